@@ -1,0 +1,1 @@
+"""Random scenes, rendered and written as a dataset."""

@@ -1,0 +1,95 @@
+"""One shot of a calibrated RGB-D camera, and the files that it is kept in."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Integer, UInt8
+
+from labkit.labels import CLASSES
+from labkit.validation import check_depth, check_K, check_labels, check_rgb, check_same_size, check_shape, check_T
+
+
+@dataclass(frozen=True, eq=False)
+class RGBDFrame:
+    """Registered colour and depth, with the calibration that turns pixels into points of the robot's base frame.
+
+    rgb: uint8 (H, W, 3), RGB. depth: metres, float32 (H, W); 0 or NaN where there is no reading. K: intrinsics, (3, 3),
+    pixel centres at integers. T_base_cam: (4, 4), maps camera coordinates (x right, y down, z forward) to base
+    coordinates. labels: true classes, uint8 (H, W), if known. instances: uint8 (H, W), 0 or the number of the object,
+    if known. Raises ValueError naming the argument that does not fit. Sections 1 and 4 of the text.
+
+    >>> frame = RGBDFrame(np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+    >>> frame.size
+    (3, 2)
+    """
+
+    rgb: UInt8[np.ndarray, "H W 3"]
+    depth: Float[np.ndarray, "H W"]
+    K: Float[np.ndarray, "3 3"]
+    T_base_cam: Float[np.ndarray, "4 4"]
+    labels: Integer[np.ndarray, "H W"] | None = None
+    instances: Integer[np.ndarray, "H W"] | None = None
+
+    def __post_init__(self):
+        def put(name, value):  # the dataclass is frozen: only here may it still take its checked values
+            object.__setattr__(self, name, value)
+
+        put("rgb", check_rgb("rgb", self.rgb))
+        put("depth", check_depth("depth", self.depth).astype(np.float32, copy=False))
+        check_same_size("rgb", self.rgb, "depth", self.depth)
+        put("K", check_K("K", self.K))
+        put("T_base_cam", check_T("T_base_cam", self.T_base_cam))
+        if self.labels is not None:
+            labels = check_shape("labels", check_labels("labels", self.labels, len(CLASSES)), (None, None))
+            check_same_size("rgb", self.rgb, "labels", labels)
+            put("labels", labels.astype(np.uint8, copy=False))
+        if self.instances is not None:
+            instances = check_shape("instances", check_labels("instances", self.instances, 256), (None, None))
+            check_same_size("rgb", self.rgb, "instances", instances)
+            put("instances", instances.astype(np.uint8, copy=False))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.rgb.shape[1], self.rgb.shape[0]
+
+    @classmethod
+    def from_files(
+        cls, rgb, depth, K, T_base_cam, labels=None, instances=None, depth_scale: float = 0.001
+    ) -> "RGBDFrame":
+        """Read a frame from image files: 8-bit RGB, 16-bit PNG depth, and 8-bit PNG labels and instances if given.
+
+        depth_scale: metres for one unit of the depth file (0.001 for millimetres); 0 in the file is "no reading".
+        Raises FileNotFoundError for a missing file, ValueError for one that is not such an image.
+        """
+        if not (np.isfinite(depth_scale) and depth_scale > 0.0):
+            raise ValueError(f"depth_scale: expected metres for one unit, above 0, got {depth_scale}")
+        raw_depth = read_image("depth", depth, np.uint16)
+        return cls(
+            rgb=read_image("rgb", rgb, np.uint8, colour=True),
+            depth=raw_depth.astype(np.float32) * np.float32(depth_scale),
+            K=K,
+            T_base_cam=T_base_cam,
+            labels=None if labels is None else read_image("labels", labels, np.uint8),
+            instances=None if instances is None else read_image("instances", instances, np.uint8),
+        )
+
+
+def read_image(name: str, path, dtype, colour: bool = False) -> np.ndarray:
+    """Read an image file as RGB (H, W, 3) if `colour`, else as one channel (H, W), without any conversion of values.
+
+    `name` is the argument that the errors speak of. Raises FileNotFoundError, or ValueError if the file is damaged
+    or holds another kind of image.
+    """
+    data = np.frombuffer(Path(path).read_bytes(), np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR if colour else cv2.IMREAD_UNCHANGED) if data.size else None
+    if image is None:
+        raise ValueError(f"{name}: {path} is not an image that can be read (damaged or truncated?)")
+    if image.dtype != dtype or (not colour and image.ndim != 2):
+        raise ValueError(
+            f"{name}: expected {np.dtype(dtype).name} with {3 if colour else 1} channel(s) in {path}, "
+            f"got {image.dtype} with shape {image.shape}"
+        )
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if colour else image

@@ -1,0 +1,176 @@
+"""A scene as plain data: what stands where, how it looks, and the camera that sees it.
+
+Nothing here knows PyBullet. A SceneSpec can be written by hand, drawn by `data_gen.sample_scene`, kept as JSON, and
+loaded into a `World`, which drops the objects from their `position` and lets them come to rest.
+"""
+
+import dataclasses
+import json
+import typing
+from dataclasses import dataclass
+from types import UnionType
+
+import numpy as np
+
+from labkit.labels import CLASSES, OBSTACLE, TARGET
+
+Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A procedural picture: `kind` is a name in `labkit.sim.textures.KINDS`, colours are RGB in 0..1."""
+
+    kind: str = "plain"
+    colour_a: Vector = (0.6, 0.5, 0.4)
+    colour_b: Vector = (0.5, 0.4, 0.3)
+    scale: float = 8.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Part:
+    """One convex piece of an object, in the object's frame.
+
+    kind "box": size = three edge lengths; "cylinder": radius, height (its axis is z); "sphere": radius; metres.
+    position in metres, orientation as a quaternion x, y, z, w.
+    """
+
+    kind: str
+    size: Vector
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Vector = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class ObjectSpec:
+    """One thing on the table: either a URDF of pybullet_data or a few convex parts.
+
+    name is unique in its scene; family says what it is; class_id is labels.TARGET or labels.OBSTACLE. scale multiplies
+    the URDF's size. mass in kg. position and orientation (quaternion x, y, z, w) place the object's frame in the base
+    frame before it settles.
+    """
+
+    name: str
+    family: str
+    class_id: int
+    position: Vector
+    orientation: Vector = (0.0, 0.0, 0.0, 1.0)
+    urdf: str | None = None
+    scale: float = 1.0
+    parts: tuple[Part, ...] = ()
+    colour: Vector = (0.8, 0.2, 0.2)
+    mass: float = 0.1
+    friction: float = 0.8
+
+    def __post_init__(self):
+        if (self.urdf is None) == (not self.parts):
+            raise ValueError(
+                f"object {self.name!r}: expected either a urdf or parts, got {self.urdf!r} and {self.parts!r}"
+            )
+        if self.class_id not in (TARGET, OBSTACLE):
+            raise ValueError(f"class_id: expected {TARGET} (target) or {OBSTACLE} (obstacle), got {self.class_id!r}")
+        if not 0.0 < self.mass:
+            raise ValueError(f"mass: expected kilograms above 0, got {self.mass}")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A box whose top is the surface, at height `z` of the base frame; its size is length in x, width in y, thickness."""
+
+    centre: Vector = (0.55, 0.0)
+    size: Vector = (0.7, 1.1, 0.05)
+    z: float = 0.0
+    texture: Texture = Texture()
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera: its pose in the base frame (4x4, row by row), its vertical field of view in radians."""
+
+    T_base_cam: tuple[Vector, ...]
+    fov_y: float = 0.8
+    near: float = 0.1
+    far: float = 6.0
+
+    @classmethod
+    def looking_at(
+        cls, target, distance: float, azimuth: float, elevation: float, roll: float = 0.0, **rest
+    ) -> "Camera":
+        """Place the camera on a sphere around `target`: angles in radians, azimuth from the base's x axis, roll about the ray."""
+        outward = np.array(
+            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        )
+        z = -outward
+        x = np.cross(z, (0.0, 0.0, 1.0))
+        x /= np.linalg.norm(x)
+        y = np.cross(z, x)
+        T = np.eye(4)
+        T[:3, 0] = np.cos(roll) * x + np.sin(roll) * y
+        T[:3, 1] = -np.sin(roll) * x + np.cos(roll) * y
+        T[:3, 2] = z
+        T[:3, 3] = np.asarray(target) + distance * outward
+        return cls(T_base_cam=tuple(map(tuple, T.tolist())), **rest)
+
+
+@dataclass(frozen=True)
+class Light:
+    """The lamp: where it shines from (base frame), its colour, and how much of it is ambient, diffuse and specular."""
+
+    direction: Vector = (0.5, 0.3, 1.0)
+    colour: Vector = (1.0, 1.0, 1.0)
+    ambient: float = 0.6
+    diffuse: float = 0.5
+    specular: float = 0.05
+    shadow: bool = True
+
+
+@dataclass(frozen=True)
+class SceneSpec:
+    """Everything that a World needs. The robot's base link stands at the origin; floor and walls are background."""
+
+    objects: tuple[ObjectSpec, ...]
+    camera: Camera
+    table: Table = Table()
+    light: Light = Light()
+    floor: Texture = Texture(kind="plain", colour_a=(0.4, 0.4, 0.42))
+    walls: Texture = Texture(kind="plain", colour_a=(0.75, 0.74, 0.7))
+    robot: bool = True
+    seed: int = 0
+    config: str = "by hand"
+
+    def __post_init__(self):
+        names = [thing.name for thing in self.objects]
+        if len(set(names)) < len(names):
+            raise ValueError(f"objects: expected unique names, got {names}")
+
+    def class_counts(self) -> dict[str, int]:
+        """How many objects there are of each class name."""
+        return {CLASSES[c]: sum(thing.class_id == c for thing in self.objects) for c in (TARGET, OBSTACLE)}
+
+    def to_json(self) -> str:
+        """Write the scene as JSON; `from_json` gives an equal scene back."""
+        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> "SceneSpec":
+        """Read a scene written by `to_json`.
+
+        >>> spec = SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.0, 0.8))
+        >>> SceneSpec.from_json(spec.to_json()) == spec
+        True
+        """
+        return _build(cls, json.loads(text))
+
+
+def _build(kind, value):
+    """Turn parsed JSON back into the dataclass, tuple or plain value that the annotation `kind` asks for."""
+    if dataclasses.is_dataclass(kind):
+        hints = typing.get_type_hints(kind)
+        return kind(**{name: _build(hints[name], item) for name, item in value.items()})
+    if typing.get_origin(kind) is UnionType:
+        return value
+    if typing.get_origin(kind) is tuple:
+        inner = typing.get_args(kind)[0]
+        return tuple(_build(inner, item) for item in value)
+    return value

@@ -1,0 +1,117 @@
+"""Checks of what callers pass in: each raises a ValueError that names the argument, what was expected and what came.
+
+Shape annotations are checked only while tests run; these checks always are, at the public entrances.
+"""
+
+import numpy as np
+
+# No sensor of this kit sees further; a larger number is a depth in millimetres.
+MAX_DEPTH_M = 100.0
+
+
+def check_shape(name: str, array, shape: tuple) -> np.ndarray:
+    """Return `array` as an ndarray if its shape fits; None in `shape` stands for any length.
+
+    >>> check_shape("P", [[1.0, 2.0, 3.0]], (None, 3)).shape
+    (1, 3)
+    """
+    array = np.asarray(array)
+    fits = array.ndim == len(shape) and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
+    if not fits:
+        expected = (
+            "(" + ", ".join("any" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+        )
+        raise ValueError(f"{name}: expected shape {expected}, got {array.shape}")
+    return array
+
+
+def check_same_size(name_a: str, a: np.ndarray, name_b: str, b: np.ndarray) -> None:
+    """Raise unless two images have the same height and width (their first two axes)."""
+    if a.shape[:2] != b.shape[:2]:
+        raise ValueError(f"{name_b}: expected the size of {name_a}, {a.shape[:2]}, got {b.shape[:2]}")
+
+
+def check_finite(name: str, array: np.ndarray) -> np.ndarray:
+    """Return `array` if it is real, numeric and without NaN or infinity."""
+    array = np.asarray(array)
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{name}: expected real numbers, got dtype {array.dtype}")
+    bad = array.size - np.count_nonzero(np.isfinite(array))
+    if bad:
+        raise ValueError(f"{name}: expected finite numbers, got {bad} NaN or infinite of {array.size}")
+    return array
+
+
+def check_rgb(name: str, image) -> np.ndarray:
+    """Return an RGB image, uint8 (H, W, 3)."""
+    image = check_shape(name, image, (None, None, 3))
+    if image.dtype != np.uint8:
+        raise ValueError(f"{name}: expected uint8 RGB in 0..255, got dtype {image.dtype}")
+    if 0 in image.shape:
+        raise ValueError(f"{name}: expected at least one pixel, got shape {image.shape}")
+    return image
+
+
+def check_depth(name: str, depth) -> np.ndarray:
+    """Return a depth image in metres, floating point (H, W); 0 and NaN mean "no reading" and are fine."""
+    depth = check_shape(name, depth, (None, None))
+    if depth.dtype.kind != "f":
+        raise ValueError(
+            f"{name}: expected floating-point metres, got dtype {depth.dtype}; "
+            "integer depth is usually millimetres: multiply by its scale (often 0.001)"
+        )
+    # One reduction answers most frames: NaN fails both comparisons, so only odd frames pay for the second look.
+    low, high = (depth.min(), depth.max()) if depth.size else (0.0, 0.0)
+    if not (low >= 0.0 and high <= MAX_DEPTH_M):
+        read = depth[~np.isnan(depth)]
+        if read.size and read.min() < 0.0:
+            raise ValueError(f"{name}: expected metres >= 0, got a minimum of {read.min():.6g}")
+        if read.size and read.max() > MAX_DEPTH_M:
+            raise ValueError(
+                f"{name}: expected metres, got a maximum of {read.max():.6g}, which looks like millimetres: "
+                "multiply by 0.001 (and mark missing readings with 0 or NaN, not infinity)"
+            )
+    return depth
+
+
+def check_K(name: str, K) -> np.ndarray:
+    """Return an intrinsic matrix as float64 (3, 3): upper triangular, last row 0 0 1, positive focal lengths."""
+    K = check_finite(name, check_shape(name, K, (3, 3))).astype(np.float64)
+    if K[1, 0] or K[2, 0] or K[2, 1]:
+        raise ValueError(f"{name}: expected an upper triangular intrinsic matrix, got {K.tolist()}; is it transposed?")
+    if K[2, 2] != 1.0:
+        raise ValueError(f"{name}: expected its last row to be 0 0 1, got {K[2].tolist()}")
+    if not (K[0, 0] > 0.0 and K[1, 1] > 0.0):
+        raise ValueError(f"{name}: expected positive focal lengths (else it is singular), got {K[0, 0]} and {K[1, 1]}")
+    return K
+
+
+def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
+    """Return a rigid transform in SE(3) as float64 (4, 4): orthonormal, right-handed, last row 0 0 0 1."""
+    T = check_finite(name, check_shape(name, T, (4, 4))).astype(np.float64)
+    if np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() > tolerance:
+        raise ValueError(f"{name}: expected its last row to be 0 0 0 1, got {T[3].tolist()}; is it transposed?")
+    R = T[:3, :3]
+    error = np.abs(R @ R.T - np.eye(3)).max()
+    if error > tolerance:
+        raise ValueError(
+            f"{name}: expected an orthonormal rotation, but R @ R.T is off from the identity by {error:.3g}"
+        )
+    if np.linalg.det(R) < 0.0:
+        raise ValueError(f"{name}: expected a right-handed rotation (determinant +1), got a mirror image (-1)")
+    return T
+
+
+def check_labels(name: str, y, num_classes: int, ignore: int | None = 255) -> np.ndarray:
+    """Return integer labels in 0 .. num_classes - 1, or `ignore`; any shape and integer dtype."""
+    y = np.asarray(y)
+    if y.dtype.kind not in "iu":
+        raise ValueError(f"{name}: expected integer labels, got dtype {y.dtype}")
+    if y.size and (y.min() < 0 or y.max() >= num_classes):
+        wrong = (y < 0) | (y >= num_classes)
+        if ignore is not None:
+            wrong &= y != ignore
+        if wrong.any():
+            allowed = f"0 to {num_classes - 1}" + (f" or {ignore}" if ignore is not None else "")
+            raise ValueError(f"{name}: expected labels {allowed}, got {np.unique(y[wrong])[:5].tolist()}")
+    return y
