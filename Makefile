@@ -1,0 +1,84 @@
+# Each target works first on a fresh machine that has only Python 3.11, and reuses .venv after that.
+#   make demo    set up, then one scene from the camera's image to the lifted object
+#   make test    set up, then lint and every test
+#   make lab     JupyterLab
+#   make train   make the data again and train the shipped weights again (over an hour on two cores)
+#   make bench   add the peers, measure against them, write BENCHMARKS.md
+#   make clean   remove what can be made again in seconds; .venv and data/ stay
+# make PYTHON=/path/to/python3.11 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := demo
+.PHONY: demo test lab train bench clean
+
+EXTRAS := test
+BIN := .venv/bin
+ARGS ?=
+
+# Training: what the shipped weights were made with.
+TRAIN_SCENES ?= 2100
+VAL_SCENES ?= 150
+SIZE ?= 320x240
+WORKERS ?= 2
+EPOCHS ?= 40
+DEVICE ?= auto
+
+demo: .venv/installed
+	$(BIN)/labkit demo $(ARGS)
+
+test: .venv/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+
+lab: .venv/installed
+	$(BIN)/jupyter lab $(ARGS)
+
+# Both steps go on where they were stopped, and do nothing if they were finished.
+train: .venv/installed
+	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/labkit train data/train --val data/val --model smallsegnet --epochs $(EPOCHS) --device $(DEVICE)
+	$(BIN)/labkit train data/train --val data/val --model unet --epochs $(EPOCHS) --device $(DEVICE)
+
+bench: .venv/installed-bench
+	$(BIN)/python -m tests.bench $(ARGS)
+
+clean:
+	rm -rf out build *.egg-info .pytest_cache .ruff_cache .hypothesis .coverage
+	find . -path ./.venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
+
+# .venv/installing is there while an installation runs and becomes .venv/installed when it ends. One that was killed
+# leaves `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
+# A changed pyproject.toml or constraints.txt only adds and removes the difference.
+.venv/installed: pyproject.toml constraints.txt
+	@python=""; \
+	for candidate in $(or $(PYTHON),python3.11 python3 python); do \
+	    if "$$candidate" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then \
+	        python="$$candidate"; break; \
+	    fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	    echo "labkit needs Python 3.11 with its venv module (Debian, Ubuntu: python3.11-venv); $(if $(PYTHON),PYTHON=$(PYTHON) is not one,make PYTHON=/path/to/python3.11 names one)." >&2; \
+	    exit 1; \
+	fi; \
+	if [ -e .venv/installing ] || ! $(BIN)/python -c 'import sys, pip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then \
+	    rm -rf .venv; \
+	fi; \
+	mkdir -p .venv; \
+	touch .venv/installing; \
+	if [ ! -e $(BIN)/python ]; then \
+	    echo "Setting up .venv: once, a minute or two where packages come quickly."; \
+	    "$$python" -m venv .venv; \
+	fi
+	@if [ -n "$(TORCH_INDEX)" ]; then \
+	    $(BIN)/python -m pip install --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"; \
+	fi
+	@$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt setuptools
+	@$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]'
+	@mv .venv/installing $@
+
+.venv/installed-bench: .venv/installed
+	$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt --no-build-isolation -e '.[$(EXTRAS),bench]'
+	touch $@
