@@ -1,0 +1,220 @@
+"""How good is a mask: the confusion matrix and every score that follows from it (the text's section 3, problem 2).
+
+Counts add up over frames and scores do not: keep one confusion matrix (and one pair of boundary counts) for a whole
+test set, add each frame's to it, and divide once at the end. A score of 0 / 0 is NaN, neither 0 nor 1.
+"""
+
+from statistics import NormalDist
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float64, Int64, Integer, Num, UInt8
+
+from labkit.labels import IGNORE
+from labkit.validation import check_finite, check_labels, check_shape
+
+
+def confusion_matrix(
+    y_true: Integer[np.ndarray, "*shape"],
+    y_pred: Integer[np.ndarray, "*shape"],
+    num_classes: int,
+    ignore: int | None = IGNORE,
+) -> Int64[np.ndarray, "{num_classes} {num_classes}"]:
+    """Count n[i, j], the pixels of true class i that are predicted as j, in one pass.
+
+    y_true, y_pred: labels of any one shape and any integer dtype. A pixel with y_true == ignore is left out, whatever
+    is predicted there; ignore=None leaves out none. Raises ValueError if the shapes differ, or if a label of a counted
+    pixel is not in 0 .. num_classes - 1. Problem 2 of the text.
+
+    >>> confusion_matrix(np.array([0, 0, 1, 255]), np.array([0, 1, 1, 0]), 2)
+    array([[1, 1], [0, 1]])
+    """
+    from labkit.metrics_kernels import count_pairs  # here, so that importing this module does not wait for numba
+
+    y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
+    # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.
+    dtype = np.uint8 if y_true.dtype == y_pred.dtype == np.uint8 else np.int64
+    flat_true, flat_pred = (np.ascontiguousarray(y, dtype).reshape(-1) for y in (y_true, y_pred))
+    no_label = np.iinfo(np.int64).min
+    n, complete = count_pairs(flat_true, flat_pred, int(num_classes), no_label if ignore is None else int(ignore))
+    if not complete:
+        _check_counted(y_true, y_pred, num_classes, ignore)
+    return n
+
+
+def iou(n: Num[np.ndarray, "C C"]) -> Float64[np.ndarray, " C"]:
+    """Score each class with TP / (TP + FP + FN): intersection over union of its true and its predicted pixels.
+
+    n: confusion matrix. NaN where a class is in neither image, because 0 / 0 is not a score. Raises ValueError if n is
+    not a square matrix of counts. Section 3 and problem 2 of the text.
+
+    >>> iou(np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]]))
+    array([0.75 , 0.66666667, nan])
+    """
+    n = _check_counts(n)
+    intersection = np.diagonal(n)
+    return _ratio(intersection, n.sum(axis=0) + n.sum(axis=1) - intersection)
+
+
+def mean_iou(n: Num[np.ndarray, "C C"]) -> float:
+    """Average the IoU over the classes that are present, in the truth or in the prediction; NaN if none is.
+
+    The text divides by C, which is 0 / 0 for a class that is in neither image. A class that is only predicted counts,
+    with an IoU of 0. n: confusion matrix. Section 3 of the text.
+
+    >>> round(mean_iou(np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]])), 4)
+    0.7083
+    """
+    scores = iou(n)
+    scores = scores[~np.isnan(scores)]
+    return float(scores.mean()) if scores.size else float("nan")
+
+
+def pixel_accuracy(n: Num[np.ndarray, "C C"]) -> float:
+    """Give the share of the counted pixels whose class is right; NaN if no pixel is counted. Section 3 of the text.
+
+    >>> pixel_accuracy(np.array([[6, 2], [0, 4]])) == 10 / 12
+    True
+    """
+    n = _check_counts(n)
+    return float(_ratio(np.trace(n), n.sum()))
+
+
+def precision_recall(n: Num[np.ndarray, "C C"]) -> tuple[Float64[np.ndarray, " C"], Float64[np.ndarray, " C"]]:
+    """Score each class with TP / (TP + FP) and TP / (TP + FN).
+
+    n: confusion matrix. Precision is NaN for a class that is never predicted, recall for one that is never true. IoU
+    cannot tell a mask that is too large from one that is too small; these two can. Problem 2 of the text.
+
+    >>> precision_recall(np.array([[6, 2], [0, 4]]))
+    (array([1. , 0.66666667]), array([0.75, 1. ]))
+    """
+    n = _check_counts(n)
+    correct = np.diagonal(n)
+    return _ratio(correct, n.sum(axis=0)), _ratio(correct, n.sum(axis=1))
+
+
+def boundary_iou(
+    y_true: Integer[np.ndarray, "H W"],
+    y_pred: Integer[np.ndarray, "H W"],
+    num_classes: int,
+    width: int | None = None,
+    ignore: int | None = IGNORE,
+) -> Float64[np.ndarray, " {num_classes}"]:
+    """Score the edge of each class's mask: IoU of the pixels that lie inside it and within `width` of its boundary.
+
+    Boundary IoU of Cheng et al. (2021). For many frames, add up `boundary_counts` and divide once. A width that reaches
+    the middle of every mask gives the plain IoU. NaN where a class is in neither image. Arguments and errors as there.
+
+    >>> y = np.zeros((5, 5), int); y[1:4, 1:4] = 1
+    >>> boundary_iou(y, np.roll(y, 1, axis=1), 2, width=1)[1]  # moved by a pixel, a rim of 8 shares 4: 4 / (8 + 8 - 4)
+    np.float64(0.3333333333333333)
+    """
+    return _ratio(*boundary_counts(y_true, y_pred, num_classes, width, ignore))
+
+
+def boundary_counts(
+    y_true: Integer[np.ndarray, "H W"],
+    y_pred: Integer[np.ndarray, "H W"],
+    num_classes: int,
+    width: int | None = None,
+    ignore: int | None = IGNORE,
+) -> tuple[Int64[np.ndarray, " {num_classes}"], Int64[np.ndarray, " {num_classes}"]]:
+    """Count, class by class, the pixels in the intersection and in the union of the true and predicted boundary bands.
+
+    The band of a mask: its pixels with a pixel outside it, or the image's border, within `width` rows and columns.
+    width: pixels, at least 1; None is the paper's 2 % of the image's diagonal. An ignored pixel belongs to no mask,
+    true or predicted. Raises ValueError if the shapes differ, a label is out of range, or width is below 1.
+
+    >>> boundary_counts(np.array([[0, 0, 1, 1]]), np.array([[0, 1, 1, 1]]), 2, width=1)
+    (array([1, 2]), array([2, 3]))
+    """
+    y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
+    check_shape("y_true", y_true, (None, None))
+    if num_classes > IGNORE:
+        raise ValueError(f"num_classes: expected at most {IGNORE} for boundaries, got {num_classes}")
+    _check_counted(y_true, y_pred, num_classes, ignore)
+    if width is None:
+        width = max(1, round(0.02 * np.hypot(*y_true.shape)))
+    if width < 1:
+        raise ValueError(f"width: expected at least 1 pixel, got {width}")
+
+    ignored = y_true == ignore
+    true, pred = (np.where(ignored, np.uint8(IGNORE), y.astype(np.uint8)) for y in (y_true, y_pred))
+    true_band, pred_band = _boundary_band(true, width), _boundary_band(pred, width)
+
+    def pixels_per_class(labels):  # entry 255, the ignored pixels, is cut off
+        return np.bincount(labels, minlength=IGNORE + 1)[:num_classes].astype(np.int64)
+
+    intersection = pixels_per_class(true[true_band & pred_band & (true == pred)])
+    return intersection, pixels_per_class(true[true_band]) + pixels_per_class(pred[pred_band]) - intersection
+
+
+def _boundary_band(y: UInt8[np.ndarray, "H W"], width: int) -> Bool[np.ndarray, "H W"]:
+    """Mark the pixels that have another label, or the image's border, within `width` rows and columns.
+
+    One erosion and one dilation serve all classes at once: a window holds one label only if its minimum is its maximum.
+    """
+    width = min(width, max(y.shape))  # a wider window sees no more
+    window = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
+    # OpenCV's windows end where the image does; a frame of another label makes the image's border a boundary.
+    framed = np.pad(y, 1, constant_values=IGNORE)
+    return (cv2.erode(framed, window) != cv2.dilate(framed, window))[1:-1, 1:-1]
+
+
+def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Bound a success rate, such as the share of objects lifted, by Wilson's score interval.
+
+    Unlike rate +- 1.96 sqrt(rate (1 - rate) / trials), it stays in 0..1 and does not shrink to a point at 0 or all
+    successes. Raises ValueError without a trial, or if successes are not in 0 .. trials.
+
+    >>> [round(bound, 3) for bound in wilson_interval(20, 20)]
+    [0.839, 1.0]
+    """
+    if trials < 1:
+        raise ValueError(f"trials: expected at least 1, got {trials}")
+    if not 0 <= successes <= trials:
+        raise ValueError(f"successes: expected 0 to {trials}, got {successes}")
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence: expected a share between 0 and 1, got {confidence}")
+    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
+    rate = successes / trials
+    spread = 1.0 + z**2 / trials
+    centre = (rate + z**2 / (2 * trials)) / spread
+    half = z * np.sqrt(rate * (1.0 - rate) / trials + z**2 / (4 * trials**2)) / spread
+    low = 0.0 if successes == 0 else float(centre - half)  # exactly 0, where rounding would miss it
+    high = 1.0 if successes == trials else float(centre + half)
+    return low, high
+
+
+def _ratio(part, whole):
+    """Divide in float64; 0 / 0 is NaN without a warning."""
+    with np.errstate(invalid="ignore"):
+        return np.true_divide(part, whole, dtype=np.float64)
+
+
+def _check_counts(n) -> np.ndarray:
+    n = check_finite("n", n)
+    if n.ndim != 2 or n.shape[0] != n.shape[1]:
+        raise ValueError(f"n: expected a square confusion matrix (C, C), got shape {n.shape}")
+    if n.size and n.min() < 0:
+        raise ValueError(f"n: expected counts of at least 0, got {n.min()}")
+    return n.astype(np.float64)
+
+
+def _check_pair(y_true, y_pred, num_classes) -> tuple[np.ndarray, np.ndarray]:
+    if not isinstance(num_classes, int | np.integer) or num_classes < 1:
+        raise ValueError(f"num_classes: expected a whole number of at least 1, got {num_classes!r}")
+    y_true, y_pred = np.asarray(y_true), np.asarray(y_pred)
+    for name, y in (("y_true", y_true), ("y_pred", y_pred)):
+        if y.dtype.kind not in "iu":
+            raise ValueError(f"{name}: expected integer labels, got dtype {y.dtype}")
+    if y_true.shape != y_pred.shape:
+        raise ValueError(f"y_pred: expected the shape of y_true, {y_true.shape}, got {y_pred.shape}")
+    return y_true, y_pred
+
+
+def _check_counted(y_true, y_pred, num_classes, ignore) -> None:
+    """Raise if a pixel that counts has a label out of range."""
+    check_labels("y_true", y_true, num_classes, ignore)
+    check_labels("y_pred", y_pred[y_true != ignore], num_classes, ignore=None)

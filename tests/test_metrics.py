@@ -1,0 +1,411 @@
+"""labkit.metrics against loops written from the definitions, scikit-learn, torchmetrics and SciPy."""
+
+import numpy as np
+import pytest
+import sklearn.metrics
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy import ndimage, stats
+from torchmetrics.functional import classification as torchmetrics
+
+from labkit import metrics
+from labkit.losses import cross_entropy
+
+C = 4
+DTYPES = (np.int8, np.uint8, np.int32, np.int64)
+
+
+untimed = settings(deadline=None)  # the first call compiles
+
+
+@st.composite
+def label_pairs(draw, min_dims=0, max_dims=3):
+    """Draw true and predicted labels of one shape, each of its own dtype; some true ones are 255 where that fits."""
+    shape = draw(hnp.array_shapes(min_dims=min_dims, max_dims=max_dims, min_side=0, max_side=7))
+    true_dtype, pred_dtype = draw(st.tuples(st.sampled_from(DTYPES), st.sampled_from(DTYPES)))
+    classes = [*range(C), 255] if np.iinfo(true_dtype).max >= 255 else list(range(C))
+    y_true = draw(hnp.arrays(true_dtype, shape, elements=st.sampled_from(classes)))
+    y_pred = draw(hnp.arrays(pred_dtype, shape, elements=st.integers(0, C - 1)))
+    return y_true, y_pred
+
+
+image_pairs = label_pairs(min_dims=2, max_dims=2)
+
+
+def counted_by_hand(y_true, y_pred, num_classes, ignore=255):
+    n = np.zeros((num_classes, num_classes), np.int64)
+    for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
+        if i != ignore:
+            n[i, j] += 1
+    return n
+
+
+def random_labels(seed, shape=(48, 64), share_ignored=0.1):
+    rng = np.random.default_rng(seed)
+    y_true = rng.choice(C, size=shape, p=[0.5, 0.3, 0.05, 0.15]).astype(np.uint8)
+    y_pred = np.where(rng.random(shape) < 0.7, y_true, rng.integers(0, C, shape)).astype(np.uint8)
+    y_true[rng.random(shape) < share_ignored] = 255
+    return y_true, y_pred
+
+
+# Confusion matrix
+
+
+@untimed
+@given(label_pairs())
+def test_confusion_matrix_is_the_count_by_hand_for_every_shape_and_dtype(pair):
+    n = metrics.confusion_matrix(*pair, C)
+    assert n.dtype == np.int64
+    np.testing.assert_array_equal(n, counted_by_hand(*pair, C))
+
+
+@untimed
+@given(label_pairs())
+def test_every_pixel_that_is_not_ignored_is_counted_once(pair):
+    y_true, y_pred = pair
+    n = metrics.confusion_matrix(y_true, y_pred, C)
+    assert n.sum() == np.count_nonzero(y_true != 255)
+    for c in range(C):
+        assert n[c].sum() == np.count_nonzero(y_true == c)  # rows are true classes
+        assert n[:, c].sum() == np.count_nonzero((y_pred == c) & (y_true != 255))  # columns are predicted ones
+
+
+def test_rows_are_true_classes_and_columns_predicted_ones():
+    n = metrics.confusion_matrix(np.array([0, 0, 0]), np.array([1, 1, 0]), 2)
+    assert n.tolist() == [[1, 2], [0, 0]]
+
+
+@untimed
+@given(image_pairs)
+def test_memory_layout_does_not_matter(pair):
+    y_true, y_pred = pair
+    expected = metrics.confusion_matrix(y_true, y_pred, C)
+    np.testing.assert_array_equal(metrics.confusion_matrix(y_true.T, y_pred.T, C), expected)
+    np.testing.assert_array_equal(metrics.confusion_matrix(y_true[::-1, ::-1], y_pred[::-1, ::-1], C), expected)
+    np.testing.assert_array_equal(metrics.confusion_matrix(np.asfortranarray(y_true), y_pred, C), expected)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_confusion_matrix_agrees_with_scikit_learn_and_torchmetrics(seed):
+    y_true, y_pred = random_labels(seed)
+    n = metrics.confusion_matrix(y_true, y_pred, C)
+    counted = y_true != 255
+    np.testing.assert_array_equal(
+        n, sklearn.metrics.confusion_matrix(y_true[counted], y_pred[counted], labels=range(C))
+    )
+    peer = torchmetrics.multiclass_confusion_matrix(
+        torch.from_numpy(y_pred).long(), torch.from_numpy(y_true).long(), C, ignore_index=255
+    )
+    np.testing.assert_array_equal(n, peer.numpy())
+
+
+def test_an_image_of_ignored_pixels_counts_nothing_and_scores_nan():
+    n = metrics.confusion_matrix(np.full((3, 5), 255, np.uint8), np.zeros((3, 5), np.uint8), C)
+    assert n.tolist() == np.zeros((C, C)).tolist()
+    assert np.isnan(metrics.iou(n)).all()
+    assert np.isnan(metrics.mean_iou(n))
+    assert np.isnan(metrics.pixel_accuracy(n))
+    assert np.isnan(metrics.precision_recall(n)).all()
+
+
+def test_what_is_predicted_at_an_ignored_pixel_changes_no_count():
+    # Mistake 21: the loss leaves 255 out, and so must the metric, whatever stands in the prediction there.
+    y_true, y_pred = random_labels(0)
+    for anything in (0, 3, 255):
+        other = np.where(y_true == 255, np.uint8(anything), y_pred)
+        np.testing.assert_array_equal(
+            metrics.confusion_matrix(y_true, other, C), metrics.confusion_matrix(y_true, y_pred, C)
+        )
+
+
+def test_loss_and_metric_leave_out_the_same_pixels():
+    y_true, y_pred = random_labels(1)
+    certain_of_nothing = np.zeros((*y_true.shape, C))
+    pixels_in_loss = cross_entropy(certain_of_nothing, y_true) / np.log(C)
+    assert pixels_in_loss == pytest.approx(metrics.confusion_matrix(y_true, y_pred, C).sum())
+
+
+@pytest.mark.parametrize("ignore", [-1, 0, 3, 7])
+def test_any_label_can_be_the_one_to_ignore(ignore):
+    y_true = np.array([0, 1, 2, 3, ignore])
+    y_pred = np.array([0, 0, 2, 1, 2])
+    n = metrics.confusion_matrix(y_true, y_pred, C, ignore=ignore)
+    np.testing.assert_array_equal(n, counted_by_hand(y_true, y_pred, C, ignore))
+
+
+def test_without_a_label_to_ignore_every_label_must_be_a_class():
+    y = np.array([[0, 255]], np.uint8)
+    assert metrics.confusion_matrix(y, y, 256, ignore=None)[255, 255] == 1
+    with pytest.raises(ValueError, match=r"y_true: expected labels 0 to 3, got \[255\]"):
+        metrics.confusion_matrix(y, y, C, ignore=None)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("name", "y_true", "y_pred", "num_classes"),
+    [
+        ("y_true", np.array([0, 4]), np.array([0, 0]), C),
+        ("y_true", np.array([0, -1]), np.array([0, 0]), C),
+        ("y_true", np.array([0, 254], np.uint8), np.array([0, 0], np.uint8), C),
+        ("y_true", np.array([0, 2**63], np.uint64), np.array([0, 0]), C),
+        ("y_true", np.array([0.0, 1.0]), np.array([0, 0]), C),
+        ("y_pred", np.array([0, 1]), np.array([0, 4]), C),
+        ("y_pred", np.array([0, 1]), np.array([0, -1]), C),
+        ("y_pred", np.array([0, 1], np.uint8), np.array([0, 255], np.uint8), C),
+        ("y_pred", np.array([0, 1]), np.array([True, False]), C),
+        ("y_pred", np.zeros((2, 3), int), np.zeros((3, 2), int), C),
+        ("y_pred", np.zeros((2, 3), int), np.zeros(6, int), C),
+        ("num_classes", np.array([0]), np.array([0]), 0),
+        ("num_classes", np.array([0]), np.array([0]), 2.0),
+    ],
+)
+def test_confusion_matrix_names_the_argument_that_is_wrong(name, y_true, y_pred, num_classes):
+    with pytest.raises(ValueError, match=f"^{name}: expected"):
+        metrics.confusion_matrix(y_true, y_pred, num_classes)
+
+
+# Scores
+
+
+@untimed
+@given(label_pairs())
+def test_iou_is_intersection_over_union_of_the_masks(pair):
+    y_true, y_pred = pair
+    scores = metrics.iou(metrics.confusion_matrix(y_true, y_pred, C))
+    for c in range(C):
+        true, pred = y_true == c, (y_pred == c) & (y_true != 255)
+        union = np.count_nonzero(true | pred)
+        if union:
+            assert scores[c] == np.count_nonzero(true & pred) / union
+        else:
+            assert np.isnan(scores[c])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_scores_agree_with_scikit_learn_and_torchmetrics(seed):
+    y_true, y_pred = random_labels(seed)
+    n = metrics.confusion_matrix(y_true, y_pred, C)
+    precision, recall = metrics.precision_recall(n)
+    counted = y_true != 255
+    pair = y_true[counted], y_pred[counted]
+    np.testing.assert_allclose(metrics.iou(n), sklearn.metrics.jaccard_score(*pair, average=None), rtol=1e-14)
+    assert metrics.mean_iou(n) == pytest.approx(sklearn.metrics.jaccard_score(*pair, average="macro"), rel=1e-14)
+    assert metrics.pixel_accuracy(n) == pytest.approx(sklearn.metrics.accuracy_score(*pair), rel=1e-14)
+    np.testing.assert_allclose(precision, sklearn.metrics.precision_score(*pair, average=None), rtol=1e-14)
+    np.testing.assert_allclose(recall, sklearn.metrics.recall_score(*pair, average=None), rtol=1e-14)
+
+    tensors = torch.from_numpy(y_pred).long(), torch.from_numpy(y_true).long(), C
+    jaccard = torchmetrics.multiclass_jaccard_index(*tensors, average=None, ignore_index=255)
+    np.testing.assert_allclose(metrics.iou(n), jaccard.numpy(), rtol=1e-6)
+    accuracy = torchmetrics.multiclass_accuracy(*tensors, average="micro", ignore_index=255)
+    assert metrics.pixel_accuracy(n) == pytest.approx(accuracy.item(), rel=1e-6)
+
+
+def test_an_absent_class_scores_neither_0_nor_1_and_leaves_the_mean_alone():
+    # Mistake 17. Without the absent class, the mean of 3/4 and 2/3; with it as 0 or 1 it would be lower or higher.
+    n = np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]])
+    assert np.isnan(metrics.iou(n)[2])
+    assert metrics.mean_iou(n) == pytest.approx((3 / 4 + 2 / 3) / 2)
+    assert metrics.mean_iou(n) == metrics.mean_iou(n[:2, :2])
+
+
+def test_a_class_that_is_only_predicted_scores_0():
+    n = np.array([[3, 1], [0, 0]])
+    assert metrics.iou(n).tolist() == [0.75, 0.0]
+    assert metrics.mean_iou(n) == 0.375
+
+
+def test_counts_are_added_before_they_are_divided():
+    # Mistake 18: frames of IoU 1/1 and 0/99 average to 0.5; all their pixels together score 0.01.
+    frames = [np.array([[0, 0], [0, 1]]), np.array([[0, 0], [99, 0]])]
+    assert metrics.iou(sum(frames))[1] == 0.01
+    assert np.mean([metrics.iou(n)[1] for n in frames]) == 0.5
+
+
+@untimed
+@given(st.lists(label_pairs(), min_size=1, max_size=4))
+def test_the_sum_of_confusion_matrices_is_that_of_all_pixels_together(frames):
+    together = (np.concatenate([y.ravel() for y in images]) for images in zip(*frames, strict=True))
+    np.testing.assert_array_equal(
+        sum(metrics.confusion_matrix(*frame, C) for frame in frames), metrics.confusion_matrix(*together, C)
+    )
+
+
+matrices = hnp.arrays(np.int64, st.integers(1, 6).map(lambda c: (c, c)), elements=st.integers(0, 50))
+
+
+@given(matrices)
+def test_iou_cannot_tell_false_positives_from_false_negatives_but_precision_can(n):
+    # Mistake 19: swapping truth and prediction transposes n.
+    precision, recall = metrics.precision_recall(n)
+    np.testing.assert_array_equal(metrics.iou(n), metrics.iou(n.T))
+    np.testing.assert_array_equal(precision, metrics.precision_recall(n.T)[1])
+    np.testing.assert_array_equal(recall, metrics.precision_recall(n.T)[0])
+
+
+@given(matrices)
+def test_precision_and_recall_give_back_the_iou(n):
+    precision, recall = metrics.precision_recall(n)
+    scores = metrics.iou(n)
+    hit = np.diagonal(n) > 0
+    np.testing.assert_allclose(1 / scores[hit], 1 / precision[hit] + 1 / recall[hit] - 1, rtol=1e-12)
+    assert ((scores[hit] <= precision[hit]) & (scores[hit] <= recall[hit])).all()
+
+
+def test_mean_iou_gives_a_small_class_the_voice_of_a_large_one():
+    # Mistake 20: the sum of intersections over the sum of unions is nearly the background's score alone.
+    n = np.array([[9900, 0], [100, 0]])
+    assert metrics.mean_iou(n) == pytest.approx((0.99 + 0.0) / 2)
+    assert metrics.pixel_accuracy(n) == 0.99
+
+
+def test_large_counts_of_small_dtypes_do_not_overflow():
+    n = np.full((2, 2), 200, np.uint8)
+    np.testing.assert_allclose(metrics.iou(n), 1 / 3)
+    assert metrics.pixel_accuracy(n) == 0.5
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("score", [metrics.iou, metrics.mean_iou, metrics.pixel_accuracy, metrics.precision_recall])
+@pytest.mark.parametrize(
+    "n", [np.zeros((2, 3), int), np.zeros(4, int), np.array([[1, -1], [0, 1]]), np.array([[np.nan]]), np.array([["a"]])]
+)
+def test_scores_name_the_matrix_that_is_wrong(score, n):
+    with pytest.raises(ValueError, match=r"^n: expected"):
+        score(n)
+
+
+# Boundaries
+
+
+def bands_by_hand(y, c, width):
+    """Mark the pixels of class c that have another label, or nothing, within `width` rows and columns, in loops."""
+    H, W = y.shape
+    band = np.zeros((H, W), bool)
+    for v, u in np.argwhere(y == c):
+        for dv in range(-width, width + 1):
+            for du in range(-width, width + 1):
+                inside = 0 <= v + dv < H and 0 <= u + du < W
+                band[v, u] |= not inside or y[v + dv, u + du] != c
+    return band
+
+
+@untimed
+@given(image_pairs, st.integers(1, 4))
+def test_boundary_counts_are_those_of_bands_found_by_hand(pair, width):
+    y_true, y_pred = pair
+    intersection, union = metrics.boundary_counts(y_true, y_pred, C, width)
+    y_pred = np.where(y_true == 255, -1, y_pred.astype(int))
+    for c in range(C):
+        true, pred = bands_by_hand(y_true, c, width), bands_by_hand(y_pred, c, width)
+        assert intersection[c] == np.count_nonzero(true & pred)
+        assert union[c] == np.count_nonzero(true | pred)
+
+
+def blobs(seed, shape=(60, 90)):
+    """Draw a label image with regions, the largest of a few smoothed noises, as a scene has them."""
+    noise = np.random.default_rng(seed).normal(size=(C, *shape))
+    return np.stack([ndimage.gaussian_filter(channel, 6) for channel in noise]).argmax(axis=0).astype(np.uint8)
+
+
+@pytest.mark.parametrize("width", [1, 3, 8])
+def test_the_band_is_what_repeated_3x3_erosion_takes_off(width):
+    # The recipe of the paper's own code, for each class by itself.
+    y_true, y_pred = blobs(0), np.roll(blobs(0), 2, axis=1)
+    scores = metrics.boundary_iou(y_true, y_pred, C, width)
+    for c in range(C):
+        bands = [
+            (y == c) & ~ndimage.binary_erosion(y == c, np.ones((3, 3)), iterations=width) for y in (y_true, y_pred)
+        ]
+        assert scores[c] == np.count_nonzero(bands[0] & bands[1]) / np.count_nonzero(bands[0] | bands[1])
+
+
+@untimed
+@given(image_pairs)
+def test_a_width_that_reaches_every_pixel_gives_the_plain_iou(pair):
+    plain = metrics.iou(metrics.confusion_matrix(*pair, C))
+    np.testing.assert_array_equal(metrics.boundary_iou(*pair, C, width=100), plain)
+
+
+def test_boundary_iou_sees_a_shifted_edge_where_the_plain_iou_hardly_does():
+    y_true = np.zeros((100, 100), np.uint8)
+    y_true[20:80, 20:80] = 1
+    y_pred = np.roll(y_true, 2, axis=0)
+    assert metrics.iou(metrics.confusion_matrix(y_true, y_pred, 2))[1] > 0.9
+    assert metrics.boundary_iou(y_true, y_pred, 2, width=2)[1] < 0.4
+
+
+def test_a_prediction_that_is_right_wherever_it_is_judged_scores_1():
+    y_true = blobs(1)
+    y_pred = y_true.copy()
+    y_true[ndimage.binary_dilation(y_true == 2) & (y_true != 2)] = 255  # an unsure ring around class 2
+    y_pred[y_true == 255] = 2
+    assert np.count_nonzero(y_true == 255) > 50
+    np.testing.assert_array_equal(metrics.boundary_iou(y_true, y_pred, C), np.ones(C))
+
+
+def test_the_default_width_is_two_hundredths_of_the_diagonal():
+    y_true, y_pred = blobs(2, (120, 160)), blobs(3, (120, 160))
+    np.testing.assert_array_equal(
+        metrics.boundary_counts(y_true, y_pred, C), metrics.boundary_counts(y_true, y_pred, C, width=4)
+    )
+    tiny = np.array([[0, 1], [1, 1]])
+    np.testing.assert_array_equal(metrics.boundary_iou(tiny, tiny, 2), [1.0, 1.0])
+
+
+def test_boundary_iou_is_nan_for_an_absent_class_and_0_for_one_only_predicted():
+    scores = metrics.boundary_iou(np.zeros((4, 6), np.uint8), np.eye(4, 6, dtype=np.uint8), 3)
+    assert 0.0 < scores[0] < 1.0
+    assert scores[1] == 0.0
+    assert np.isnan(scores[2])
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("y_true", {"y_true": np.full((3, 4), 4)}),
+        ("y_true", {"y_true": np.zeros(12, int), "y_pred": np.zeros(12, int)}),
+        ("y_pred", {"y_pred": np.full((3, 4), 255)}),
+        ("y_pred", {"y_pred": np.zeros((4, 3), int)}),
+        ("width", {"width": 0}),
+        ("num_classes", {"num_classes": 256}),
+    ],
+)
+def test_boundary_iou_names_the_argument_that_is_wrong(name, change):
+    good = {"y_true": np.zeros((3, 4), int), "y_pred": np.zeros((3, 4), int), "num_classes": C}
+    with pytest.raises(ValueError, match=f"^{name}: expected"):
+        metrics.boundary_iou(**(good | change))
+
+
+# Lift rates
+
+
+@given(st.integers(1, 2000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), st.floats(0.5, 0.999))
+def test_wilson_interval_agrees_with_scipy_and_holds_the_rate(result, confidence):
+    low, high = metrics.wilson_interval(*result, confidence)
+    peer = stats.binomtest(*result).proportion_ci(confidence, method="wilson")
+    assert (low, high) == pytest.approx((peer.low, peer.high), abs=1e-9)
+    assert 0.0 <= low <= result[0] / result[1] <= high <= 1.0
+
+
+def test_wilson_interval_of_a_clean_sweep_still_has_a_width():
+    assert metrics.wilson_interval(20, 20) == pytest.approx((0.8389, 1.0), abs=1e-4)
+    assert metrics.wilson_interval(0, 20) == pytest.approx((0.0, 0.1611), abs=1e-4)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("trials", (0, 0)),
+        ("successes", (-1, 10)),
+        ("successes", (11, 10)),
+        ("confidence", (5, 10, 95)),
+    ],
+)
+def test_wilson_interval_names_the_argument_that_is_wrong(name, arguments):
+    with pytest.raises(ValueError, match=f"^{name}: expected"):
+        metrics.wilson_interval(*arguments)
