@@ -1,0 +1,110 @@
+"""Random changes of a training batch that leave its labels true: the network must not learn what may change.
+
+Every change works on the whole batch as tensors and draws from the generator that it is given, so that a seed
+gives the same batch again. Images are float (N, 3, H, W) in [0, 1], labels integer (N, H, W).
+"""
+
+import torch
+from jaxtyping import Float, Integer, UInt8
+from torch.nn import functional as F
+
+
+def uniform(low: float, high: float, shape: tuple, generator: torch.Generator) -> torch.Tensor:
+    """Draw numbers between `low` and `high`."""
+    return low + (high - low) * torch.rand(shape, generator=generator)
+
+
+def random_crop(
+    rgb: UInt8[torch.Tensor, "N H W 3"],
+    y: UInt8[torch.Tensor, "N H W"],
+    size: tuple[int, int],
+    generator: torch.Generator,
+    zoom: float = 1.0,
+) -> tuple[Float[torch.Tensor, "N 3 h w"], UInt8[torch.Tensor, "N h w"]]:
+    """Cut a window of (h, w) pixels at a random place of each image, and turn its bytes into floats in [0, 1].
+
+    zoom: the window holds `zoom` times fewer pixels along each axis and is enlarged (labels by nearest neighbour).
+    Raises ValueError if the window is larger than the image.
+
+    >>> rgb, y = torch.zeros(2, 6, 8, 3, dtype=torch.uint8), torch.zeros(2, 6, 8, dtype=torch.uint8)
+    >>> [tuple(t.shape) for t in random_crop(rgb, y, (4, 4), torch.Generator())]
+    [(2, 3, 4, 4), (2, 4, 4)]
+    """
+    N, H, W = y.shape
+    h, w = (round(length / zoom) for length in size)
+    if h > H or w > W:
+        raise ValueError(f"size: expected a window within {(H, W)}, got {(h, w)}")
+    rows = torch.randint(0, H - h + 1, (N,), generator=generator).tolist()
+    columns = torch.randint(0, W - w + 1, (N,), generator=generator).tolist()
+    windows = [(i, slice(r, r + h), slice(c, c + w)) for i, (r, c) in enumerate(zip(rows, columns, strict=True))]
+    # Bytes (N, h, w, 3) seen as (N, 3, h, w) are channels_last as they stand: no transpose is ever made.
+    x = torch.stack([rgb[window] for window in windows]).permute(0, 3, 1, 2).float().div_(255.0)
+    y = torch.stack([y[window] for window in windows])
+    if (h, w) != tuple(size):
+        x = F.interpolate(x, size=tuple(size), mode="bilinear")
+        y = F.interpolate(y[:, None], size=tuple(size), mode="nearest-exact")[:, 0]
+    return x, y
+
+
+def random_flip(
+    x: Float[torch.Tensor, "N 3 H W"], y: Integer[torch.Tensor, "N H W"], generator: torch.Generator
+) -> tuple[Float[torch.Tensor, "N 3 H W"], Integer[torch.Tensor, "N H W"]]:
+    """Mirror about half of the images left to right, and their labels with them; in place."""
+    flip = torch.rand(len(x), generator=generator) < 0.5
+    x[flip], y[flip] = x[flip].flip(-1), y[flip].flip(-1)
+    return x, y
+
+
+def random_colour(x: Float[torch.Tensor, "N 3 H W"], generator: torch.Generator) -> Float[torch.Tensor, "N 3 H W"]:
+    """Change each image's white balance, contrast, brightness and saturation: one affine map of its colours."""
+    N = len(x)
+    gains = uniform(0.8, 1.25, (N, 1, 1), generator) * uniform(0.85, 1.18, (N, 3, 1), generator)
+    saturation = uniform(0.5, 1.4, (N, 1, 1), generator)
+    grey = torch.full((3, 3), 1.0 / 3.0)
+    A = gains * (grey + saturation * (torch.eye(3) - grey))
+    b = 0.5 - 0.5 * gains[..., 0] + uniform(-0.12, 0.12, (N, 1), generator)
+    return torch.einsum("ncd,ndhw->nchw", A, x) + b[..., None, None]
+
+
+def random_sharpness(x: Float[torch.Tensor, "N 3 H W"], generator: torch.Generator) -> Float[torch.Tensor, "N 3 H W"]:
+    """Blur some images and sharpen others a little: towards their 3x3 mean, or away from it; half stay as they are."""
+    amount = uniform(-0.4, 0.8, (len(x),), generator) * (torch.rand(len(x), generator=generator) < 0.5)
+    mean = F.avg_pool2d(x, 3, stride=1, padding=1, count_include_pad=False)
+    return torch.lerp(x, mean, amount[:, None, None, None])
+
+
+def random_noise(x: Float[torch.Tensor, "N 3 H W"], generator: torch.Generator) -> Float[torch.Tensor, "N 3 H W"]:
+    """Add a sensor's noise, of another strength in each image.
+
+    One noise image serves the batch, rolled to another place each time: drawing it is what costs.
+    """
+    noise = torch.randn(x[0].shape, generator=generator).permute(1, 2, 0).contiguous().permute(2, 0, 1)
+    strength = uniform(0.0, 0.04, (len(x),), generator)
+    shifts = torch.randint(0, 64, (len(x), 2), generator=generator).tolist()
+    rolled = torch.stack([noise.roll(shift, (1, 2)) for shift in shifts])
+    return x + strength[:, None, None, None] * rolled
+
+
+def augment(
+    rgb: UInt8[torch.Tensor, "N H W 3"],
+    y: UInt8[torch.Tensor, "N H W"],
+    size: tuple[int, int],
+    generator: torch.Generator,
+) -> tuple[Float[torch.Tensor, "N 3 h w"], UInt8[torch.Tensor, "N h w"]]:
+    """Crop to `size` (h, w), zoom every other batch, flip, and change colour, sharpness and noise.
+
+    The same generator state gives the same batch; 255 stays 255. Raises ValueError if `size` exceeds the image.
+
+    >>> rgb, y = torch.zeros(2, 6, 8, 3, dtype=torch.uint8), torch.full((2, 6, 8), 255, dtype=torch.uint8)
+    >>> x, y = augment(rgb, y, (4, 4), torch.Generator().manual_seed(0))
+    >>> tuple(x.shape), float(x.min()) >= 0.0, y.unique().tolist()
+    ((2, 3, 4, 4), True, [255])
+    """
+    zoom = 1.0
+    if torch.rand((), generator=generator) < 0.5:
+        # Zooming out is limited by the image: a window cannot be larger than it.
+        widest = max(0.8, size[0] / y.shape[1], size[1] / y.shape[2])
+        zoom = float(uniform(min(widest, 1.0), 1.25, (), generator))
+    x, y = random_flip(*random_crop(rgb, y, size, generator, zoom), generator)
+    x = random_noise(random_sharpness(random_colour(x, generator), generator), generator)
+    return x.clamp_(0.0, 1.0).contiguous(memory_format=torch.channels_last), y

@@ -1,0 +1,340 @@
+"""Training a network on labelled images: fast on a CPU, seeded, stopped and resumed at will (the text's section 3).
+
+A run is a function of its configuration and its data. Step s of it draws its randomness from (seed, s) and the order of
+epoch e from (seed, e), so that nothing has to be replayed: weights, optimiser and the number of steps done are all
+that a checkpoint holds, and a resumed run ends where an undisturbed one does.
+"""
+
+import json
+import math
+import signal
+import threading
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import nn
+from tqdm.auto import tqdm
+
+from labkit.augment import augment
+from labkit.frame import RGBDFrame
+from labkit.labels import CLASSES, IGNORE, TARGET
+from labkit.losses import SCHEMES, class_weights, segmentation_loss
+from labkit.metrics import confusion_matrix, iou, mean_iou
+from labkit.network import ARCHITECTURES, read_checkpoint, save_model, write_atomically
+from labkit.validation import check_labels, check_rgb
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """Everything that a run depends on besides its data.
+
+    model: "unet" or "smallsegnet". epochs: passes over the data; steps: optimiser steps instead, if given. lr: the
+    highest learning rate; weights: scheme of labkit.losses.class_weights. crop: (h, w) of the random window of each
+    image, or None for whole images. val_every: epochs between validations. Raises ValueError for a bad value.
+
+    >>> TrainConfig(model="unet", epochs=2).batch
+    8
+    """
+
+    model: str = "unet"
+    epochs: int = 40
+    steps: int | None = None
+    batch: int = 8
+    lr: float = 3e-3
+    weight_decay: float = 0.01
+    warmup: float = 0.05  # share of the steps in which the learning rate rises
+    weights: str = "sqrt"
+    augment: bool = True
+    crop: tuple[int, int] | None = (192, 256)
+    val_every: int = 1
+    num_classes: int = len(CLASSES)
+    seed: int = 0
+
+    def __post_init__(self):
+        def need(name, fits, expected):
+            if not fits:
+                raise ValueError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+
+        need("model", self.model in ARCHITECTURES, f"one of {sorted(ARCHITECTURES)}")
+        need("weights", self.weights in SCHEMES, f"one of {', '.join(SCHEMES)}")
+        need("epochs", self.epochs >= 1, "at least 1")
+        need("steps", self.steps is None or self.steps >= 1, "at least 1, or None")
+        need("batch", self.batch >= 1, "at least 1")
+        need("lr", 0.0 < self.lr < 1.0, "a learning rate between 0 and 1")
+        need("weight_decay", 0.0 <= self.weight_decay < 1.0, "a share in 0..1")
+        need("warmup", 0.0 <= self.warmup < 1.0, "a share in 0..1")
+        need("val_every", self.val_every >= 1, "at least 1")
+        need("num_classes", 2 <= self.num_classes <= IGNORE, f"2 to {IGNORE}")
+        need("seed", self.seed >= 0, "at least 0")
+        need("crop", self.crop is None or (len(self.crop) == 2 and min(self.crop) >= 4), "(h, w) of 4 or more, or None")
+        if self.crop is not None:
+            object.__setattr__(self, "crop", tuple(int(length) for length in self.crop))
+
+    def learning_rate(self, step: int, total: int) -> float:
+        """Learning rate at a step of `total`: a linear rise, then half a cosine that falls to 0."""
+        rise = max(1, round(self.warmup * total))
+        if step < rise:
+            return self.lr * (step + 1) / rise
+        return self.lr * 0.5 * (1.0 + math.cos(math.pi * (step - rise) / max(1, total - rise)))
+
+
+# What the committed weights are trained with; SmallSegNet has no normalisation, and wants smaller steps.
+RECIPES = {
+    "unet": TrainConfig(model="unet", epochs=40),
+    "smallsegnet": TrainConfig(model="smallsegnet", epochs=6, lr=1e-3),
+}
+
+
+class ImagesInMemory:
+    """Images and labels of a dataset, decoded once and kept as bytes: 4,000 of 320x240 take 1.2 GB.
+
+    dataset: a sequence of (rgb uint8 (H, W, 3), labels (H, W)), arrays or tensors, or of RGBDFrame with labels.
+    rgb: uint8 tensor (N, H, W, 3); y: uint8 tensor (N, H, W). Raises ValueError if the dataset is empty, its images
+    differ in size, or a label is out of range.
+    """
+
+    def __init__(
+        self, dataset: Sequence, num_classes: int = len(CLASSES), name: str = "dataset", progress: bool = True
+    ):
+        if len(dataset) == 0:
+            raise ValueError(f"{name}: expected at least one image, got none")
+        for i in tqdm(range(len(dataset)), desc=f"reading {name}", unit="image", disable=not progress):
+            rgb, y = image_and_labels(f"{name}[{i}]", dataset[i])
+            if i == 0:
+                self.rgb = torch.empty((len(dataset), *rgb.shape), dtype=torch.uint8)
+                self.y = torch.empty((len(dataset), *y.shape), dtype=torch.uint8)
+            if rgb.shape != self.rgb.shape[1:] or y.shape != self.y.shape[1:]:
+                raise ValueError(
+                    f"{name}: expected images of one size, {tuple(self.y.shape[1:])}, "
+                    f"got rgb {rgb.shape} and labels {y.shape} at {i}"
+                )
+            self.rgb[i] = torch.from_numpy(rgb)
+            self.y[i] = torch.from_numpy(check_labels(f"{name}[{i}]", y, num_classes).astype(np.uint8))
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def class_counts(self, num_classes: int) -> np.ndarray:
+        """Pixels of each class; ignored ones are not counted."""
+        return sum(np.bincount(y.numpy().ravel(), minlength=256)[:num_classes] for y in self.y)
+
+
+def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
+    """Take the image and the labels out of a dataset's item."""
+    rgb, y = (item.rgb, item.labels) if isinstance(item, RGBDFrame) else item
+    if y is None:
+        raise ValueError(f"{name}: expected a frame with labels, got one without")
+    return np.ascontiguousarray(check_rgb(name, np.asarray(rgb))), np.asarray(y)
+
+
+def choose_device(device: str = "auto") -> torch.device:
+    """Turn "auto", "cpu" or "cuda" into a device; raises ValueError if there is no such device here."""
+    if device not in ("auto", "cpu", "cuda"):
+        raise ValueError(f"device: expected auto, cpu or cuda, got {device!r}")
+    if device == "cuda" and not torch.cuda.is_available():
+        raise ValueError("device: expected a CUDA GPU and a CUDA build of PyTorch, got neither; use cpu or auto")
+    return torch.device("cuda" if device != "cpu" and torch.cuda.is_available() else "cpu")
+
+
+def bf16_is_native(device: torch.device) -> bool:
+    """Whether the device multiplies bfloat16 in hardware; elsewhere it is emulated, and slower than float32."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    able = torch.cpu.get_capabilities()
+    return bool(able.get("avx512_bf16") or able.get("amx_bf16") or able.get("bf16"))
+
+
+def generator_for(*numbers: int) -> torch.Generator:
+    """Make a generator whose stream belongs to these numbers, such as a seed and a step."""
+    state = np.random.SeedSequence(numbers).generate_state(1, np.uint64)[0]
+    return torch.Generator().manual_seed(int(state))
+
+
+class DeferredInterrupt:
+    """While entered, the first Ctrl-C only sets `.pending`, so that no step is cut in half; a second one raises."""
+
+    def __enter__(self) -> "DeferredInterrupt":
+        self.pending = False
+        self.installed = threading.current_thread() is threading.main_thread()  # only there may handlers be set
+        if self.installed:
+            self.previous = signal.signal(signal.SIGINT, self.handle)
+        return self
+
+    def handle(self, signum, stack_frame):
+        if self.pending:
+            raise KeyboardInterrupt
+        self.pending = True
+
+    def __exit__(self, *exception):
+        if self.installed:
+            signal.signal(signal.SIGINT, self.previous)
+
+
+class Trainer:
+    """One run: model, optimiser and position; `step` makes one step, `state` and `restore` save and load all of it."""
+
+    def __init__(self, data: ImagesInMemory, config: TrainConfig, device: torch.device):
+        self.data, self.config, self.device = data, config, device
+        self.batches = math.ceil(len(data) / config.batch)  # in an epoch
+        self.total = config.steps if config.steps is not None else config.epochs * self.batches
+        with torch.random.fork_rng():
+            torch.manual_seed(config.seed)
+            model = ARCHITECTURES[config.model](config.num_classes)
+        self.model = model.to(device=device, memory_format=torch.channels_last)
+        self.optimiser = torch.optim.AdamW(
+            self.model.parameters(), lr=config.lr, weight_decay=config.weight_decay, fused=True
+        )
+        self.bf16 = bf16_is_native(device)
+        counts = data.class_counts(config.num_classes)
+        self.weights = torch.from_numpy(class_weights(counts, config.weights)).float()
+        self.done = 0
+        self.losses: list[float] = []  # of this epoch
+        self.history: list[dict] = []
+
+    def batch_of_step(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
+        """Images (N, 3, h, w) in [0, 1] and labels (N, h, w) of a step: a function of the seed and the step."""
+        config, (H, W) = self.config, self.data.y.shape[1:]
+        epoch, place = divmod(step, self.batches)
+        order = torch.randperm(len(self.data), generator=generator_for(config.seed, 0, epoch))
+        chosen = order[place * config.batch : (place + 1) * config.batch]
+        rgb, y = self.data.rgb[chosen], self.data.y[chosen]
+        if not config.augment:
+            return rgb.permute(0, 3, 1, 2).float().div_(255.0), y
+        size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
+        return augment(rgb, y, size, generator_for(config.seed, 1, step))
+
+    def step(self) -> float:
+        """Make one optimiser step and return its loss."""
+        x, y = self.batch_of_step(self.done)
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.config.learning_rate(self.done, self.total)
+        self.model.train()
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
+            logits = self.model(x.to(self.device))
+        loss = segmentation_loss(logits, y.to(self.device), self.weights)
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.model.parameters(), 5.0)  # one odd batch must not undo an hour
+        self.optimiser.step()
+        self.done += 1
+        self.losses.append(loss.item())
+        return self.losses[-1]
+
+    def state(self) -> dict:
+        """All that another run needs to go on from here."""
+        return {
+            "model": self.model.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "done": self.done,
+            "losses": self.losses,
+            "history": self.history,
+            "config": asdict(self.config),
+            "images": len(self.data),
+        }
+
+    def restore(self, state: dict, source) -> None:
+        """Go on from a `state`; raises ValueError naming `config` if it is of another run."""
+        ours, theirs = asdict(self.config) | {"images": len(self.data)}, dict(state.get("config", {}))
+        theirs["images"] = state.get("images")
+        differ = sorted(key for key in ours if theirs.get(key) != ours[key])
+        if differ:
+            raise ValueError(
+                f"config: {source} is of another run, which differs in {', '.join(differ)}: expected "
+                f"{[theirs.get(key) for key in differ]}, got {[ours[key] for key in differ]}; "
+                "delete it or use resume=False to start anew"
+            )
+        self.model.load_state_dict(state["model"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.done, self.losses, self.history = state["done"], list(state["losses"]), list(state["history"])
+
+
+def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int, batch: int = 8) -> np.ndarray:
+    """Pool one confusion matrix (C, C) over all images of `data`, whole, with the model in eval mode."""
+    device = next(model.parameters()).device
+    n = np.zeros((num_classes, num_classes), np.int64)
+    model.eval()
+    with torch.inference_mode(), torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
+        for first in range(0, len(data), batch):
+            x = data.rgb[first : first + batch].permute(0, 3, 1, 2).to(device).float().div_(255.0)
+            predicted = model(x).argmax(dim=1).to(torch.uint8).cpu().numpy()
+            n += confusion_matrix(data.y[first : first + batch].numpy(), predicted, num_classes)
+    return n
+
+
+def train(
+    train_set: Sequence,
+    val_set: Sequence | None,
+    config: TrainConfig,
+    out,
+    resume: bool = True,
+    device: str = "auto",
+    progress: bool = True,
+) -> list[dict]:
+    """Train a network and return its history: one dict an epoch (epoch, steps, loss, and mean_iou and iou by class).
+
+    train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. In the folder
+    `out` are written, atomically: NAME.pt, the weights for load_model, after each validation; NAME.checkpoint.pt, from
+    which `resume` goes on, after each epoch and at Ctrl-C (which then raises KeyboardInterrupt); NAME.history.json.
+    On one machine, with as many threads, a resumed run ends with the very weights of an undisturbed one.
+    Raises ValueError for data that do not fit, or a checkpoint of another configuration. Section 3 of the text.
+    """
+    out, where = Path(out), choose_device(device)
+    train_data = in_memory(train_set, config.num_classes, "train_set", progress)
+    val_data = None if val_set is None else in_memory(val_set, config.num_classes, "val_set", progress)
+    checkpoint = out / f"{config.model}.checkpoint.pt"
+    trainer = Trainer(train_data, config, where)
+    if resume and checkpoint.is_file():
+        trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
+
+    def save():
+        write_atomically(checkpoint, lambda temporary: torch.save(trainer.state(), temporary))
+
+    bar = tqdm(total=trainer.total, initial=trainer.done, desc=config.model, unit="step", disable=not progress)
+    with bar, DeferredInterrupt() as interrupt:
+        while trainer.done < trainer.total:
+            loss = trainer.step()
+            bar.update()
+            bar.set_postfix_str(progress_line(loss, trainer.history), refresh=False)
+            if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:
+                finish_epoch(trainer, val_data, out)
+                save()
+            if interrupt.pending:
+                save()
+                raise KeyboardInterrupt
+    return trainer.history
+
+
+def in_memory(dataset, num_classes: int, name: str, progress: bool = True) -> ImagesInMemory:
+    """Read a dataset into memory, unless it is there already."""
+    return dataset if isinstance(dataset, ImagesInMemory) else ImagesInMemory(dataset, num_classes, name, progress)
+
+
+def finish_epoch(trainer: Trainer, val_data: ImagesInMemory | None, out: Path) -> None:
+    """Write down the epoch that has just ended: its mean loss, the validation scores when they are due, the weights."""
+    config = trainer.config
+    epoch = math.ceil(trainer.done / trainer.batches)
+    row = {"epoch": epoch, "steps": trainer.done, "loss": float(np.mean(trainer.losses))}
+    trainer.losses = []
+    last = trainer.done == trainer.total
+    if val_data is not None and (epoch % config.val_every == 0 or last):
+        n = evaluate(trainer.model, val_data, config.num_classes, config.batch)
+        row |= {"mean_iou": mean_iou(n), "iou": iou(n).tolist()}
+    trainer.history.append(row)
+    if last or "mean_iou" in row:
+        save_model(trainer.model, out / f"{config.model}.pt", **row, config=asdict(config))
+    write_atomically(
+        out / f"{config.model}.history.json", lambda file: file.write_text(json.dumps(trainer.history, indent=1))
+    )
+
+
+def progress_line(loss: float, history: list[dict]) -> str:
+    """Say the last loss and validation scores for the progress bar."""
+    scored = [row for row in history if "mean_iou" in row]
+    if not scored:
+        return f"loss {loss:.3f}"
+    row = scored[-1]
+    target = f", target {row['iou'][TARGET]:.3f}" if len(row["iou"]) > TARGET else ""
+    return f"loss {loss:.3f}, val mIoU {row['mean_iou']:.3f}{target}"
