@@ -1,1 +1,11 @@
-"""Random scenes, rendered and written as a dataset."""
+"""Random scenes, rendered and written as a dataset.
+
+sample_scene(seed, config) draws a scene, render(spec, size) takes its picture, generate(out, seeds, ...) writes a dataset,
+load(path) reads it.
+"""
+
+from data_gen.dataset import Dataset, generate, load, render, verify
+from data_gen.scenes import CONFIGS, sample_scene
+from data_gen.sensor import DepthSensor
+
+__all__ = ["CONFIGS", "Dataset", "DepthSensor", "generate", "load", "render", "sample_scene", "verify"]

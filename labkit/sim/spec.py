@@ -70,7 +70,7 @@ class ObjectSpec:
             )
         if self.class_id not in (TARGET, OBSTACLE):
             raise ValueError(f"class_id: expected {TARGET} (target) or {OBSTACLE} (obstacle), got {self.class_id!r}")
-        if not 0.0 < self.mass:
+        if not self.mass > 0.0:
             raise ValueError(f"mass: expected kilograms above 0, got {self.mass}")
 
 

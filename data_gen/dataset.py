@@ -1,0 +1,267 @@
+"""Datasets on disk in the BOP benchmark's layout, written so that a killed run goes on where it was.
+
+    OUT/rgb/000000.png  depth/000000.png (16 bit)  labels/000000.png  instances/000000.png
+    OUT/scene_camera.json   cam_K, cam_R_w2c, cam_t_w2c (millimetres), depth_scale (millimetres for one unit of depth)
+    OUT/scene_gt.json       for each object cam_R_m2c, cam_t_m2c (millimetres), obj_id, and its name, family and class
+    OUT/dataset.json        generator version, config, seeds, size, classes, families, and the SHA-256 of every image
+
+World frame = robot base. Lengths are millimetres in BOP's files alone. `dataset.json` comes last: with it, a dataset
+is complete.
+"""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, wait
+from pathlib import Path
+
+import cv2
+import numpy as np
+from tqdm.auto import tqdm
+
+from data_gen.families import FAMILIES
+from data_gen.scenes import CONFIGS, sample_scene
+from data_gen.sensor import DepthSensor
+from labkit.files import write_atomically
+from labkit.frame import RGBDFrame
+from labkit.labels import CLASSES
+from labkit.sim.spec import SceneSpec
+from labkit.sim.world import World
+
+VERSION = 1
+DEPTH_UNIT_MM = 0.1  # one step of the 16-bit files: finer than any sensor, and 6.5 m still fit
+KINDS = ("rgb", "depth", "labels", "instances")
+FAMILY_NUMBER = {family: number for number, family in enumerate(FAMILIES, start=1)}
+
+
+def render(spec: SceneSpec, size: tuple[int, int] = (320, 240)) -> RGBDFrame:
+    """Load a scene, let it settle and take its picture; size is (width, height)."""
+    with World(spec) as world:
+        return world.render(size)
+
+
+def generate(
+    out,
+    seeds: Sequence[int],
+    config: str = "train",
+    size: tuple[int, int] = (320, 240),
+    executor: Executor | None = None,
+    sensor: DepthSensor | None = None,
+    progress: bool = True,
+) -> "Dataset":
+    """Write one frame a seed to the folder `out` and return the dataset.
+
+    executor: any concurrent.futures.Executor, None for this process. sensor: how depth is spoilt, None for exact depth.
+    Frames that an interrupted run left are kept, and the result is the same bytes. Raises ValueError if `out` holds
+    another dataset, and OSError naming the file if it cannot be written.
+    """
+    out, seeds = Path(out), [int(seed) for seed in seeds]
+    if not seeds:
+        raise ValueError("seeds: expected at least one")
+    request = _request(seeds, config, size, sensor)
+    unfinished = out / ".unfinished"
+    if (out / "dataset.json").exists():
+        _check_same(out, request, read_description(out))
+        shutil.rmtree(unfinished, ignore_errors=True)
+        return Dataset(out)
+    if (unfinished / "request.json").exists():
+        _check_same(out, request, json.loads((unfinished / "request.json").read_text()))
+    elif out.exists() and any(path.name != ".unfinished" for path in out.iterdir()):
+        raise ValueError(f"out: {out} holds other files; choose an empty folder")
+    write_atomically(unfinished / "request.json", _json(request))
+
+    missing = [i for i in range(len(seeds)) if not (unfinished / f"{i:06d}.json").exists()]
+    bar = tqdm(total=len(seeds), initial=len(seeds) - len(missing), unit="scene", disable=not progress)
+    jobs = ((str(out), i, seeds[i], config, tuple(size), sensor) for i in missing)
+    with bar:
+        for _ in _run(write_frame, jobs, executor):
+            bar.update()
+    _finish(out, request, [json.loads((unfinished / f"{i:06d}.json").read_text()) for i in range(len(seeds))])
+    return Dataset(out)
+
+
+def _request(seeds, config, size, sensor) -> dict:
+    """What makes a dataset the one that was asked for."""
+    width, height = size
+    if config not in CONFIGS:
+        raise ValueError(f"config: expected one of {sorted(CONFIGS)}, got {config!r}")
+    if min(width, height) < 1:
+        raise ValueError(f"size: expected width and height of at least 1, got {size}")
+    return {
+        "version": VERSION,
+        "config": config,
+        "seeds": seeds,
+        "size": [int(width), int(height)],
+        "sensor": None if sensor is None else vars(sensor),
+        "classes": list(CLASSES),
+        "families": FAMILY_NUMBER,
+    }
+
+
+def _check_same(out: Path, request: dict, found: dict) -> None:
+    differs = [key for key in request if found.get(key) != request[key]]
+    if differs:
+        raise ValueError(
+            f"out: {out} holds a dataset with other {', '.join(differs)}; choose another folder, or remove that one"
+        )
+
+
+def _run(function, jobs, executor: Executor | None):
+    """Yield the results of function(*job) as they come, with few jobs waiting, so that memory stays flat."""
+    if executor is None:
+        for job in jobs:
+            yield function(*job)
+        return
+    pending = set()
+    try:
+        for job in jobs:
+            pending.add(executor.submit(function, *job))
+            if len(pending) >= 64:
+                done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        while pending:
+            done, pending = wait(pending, return_when=FIRST_COMPLETED)
+            yield from (future.result() for future in done)
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def write_frame(out: str, index: int, seed: int, config: str, size, sensor: DepthSensor | None) -> None:
+    """Render one frame and write its images, then the note that says they are all there."""
+    out = Path(out)
+    spec = sample_scene(seed, config)
+    with World(spec) as world:
+        frame = world.render(size)
+        poses = world.poses()
+    if sensor is not None:
+        frame = sensor.apply(frame, np.random.default_rng([seed, 1]))
+    images = {
+        "rgb": cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR),
+        "depth": np.round(frame.depth * (1000.0 / DEPTH_UNIT_MM)).astype(np.uint16),
+        "labels": frame.labels,
+        "instances": frame.instances,
+    }
+    hashes = {}
+    for kind in KINDS:
+        data = cv2.imencode(".png", images[kind])[1].tobytes()
+        write_atomically(out / kind / f"{index:06d}.png", data)
+        hashes[kind] = hashlib.sha256(data).hexdigest()
+    note = {"camera": _bop_camera(frame), "gt": _bop_poses(spec, frame, poses), "sha256": hashes}
+    write_atomically(out / ".unfinished" / f"{index:06d}.json", _json(note))
+
+
+def _bop_camera(frame: RGBDFrame) -> dict:
+    T_cam_base = np.linalg.inv(frame.T_base_cam)
+    return {
+        "cam_K": frame.K.ravel().tolist(),
+        "depth_scale": DEPTH_UNIT_MM,
+        "cam_R_w2c": T_cam_base[:3, :3].ravel().tolist(),
+        "cam_t_w2c": (1000.0 * T_cam_base[:3, 3]).tolist(),
+    }
+
+
+def _bop_poses(spec: SceneSpec, frame: RGBDFrame, poses: dict) -> list[dict]:
+    T_cam_base = np.linalg.inv(frame.T_base_cam)
+    entries = []
+    for number, thing in enumerate(spec.objects, start=1):
+        T_cam_object = T_cam_base @ poses[thing.name]
+        entries.append(
+            {
+                "cam_R_m2c": T_cam_object[:3, :3].ravel().tolist(),
+                "cam_t_m2c": (1000.0 * T_cam_object[:3, 3]).tolist(),
+                "obj_id": FAMILY_NUMBER[thing.family],
+                "instance": number,
+                "name": thing.name,
+                "family": thing.family,
+                "class": CLASSES[thing.class_id],
+            }
+        )
+    return entries
+
+
+def _finish(out: Path, request: dict, notes: list[dict]) -> None:
+    write_atomically(out / "scene_camera.json", _json({str(i): note["camera"] for i, note in enumerate(notes)}))
+    write_atomically(out / "scene_gt.json", _json({str(i): note["gt"] for i, note in enumerate(notes)}))
+    files = {f"{kind}/{i:06d}.png": note["sha256"][kind] for i, note in enumerate(notes) for kind in KINDS}
+    for name in ("scene_camera.json", "scene_gt.json"):
+        files[name] = hashlib.sha256((out / name).read_bytes()).hexdigest()
+    write_atomically(out / "dataset.json", _json({**request, "sha256": files}))
+    shutil.rmtree(out / ".unfinished")
+
+
+def _json(value) -> bytes:
+    return (json.dumps(value, indent=1) + "\n").encode()
+
+
+def read_description(path) -> dict:
+    """Read dataset.json. Raises FileNotFoundError without one, ValueError if it is damaged or of a newer version."""
+    file = Path(path) / "dataset.json"
+    if not file.exists():
+        state = (
+            "was not finished: run the same command again" if (Path(path) / ".unfinished").exists() else "is no dataset"
+        )
+        raise FileNotFoundError(f"path: {path} {state} ({file.name} is missing)")
+    try:
+        description = json.loads(file.read_text())
+        version = description["version"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"path: {file} is damaged ({error})") from error
+    if version > VERSION:
+        raise ValueError(f"path: {path} has dataset version {version}, newer than this kit's {VERSION}: update labkit")
+    return description
+
+
+def verify(path) -> list[str]:
+    """Name every file of a dataset that is missing or not as it was written, and why; an empty list is good news."""
+    path = Path(path)
+    problems = []
+    for name, digest in read_description(path)["sha256"].items():
+        file = path / name
+        if not file.is_file():
+            problems.append(f"{name}: missing")
+        elif hashlib.sha256(file.read_bytes()).hexdigest() != digest:
+            problems.append(f"{name}: damaged")
+    return problems
+
+
+class Dataset(Sequence):
+    """A dataset on disk as a sequence of RGBDFrame, read when asked for; a slice gives a list.
+
+    `description` is dataset.json. Raises FileNotFoundError or ValueError as `read_description` does.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.description = read_description(path)
+        self._cameras = json.loads((self.path / "scene_camera.json").read_text())
+
+    def __len__(self) -> int:
+        return len(self.description["seeds"])
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        i = range(len(self))[index]
+        camera = self._cameras[str(i)]
+        T_cam_base = np.eye(4)
+        T_cam_base[:3, :3] = np.reshape(camera["cam_R_w2c"], (3, 3))
+        T_cam_base[:3, 3] = np.array(camera["cam_t_w2c"]) / 1000.0
+        return RGBDFrame.from_files(
+            **{kind: self.path / kind / f"{i:06d}.png" for kind in KINDS},
+            K=np.reshape(camera["cam_K"], (3, 3)),
+            T_base_cam=np.linalg.inv(T_cam_base),
+            depth_scale=camera["depth_scale"] / 1000.0,
+        )
+
+    def objects(self, index: int) -> list[dict]:
+        """The objects of a frame as scene_gt.json has them (poses in the camera frame, millimetres)."""
+        if not hasattr(self, "_objects"):
+            self._objects = json.loads((self.path / "scene_gt.json").read_text())
+        return self._objects[str(range(len(self))[index])]
+
+
+def load(path) -> Dataset:
+    """Open a dataset: a sequence of RGBDFrame. Raises FileNotFoundError if there is none, ValueError if it is too new."""
+    return Dataset(path)

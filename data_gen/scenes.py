@@ -1,0 +1,215 @@
+"""Random scenes: a table with targets among obstacles, seen by a camera that stands somewhere before the robot."""
+
+import colorsys
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from data_gen.families import FAMILIES, quaternion
+from labkit.labels import OBSTACLE, TARGET
+from labkit.sim.shapes import object_mesh
+from labkit.sim.spec import Camera, Light, ObjectSpec, SceneSpec, Table, Texture
+from labkit.sim.world import intrinsics
+
+DROP_HEIGHT = 0.002  # objects start this far above the table
+TARGET_AREA = ((0.40, 0.62), (-0.20, 0.20))  # x and y of target centres: well within the arm's reach
+OBSTACLE_AREA = ((0.34, 0.72), (-0.36, 0.36))
+ASPECT = 4.0 / 3.0
+
+
+@dataclass(frozen=True)
+class SceneConfig:
+    """What scenes of one kind have in common; `stream` keeps equal seeds of two configs from giving equal scenes.
+
+    Ranges are (low, high): distance in metres, elevation in radians above the table (several ranges are drawn from with
+    equal chance). hard: object proportions and models that training never sees.
+    """
+
+    stream: int
+    hard: bool = False
+    surfaces: tuple[str, ...] = ("plain", "wood", "clouds", "speckle", "stripes")
+    elevations: tuple[tuple[float, float], ...] = ((0.38, 0.95),)
+    distance: tuple[float, float] = (0.6, 1.15)
+    targets: tuple[int, int] = (1, 3)
+    obstacles: tuple[int, int] = (3, 8)
+
+
+CONFIGS = {
+    "train": SceneConfig(stream=0),
+    "test": SceneConfig(stream=1),
+    "hard": SceneConfig(
+        stream=2,
+        hard=True,
+        surfaces=("checker", "dots", "bricks"),
+        elevations=((0.32, 0.38), (0.95, 1.20)),
+    ),
+}
+
+
+def sample_scene(seed: int, config: str = "train") -> SceneSpec:
+    """Draw a scene; the same seed and config give the same scene.
+
+    config: "train", "test" (the same distribution, other scenes) or "hard" (shapes, textures and viewpoints that are not
+    in train). Raises ValueError for a negative seed or an unknown config.
+
+    >>> spec = sample_scene(7, "test")
+    >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
+    (True, True)
+    """
+    if config not in CONFIGS:
+        raise ValueError(f"config: expected one of {sorted(CONFIGS)}, got {config!r}")
+    if not (isinstance(seed, (int, np.integer)) and seed >= 0):
+        raise ValueError(f"seed: expected an integer of at least 0, got {seed!r}")
+    kind = CONFIGS[config]
+    rng = np.random.default_rng([kind.stream, int(seed)])
+    table = _table(rng, kind)
+    azimuth = float(rng.uniform(-1.75, 1.75))
+    objects = _objects(rng, kind, table, azimuth)
+    return SceneSpec(
+        objects=objects,
+        camera=_camera(rng, kind, azimuth, objects),
+        table=table,
+        light=_light(rng),
+        floor=_texture(rng, kind),
+        walls=_texture(rng, kind),
+        seed=int(seed),
+        config=config,
+    )
+
+
+def _colour(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Any hue, from grey to saturated, not black: one distribution for all objects, so that colour tells nothing."""
+    return colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.0, 1.0) ** 0.7, rng.uniform(0.25, 1.0))
+
+
+def _texture(rng: np.random.Generator, kind: SceneConfig) -> Texture:
+    """Two shades of one colour, sometimes two colours."""
+    a = _colour(rng)
+    b = (
+        _colour(rng)
+        if rng.random() < 0.2
+        else tuple(float(c) for c in np.clip(np.array(a) * rng.uniform(0.6, 0.95), 0, 1))
+    )
+    name = str(rng.choice(kind.surfaces))
+    return Texture(name, a, b, float(rng.uniform(4.0, 14.0)), int(rng.integers(2**31)))
+
+
+def _table(rng: np.random.Generator, kind: SceneConfig) -> Table:
+    return Table(
+        centre=(0.55, float(rng.uniform(-0.05, 0.05))),
+        size=(float(rng.uniform(0.62, 0.78)), float(rng.uniform(0.95, 1.3)), float(rng.uniform(0.03, 0.08))),
+        z=float(rng.uniform(-0.04, 0.04)),
+        texture=_texture(rng, kind),
+    )
+
+
+def _light(rng: np.random.Generator) -> Light:
+    azimuth, height = rng.uniform(-np.pi, np.pi), rng.uniform(0.6, 1.4)
+    return Light(
+        direction=(
+            float(np.cos(azimuth) * np.cos(height)),
+            float(np.sin(azimuth) * np.cos(height)),
+            float(np.sin(height)),
+        ),
+        colour=tuple(float(c) for c in rng.uniform(0.85, 1.0, 3)),
+        ambient=float(rng.uniform(0.4, 0.65)),
+        diffuse=float(rng.uniform(0.3, 0.6)),
+        specular=float(rng.uniform(0.0, 0.3)),
+        shadow=bool(rng.random() < 0.85),
+    )
+
+
+def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects: tuple[ObjectSpec, ...]) -> Camera:
+    """A camera on the side of `azimuth` (radians from the base's x axis), redrawn until it sees every target's centre."""
+    targets = np.array([thing.position for thing in objects if thing.class_id == TARGET])
+    while True:
+        low, high = kind.elevations[rng.integers(len(kind.elevations))]
+        camera = Camera.looking_at(
+            targets.mean(axis=0) + rng.uniform(-0.08, 0.08, 3) * (1.0, 1.0, 0.3),
+            distance=rng.uniform(*kind.distance),
+            azimuth=azimuth,
+            elevation=rng.uniform(low, high),
+            roll=rng.uniform(-0.15, 0.15),
+            fov_y=float(rng.uniform(0.55, 0.85)),
+        )
+        T_cam_base = np.linalg.inv(np.array(camera.T_base_cam))
+        P_cam = targets @ T_cam_base[:3, :3].T + T_cam_base[:3, 3]
+        K = intrinsics(camera.fov_y, 320, 240)
+        pixels = P_cam @ K.T
+        u, v = pixels[:, 0] / pixels[:, 2], pixels[:, 1] / pixels[:, 2]
+        if (P_cam[:, 2] > 0.3).all() and (abs(u - 160) < 136).all() and (abs(v - 120) < 100).all():
+            return camera
+
+
+def _objects(rng, kind: SceneConfig, table: Table, azimuth: float) -> tuple[ObjectSpec, ...]:
+    """Targets first, then obstacles, many of them close to a target; started over when the table gets too full."""
+    counts = {c: rng.integers(n[0], n[1] + 1) for c, n in ((TARGET, kind.targets), (OBSTACLE, kind.obstacles))}
+    while True:
+        families = [_family(rng, class_id) for class_id, n in counts.items() for _ in range(n)]
+        objects, circles = [], []
+        for number, family in enumerate(families):
+            thing, circle = _place(rng, kind, table, azimuth, family, f"{family}_{number}", circles)
+            if thing is None:
+                break
+            objects.append(thing)
+            circles.append(circle)
+        else:
+            return tuple(objects)
+
+
+def _family(rng: np.random.Generator, class_id: int) -> str:
+    names = [name for name, family in FAMILIES.items() if family.class_id == class_id]
+    weights = np.array([FAMILIES[name].weight for name in names])
+    return names[rng.choice(len(names), p=weights / weights.sum())]
+
+
+def _place(rng, kind: SceneConfig, table: Table, azimuth: float, family: str, name: str, circles):
+    """Make one object and find room for it; (None, None) if there is none. A circle is (x, y, radius, class)."""
+    class_id = FAMILIES[family].class_id
+    body = FAMILIES[family].recipe(rng, kind.hard)
+    yaw = Rotation.from_euler("z", rng.uniform(-np.pi, np.pi))
+    turned = yaw * Rotation.from_quat(quaternion(*body.tilt))
+    thing = ObjectSpec(
+        name=name,
+        family=family,
+        class_id=class_id,
+        position=(0.0, 0.0, 0.0),
+        orientation=tuple(turned.as_quat().tolist()),
+        urdf=body.urdf,
+        scale=float(body.scale),
+        parts=body.parts,
+        colour=_object_colour(rng, table),
+        mass=float(rng.uniform(0.05, 0.3)),
+        friction=float(rng.uniform(0.6, 1.0)),
+    )
+    vertices = turned.apply(object_mesh(thing).vertices)
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    radius = float(np.linalg.norm(vertices[:, :2] - middle[:2], axis=1).max())
+    gap = 0.005 if class_id == OBSTACLE else 0.03
+    near = [c for c in circles if c[3] == TARGET]
+    beside = class_id == OBSTACLE and rng.random() < 0.75
+    for attempt in range(40):
+        if (
+            beside and attempt < 20
+        ):  # most of the clutter crowds the targets on the camera's side: some get hidden, some grasps blocked
+            x, y, r, _ = near[rng.integers(len(near))]
+            angle, reach = azimuth + rng.normal(0.0, 0.55), r + radius + rng.uniform(0.005, 0.02)
+            x, y = x + reach * np.cos(angle), y + reach * np.sin(angle)
+        else:
+            x, y = (rng.uniform(*side) for side in (TARGET_AREA if class_id == TARGET else OBSTACLE_AREA))
+        inside = all(low <= w <= high for w, (low, high) in zip((x, y), OBSTACLE_AREA, strict=True))
+        if inside and all(np.hypot(x - a, y - b) > r + radius + gap for a, b, r, _ in circles):
+            z = table.z + DROP_HEIGHT - vertices[:, 2].min()
+            position = (float(x - middle[0]), float(y - middle[1]), float(z))
+            return replace(thing, position=position), (x, y, radius, class_id)
+    return None, None
+
+
+def _object_colour(rng: np.random.Generator, table: Table) -> tuple[float, float, float]:
+    """A colour that can be told from the table's two by eye."""
+    surface = np.array([table.texture.colour_a, table.texture.colour_b])
+    while True:
+        colour = _colour(rng)
+        if np.linalg.norm(surface - colour, axis=1).min() > 0.2:
+            return colour

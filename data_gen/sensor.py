@@ -1,0 +1,43 @@
+"""What a real depth camera does to exact depth: steps, noise that grows with distance, holes at edges."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from labkit.frame import RGBDFrame
+
+
+@dataclass(frozen=True)
+class DepthSensor:
+    """A structured-light camera. sigma = noise * d^2, in metres at d metres; readings are whole `step`s, metres.
+
+    Next to a jump of depth by more than `jump` metres a pixel is lost with probability `edge_loss`, anywhere else with
+    `loss`. The defaults are of the size of a Kinect's (Khoshelham and Elberink, 2012).
+    """
+
+    noise: float = 0.0014
+    step: float = 0.001
+    jump: float = 0.02
+    edge_loss: float = 0.5
+    loss: float = 0.002
+
+    def apply(self, frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+        """The frame as this sensor would have seen it; only depth changes, and holes become 0.
+
+        >>> frame = RGBDFrame(np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+        >>> DepthSensor(noise=0.0, step=0.3, loss=0.0).apply(frame, np.random.default_rng(0)).depth
+        array([[0.9, 0.9],
+               [0.9, 0.9]], dtype=float32)
+        """
+        depth = frame.depth.astype(np.float64)
+        known = np.isfinite(depth) & (depth > 0.0)
+        depth = np.where(known, depth, 0.0)
+        around = np.ones((3, 3), np.uint8)
+        edge = cv2.dilate(depth, around) - cv2.erode(depth, around) > self.jump
+        lost = rng.random(depth.shape) < np.where(edge, self.edge_loss, self.loss)
+        noisy = depth + self.noise * depth**2 * rng.standard_normal(depth.shape)
+        if self.step > 0.0:
+            noisy = self.step * np.round(noisy / self.step)
+        measured = np.where(known & ~lost, np.maximum(noisy, 0.0), 0.0)
+        return replace(frame, depth=measured.astype(np.float32))

@@ -1,0 +1,23 @@
+"""Writing files so that a killed process or a full disk never leaves half of one."""
+
+import os
+from pathlib import Path
+
+
+def write_atomically(path, data: bytes) -> None:
+    """Write bytes to `path` through a temporary file beside it: readers see the old file or the new one, whole.
+
+    Creates missing folders. On any failure (a full disk, say) the temporary file is removed, and the OSError names `path`.
+    """
+    path = Path(path)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_bytes(data)
+        os.replace(unfinished, path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise OSError(error.errno, f"could not write the file ({os.strerror(error.errno or 0)})", str(path)) from error
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,264 @@
+"""A scene in PyBullet: load a SceneSpec, let it settle, step it, render it, and ask where things really are."""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pybullet
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from labkit.frame import RGBDFrame
+from labkit.labels import BACKGROUND, SURFACE
+from labkit.sim.client import Client
+from labkit.sim.kinematics import HOME, PANDA_URDF
+from labkit.sim.shapes import data_path, file_for, part_mesh, parts_file
+from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
+from labkit.sim.textures import paint
+from labkit.validation import check_T
+
+TIME_STEP = 1.0 / 240.0
+FLOOR_BELOW_TABLE = 0.7
+ROOM = 6.0  # edge of the square room, metres
+
+
+class World:
+    """One PyBullet simulation of a SceneSpec, apart from any other in the process; use it as a context manager.
+
+    Objects drop from where the spec puts them and come to rest before the constructor returns. `client` is PyBullet's
+    own interface, `bodies` the body number by object name, `robot` the arm's (None without one). `observers` are called
+    after every step. The base frame is the world frame; metres, seconds. Sections 4 and 5 of the text.
+
+    >>> spec = SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.3, 0.8), robot=False)
+    >>> with World(spec) as world:
+    ...     world.render((64, 48)).size
+    (64, 48)
+    """
+
+    def __init__(self, spec: SceneSpec, settle_seconds: float = 2.0):
+        self.spec = spec
+        self.observers: list[Callable[[World], None]] = []
+        self.client = Client()
+        try:
+            self.client.setGravity(0.0, 0.0, -9.81)
+            self.client.setPhysicsEngineParameter(
+                fixedTimeStep=TIME_STEP, numSolverIterations=100, deterministicOverlappingPairs=1
+            )
+            self._build_room()
+            self.robot = self._load_robot() if spec.robot else None
+            self.bodies = {thing.name: self._load_object(thing) for thing in spec.objects}
+            self._settle(settle_seconds)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> "World":
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self) -> None:
+        """End the simulation and free its memory; harmless when already closed."""
+        self.client.close()
+
+    def step(self, n: int = 1) -> None:
+        """Simulate n steps of 1/240 s."""
+        for _ in range(n):
+            self.client.stepSimulation()
+            for observer in self.observers:
+                observer(self)
+
+    def pose(self, name: str) -> Float[np.ndarray, "4 4"]:
+        """The true pose of an object now, T_base_object. Raises ValueError if there is no such object."""
+        if name not in self.bodies:
+            raise ValueError(f"name: expected one of {sorted(self.bodies)}, got {name!r}")
+        body = self.bodies[name]
+        # PyBullet speaks of the centre of mass; an object's frame is where its mesh is drawn.
+        T_base_mass = _pose_matrix(*self.client.getBasePositionAndOrientation(body))
+        T_object_mass = _pose_matrix(*self.client.getDynamicsInfo(body, -1)[3:5])
+        return T_base_mass @ np.linalg.inv(T_object_mass)
+
+    def poses(self) -> dict[str, np.ndarray]:
+        """The true poses of all objects now, by name."""
+        return {name: self.pose(name) for name in self.bodies}
+
+    def render(self, size: tuple[int, int] = (320, 240), camera: Camera | None = None) -> RGBDFrame:
+        """Take an exact RGB-D image of `size` = (width, height), with true labels and instances.
+
+        Depth is 0 where the camera sees nothing. Instances number the objects of the spec from 1. `camera` defaults to
+        the spec's. Raises ValueError for an empty size.
+        """
+        width, height = size
+        if min(size) < 1:
+            raise ValueError(f"size: expected width and height of at least 1, got {size}")
+        camera = camera or self.spec.camera
+        light = self.spec.light
+        _, _, rgba, buffer, segmentation = self.client.getCameraImage(
+            width,
+            height,
+            viewMatrix=view_matrix(np.array(camera.T_base_cam)),
+            projectionMatrix=self.client.computeProjectionMatrixFOV(
+                np.degrees(camera.fov_y), width / height, camera.near, camera.far
+            ),
+            lightDirection=light.direction,
+            lightColor=light.colour,
+            lightDistance=2.0,
+            shadow=int(light.shadow),
+            lightAmbientCoeff=light.ambient,
+            lightDiffuseCoeff=light.diffuse,
+            lightSpecularCoeff=light.specular,
+            renderer=pybullet.ER_TINY_RENDERER,
+        )
+        buffer = np.asarray(buffer, dtype=np.float64).reshape(height, width)
+        bodies = np.asarray(segmentation).reshape(height, width)
+        labels, instances = self._label(bodies)
+        return RGBDFrame(
+            rgb=np.ascontiguousarray(np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]),
+            depth=np.where(bodies < 0, 0.0, metres(buffer, camera.near, camera.far)).astype(np.float32),
+            K=intrinsics(camera.fov_y, width, height),
+            T_base_cam=np.array(camera.T_base_cam),
+            labels=labels,
+            instances=instances,
+        )
+
+    def _label(self, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Turn the renderer's body numbers (-1 for nothing) into labels and instances."""
+        label_of = np.full(self.client.getNumBodies() + 1, BACKGROUND, dtype=np.uint8)
+        instance_of = np.zeros(len(label_of), dtype=np.uint8)
+        label_of[self.table] = SURFACE
+        for number, thing in enumerate(self.spec.objects, start=1):
+            label_of[self.bodies[thing.name]] = thing.class_id
+            instance_of[self.bodies[thing.name]] = number
+        return label_of[bodies], instance_of[bodies]
+
+    def _build_room(self) -> None:
+        table, spec = self.spec.table, self.spec
+        floor = table.z - FLOOR_BELOW_TABLE
+        self._box((ROOM, ROOM, 0.1), (0.0, 0.0, floor - 0.05), spec.floor)
+        for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            size = (0.1 if x else ROOM, 0.1 if y else ROOM, 3.0)
+            self._box(size, (x * ROOM / 2, y * ROOM / 2, floor + 1.5), spec.walls)
+        length, width, thickness = table.size
+        centre = (*table.centre, table.z - thickness / 2)
+        self.table = self._box((length, width, thickness), centre, table.texture)
+        if spec.robot:
+            stand = Texture(colour_a=(0.3, 0.3, 0.32))
+            self._box((0.2, 0.2, -floor - 0.001), (0.0, 0.0, floor / 2), stand)
+
+    def _box(self, size, centre, texture: Texture) -> int:
+        """A fixed box with a texture on each side."""
+        half = [length / 2 for length in size]
+        body = self.client.createMultiBody(
+            0.0,
+            self.client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half),
+            self.client.createVisualShape(pybullet.GEOM_BOX, halfExtents=half, rgbaColor=(1, 1, 1, 1)),
+            centre,
+        )
+        picture = cv2.imencode(".png", cv2.cvtColor(paint(texture), cv2.COLOR_RGB2BGR))[1].tobytes()
+        number = self.client.loadTexture(file_for(picture, ".png"))
+        self.client.changeVisualShape(body, -1, textureUniqueId=number)
+        self.client.changeDynamics(body, -1, lateralFriction=1.0, rollingFriction=0.001, spinningFriction=0.001)
+        return body
+
+    def _load_robot(self) -> int:
+        robot = self.client.loadURDF(str(data_path() / PANDA_URDF), useFixedBase=True)
+        moving = [j for j in range(self.client.getNumJoints(robot)) if self.client.getJointInfo(robot, j)[2] != 4]
+        for joint, angle in zip(moving, HOME, strict=True):
+            self.client.resetJointState(robot, joint, angle)
+            force = self.client.getJointInfo(robot, joint)[10]
+            self.client.setJointMotorControl2(robot, joint, pybullet.POSITION_CONTROL, angle, force=force)
+        return robot
+
+    def _load_object(self, thing: ObjectSpec) -> int:
+        if thing.urdf is not None:
+            body = self.client.loadURDF(str(data_path() / thing.urdf), globalScaling=thing.scale)
+            self._place(body, thing)
+        else:
+            body = self._load_parts(thing)
+        self.client.changeVisualShape(body, -1, textureUniqueId=-1, rgbaColor=(*thing.colour, 1.0))
+        self.client.changeDynamics(
+            body,
+            -1,
+            mass=thing.mass,
+            lateralFriction=thing.friction,
+            rollingFriction=0.001,
+            spinningFriction=0.001,
+            restitution=0.0,
+        )
+        return body
+
+    def _place(self, body: int, thing: ObjectSpec) -> None:
+        T_base_object = _pose_matrix(thing.position, thing.orientation)
+        T_base_mass = T_base_object @ _pose_matrix(*self.client.getDynamicsInfo(body, -1)[3:5])
+        quaternion = Rotation.from_matrix(T_base_mass[:3, :3]).as_quat()
+        self.client.resetBasePositionAndOrientation(body, T_base_mass[:3, 3], quaternion)
+
+    def _load_parts(self, thing: ObjectSpec) -> int:
+        path = parts_file(thing.parts, thing.scale)
+        solids = [_volume_and_centroid(part_mesh(part)) for part in thing.parts]
+        total = sum(volume for volume, _ in solids)
+        mass_centre = thing.scale * sum(volume * centroid for volume, centroid in solids) / total
+        # createMultiBody takes the pose of the object's frame, and the centre of mass in that frame.
+        return self.client.createMultiBody(
+            thing.mass,
+            self.client.createCollisionShape(pybullet.GEOM_MESH, fileName=path),
+            self.client.createVisualShape(pybullet.GEOM_MESH, fileName=path),
+            thing.position,
+            thing.orientation,
+            baseInertialFramePosition=mass_centre,
+        )
+
+    def _settle(self, seconds: float) -> None:
+        """Step until everything rests, at most `seconds`; nobody observes this."""
+        for step in range(round(seconds / TIME_STEP)):
+            self.client.stepSimulation()
+            if step % 24 == 23 and all(self._rests(body) for body in self.bodies.values()):
+                break
+
+    def _rests(self, body: int) -> bool:
+        linear, angular = self.client.getBaseVelocity(body)
+        return np.dot(linear, linear) < 0.002**2 and np.dot(angular, angular) < 0.05**2
+
+
+def intrinsics(fov_y: float, width: int, height: int) -> Float[np.ndarray, "3 3"]:
+    """K of PyBullet's TinyRenderer for a vertical field of view in radians; pixel centres at integers.
+
+    The principal point is measured, not assumed: only cx = W / 2, cy = H / 2 - 1 puts a rendered plane on a plane.
+
+    >>> intrinsics(np.pi / 2, 320, 240)
+    array([[120.,   0., 160.],
+           [  0., 120., 119.],
+           [  0.,   0.,   1.]])
+    """
+    f = height / (2.0 * np.tan(fov_y / 2.0))
+    return np.array([[f, 0.0, width / 2.0], [0.0, f, height / 2.0 - 1.0], [0.0, 0.0, 1.0]])
+
+
+def view_matrix(T_base_cam: Float[np.ndarray, "4 4"]) -> list[float]:
+    """OpenGL's view matrix, column by column: it maps base coordinates to a camera that looks along -z with y up."""
+    T_gl_cam = np.diag([1.0, -1.0, -1.0, 1.0])
+    return (T_gl_cam @ np.linalg.inv(check_T("T_base_cam", T_base_cam))).T.ravel().tolist()
+
+
+def metres(buffer: Float[np.ndarray, "H W"], near: float, far: float) -> Float[np.ndarray, "H W"]:
+    """Turn the depth buffer, 0 at the near plane and 1 at the far one, into metres along the camera's z axis.
+
+    >>> metres(np.array([[0.0, 1.0]]), 0.1, 6.0)
+    array([[0.1, 6. ]])
+    """
+    return far * near / (far - (far - near) * buffer)
+
+
+def _pose_matrix(position, quaternion) -> Float[np.ndarray, "4 4"]:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    T[:3, 3] = position
+    return T
+
+
+def _volume_and_centroid(mesh) -> tuple[float, Float[np.ndarray, "3"]]:
+    """Volume and centroid of a closed mesh: the sum over tetrahedra from the origin to each triangle."""
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    volumes = np.einsum("fi,fi->f", a, np.cross(b, c)) / 6.0
+    return volumes.sum(), (volumes[:, None] * (a + b + c) / 4.0).sum(axis=0) / volumes.sum()
