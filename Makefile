@@ -43,7 +43,7 @@ train: .venv/installed
 	$(BIN)/labkit train data/train --val data/val --model unet --epochs $(EPOCHS) --device $(DEVICE)
 
 bench: .venv/installed-bench
-	$(BIN)/python -m tests.bench $(ARGS)
+	$(BIN)/python -m tests.bench.run $(ARGS)
 
 clean:
 	rm -rf out build *.egg-info .pytest_cache .ruff_cache .hypothesis .coverage

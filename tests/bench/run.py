@@ -1,0 +1,123 @@
+"""Runs the benchmarks of this folder and writes their tables on one page: `python -m tests.bench.run [NAME ...]`.
+
+A benchmark is a module bench_<name>.py whose docstring says what is compared, and whose main() returns a
+Markdown table. Each runs in a process of its own, one after the other, so that none disturbs another's threads or
+memory. When only some are named, the page keeps the sections of the others.
+"""
+
+import argparse
+import importlib
+import multiprocessing
+import os
+import platform
+import re
+import sys
+import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor
+from importlib import metadata
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+PAGE = HERE.parent.parent / "BENCHMARKS.md"
+INTRODUCTION = """# Benchmarks
+
+`make bench` writes this page. What stands in one table was measured side by side in one run; times are medians, and on
+another machine they differ, while their ratios hold.
+"""
+SECTION = "<!-- bench: {} -->"
+# Flags of /proc/cpuinfo that decide how fast networks and kernels run, in words.
+CPU_FLAGS = {"avx2": "AVX2", "avx512f": "AVX-512", "avx512_bf16": "AVX-512 bf16", "amx_bf16": "AMX bf16"}
+VERSIONS = ("numpy", "scipy", "numba", "torch", "opencv-python-headless", "pybullet")
+PEERS = ("scikit-learn", "torchmetrics", "open3d", "pymaxflow", "pydensecrf2")
+
+
+def main(arguments: list[str] | None = None, folder: Path = HERE) -> int:
+    """Run the benchmarks that are named, all by default, and write the page; returns 1 if one of them failed."""
+    names = sorted(path.stem.removeprefix("bench_") for path in folder.glob("bench_*.py"))
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.run", description="Measure, and write the page.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one or more of: {', '.join(names)}; default: all")
+    parser.add_argument("--page", type=Path, default=PAGE, help="the page to write (default: %(default)s)")
+    options = parser.parse_args(arguments)
+    unknown = sorted(set(options.names) - set(names))
+    if unknown:
+        parser.error(f"no benchmark {', '.join(unknown)}; there are: {', '.join(names)}")
+
+    old = read_sections(options.page)
+    sections = {name: old[name] for name in names if name in old}
+    failed = []
+    for name in options.names or names:
+        print(f"bench: {name}", file=sys.stderr, flush=True)
+        try:
+            sections[name] = measure(name, folder)
+        except Exception:
+            traceback.print_exc()
+            failed.append(name)
+            continue
+        print(sections[name], flush=True)
+        write_page(options.page, sections)
+    if failed:
+        print(f"bench: failed: {', '.join(failed)}; the page keeps what it had of them", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def measure(name: str, folder: Path) -> str:
+    """Run one benchmark in a process of its own and return its section of the page."""
+    load, start = os.getloadavg()[0], time.perf_counter()
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        description, table = pool.submit(run, name, folder).result()
+    seconds = time.perf_counter() - start
+    title, _, rest = description.partition("\n")
+    footer = f"<sub>Measured in {seconds:.0f} s on {machine()}; load before it {load:.1f}.</sub>"
+    return "\n\n".join(part for part in (f"## {title.rstrip('.')}", rest.strip(), table.strip(), footer) if part)
+
+
+def run(name: str, folder: Path) -> tuple[str, str]:
+    """Import a benchmark and run it: its docstring and its table."""
+    if folder == HERE:
+        module = importlib.import_module(f"tests.bench.bench_{name}")
+    else:
+        sys.path.insert(0, str(folder))
+        module = importlib.import_module(f"bench_{name}")
+    return module.__doc__.strip(), module.main()
+
+
+def machine() -> str:
+    """Describe the machine by what decides speed, and by nothing that names it."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    info = Path("/proc/cpuinfo")
+    flags = set(re.findall(r"\w+", info.read_text())) if info.is_file() else set()
+    words = [word for flag, word in CPU_FLAGS.items() if flag in flags]
+    return f"{cores} {platform.machine()} cores" + (f" with {', '.join(words)}" if words else "")
+
+
+def versions() -> str:
+    """List the versions of what is measured and of the peers that are installed."""
+    found = [f"Python {platform.python_version()}"]
+    for package in VERSIONS + PEERS:
+        try:
+            found.append(f"{package} {metadata.version(package)}")
+        except metadata.PackageNotFoundError:
+            continue
+    return ", ".join(found)
+
+
+def read_sections(page: Path) -> dict[str, str]:
+    """Take a page apart into its sections by name; an absent page has none."""
+    if not page.is_file():
+        return {}
+    parts = re.split(r"^<!-- bench: (\w+) -->\n", page.read_text(), flags=re.MULTILINE)
+    return {name: text.strip() for name, text in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def write_page(page: Path, sections: dict[str, str]) -> None:
+    """Write the page anew, its sections in the order of their names."""
+    parts = [INTRODUCTION, f"Versions: {versions()}.\n"]
+    parts += [f"{SECTION.format(name)}\n{sections[name]}\n" for name in sorted(sections)]
+    unfinished = page.with_suffix(".tmp")
+    unfinished.write_text("\n".join(parts))
+    os.replace(unfinished, page)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
