@@ -1,0 +1,109 @@
+"""Which points of a cloud are near each other: a grid of cubes, and loops over it compiled by numba.
+
+Measured side by side, SciPy's exact k-d tree takes several times as long, most of the time there is for a whole frame.
+"""
+
+import numpy as np
+from numba import njit
+
+
+def sort_into_cells(P, reach):
+    """Sort the points of a cloud (N, 3) into cubes, so that points within `reach` are in the same or in nearby cubes.
+
+    The edge of a cube is a hair under reach / sqrt(3): points in one cube are always within reach of each other, and
+    points within reach are at most two cubes apart along each axis. A cube has the key x * x_step + y * y_step + z,
+    with a margin of two empty cubes in y and z, so that two apart never means round the corner. The cloud must be less
+    than a million times as wide as `reach`, so that keys fit in 64 bits.
+
+    Returns the order that sorts the points by cube, the sorted points in float64, and (keys, starts, x_step, y_step) of
+    the cubes that are not empty: cube i holds the sorted points starts[i] to starts[i + 1].
+    """
+    points = P.astype(np.float64)
+    xyz = np.floor((points - points.min(axis=0, initial=np.inf)) * (1.7321 / reach)).astype(np.int64)
+    y_step = xyz[:, 2].max(initial=0) + 3
+    x_step = (xyz[:, 1].max(initial=0) + 3) * y_step
+    key = xyz @ np.array([x_step, y_step, 1])
+    order = np.argsort(key, kind="stable")
+    keys, starts = np.unique(key[order], return_index=True)
+    return order, points[order], (keys, np.append(starts, len(P)), x_step, y_step)
+
+
+@njit(cache=True)
+def nearby_cells(keys, offset):
+    """Find, for every cell a, the run of cells first[a] to last[a] whose keys are within 2 of keys[a] + offset.
+
+    `offset` is a step in x and y, so the run is that column's cells at most two apart in z. The keys are sorted: the
+    run only moves forward while a does, and no search is needed.
+    """
+    first, last = np.empty(len(keys), np.int64), np.empty(len(keys), np.int64)
+    low = high = 0
+    for a in range(len(keys)):
+        while low < len(keys) and keys[low] < keys[a] + offset - 2:
+            low += 1
+        while high < len(keys) and keys[high] <= keys[a] + offset + 2:
+            high += 1
+        first[a], last[a] = low, high
+    return first, last
+
+
+@njit(cache=True)
+def within(points, i, j, reach):
+    """Say whether two points are at most `reach` apart."""
+    x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+    return x * x + y * y + z * z <= reach * reach
+
+
+@njit(cache=True)
+def count_neighbours(points, keys, starts, x_step, y_step, reach, enough):
+    """Count the other points within `reach` of each point; the search for a point ends at `enough`."""
+    count = np.empty(len(points), np.int64)
+    for a in range(len(keys)):
+        count[starts[a] : starts[a + 1]] = starts[a + 1] - starts[a] - 1  # its own cube is all within reach
+    for dx in range(-2, 3):
+        for dy in range(-2, 3):
+            first, last = nearby_cells(keys, dx * x_step + dy * y_step)
+            for a in range(len(keys)):
+                for i in range(starts[a], starts[a + 1]):
+                    for j in range(starts[first[a]], starts[last[a]]):
+                        if count[i] >= enough:
+                            break
+                        if not starts[a] <= j < starts[a + 1]:
+                            count[i] += within(points, i, j, reach)
+    return count
+
+
+@njit(cache=True)
+def root(parent, a):
+    """Follow a cell to the root of its tree, shortening the way for the next time."""
+    while parent[a] != a:
+        parent[a] = parent[parent[a]]
+        a = parent[a]
+    return a
+
+
+@njit(cache=True)
+def touch(points, starts, a, b, reach):
+    """Say whether any point of cell a is within `reach` of any point of cell b."""
+    for i in range(starts[a], starts[a + 1]):
+        for j in range(starts[b], starts[b + 1]):
+            if within(points, i, j, reach):
+                return True
+    return False
+
+
+@njit(cache=True)
+def link_cells(points, keys, starts, x_step, y_step, reach):
+    """Number the groups of points that chains with steps of at most `reach` hold together (union-find over cells)."""
+    parent = np.arange(len(keys))
+    for dx in range(3):  # a pair of cells is met once from either side: half of the columns is enough
+        for dy in range(-2 if dx else 0, 3):
+            first, last = nearby_cells(keys, dx * x_step + dy * y_step)
+            for a in range(len(keys)):
+                for b in range(first[a], last[a]):
+                    root_a, root_b = root(parent, a), root(parent, b)
+                    if root_a != root_b and touch(points, starts, a, b, reach):
+                        parent[max(root_a, root_b)] = min(root_a, root_b)
+    group = np.empty(len(points), np.int64)
+    for a in range(len(keys)):
+        group[starts[a] : starts[a + 1]] = root(parent, a)
+    return group
