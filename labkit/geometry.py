@@ -14,6 +14,8 @@ from jaxtyping import Bool, Float, Float32, Integer, Real
 
 from labkit.validation import check_depth, check_finite, check_K, check_same_size, check_shape, check_T
 
+Scalar = int | float | np.integer | np.floating
+
 # ---------------------------------------------------------------------------------------- pixels, rays and points
 
 
@@ -153,7 +155,7 @@ def _back_project(
 # ----------------------------------------------------------------------------- how errors in u, v and d move a point
 
 
-def back_projection_jacobian(u: float, v: float, d: float, K: Real[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+def back_projection_jacobian(u: Scalar, v: Scalar, d: Scalar, K: Real[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
     """Differentiate P_cam(u, v, d) = d K^-1 (u, v, 1): the columns are dP/du, dP/dv and dP/dd.
 
     u, v in pixels, d in metres, above 0; camera frame. dP/dd is the ray q(u, v), the answer to problem 4 of the text;
@@ -172,7 +174,7 @@ def back_projection_jacobian(u: float, v: float, d: float, K: Real[np.ndarray, "
 
 
 def back_projection_noise(
-    u: float, v: float, d: float, K: Real[np.ndarray, "3 3"], sigma_pixel: float, sigma_depth: float
+    u: Scalar, v: Scalar, d: Scalar, K: Real[np.ndarray, "3 3"], sigma_pixel: Scalar, sigma_depth: Scalar
 ) -> Float[np.ndarray, "3 3"]:
     """Carry independent noise of u, v (std `sigma_pixel`) and d (std `sigma_depth`) to the point: J diag(sigma^2) J^T.
 
@@ -228,8 +230,8 @@ def centroid_and_covariance(
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
     """Compute the mean of a cloud and its covariance with 1/N (not 1/(N - 1)), as the text defines them.
 
-    Float64, whatever the points are: a float32 sum over 40,000 points is wrong in the fourth digit. Raises ValueError
-    if the cloud is empty (there is no mean of nothing) or holds NaN. Section 4 of the text.
+    Float64, whatever the points are: the float32 mean height of 40,000 points of a table is wrong in the fourth digit.
+    Raises ValueError if the cloud is empty (there is no mean of nothing) or holds NaN. Section 4 of the text.
 
     >>> mu, Sigma = centroid_and_covariance(np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]]))
     >>> mu.tolist(), Sigma[0].tolist()
@@ -263,7 +265,7 @@ class PrincipalAxes:
         return ~np.isnan(self.axes[0])
 
 
-def principal_axes(P: Float[np.ndarray, "N 3"], tolerance: float = 0.05) -> PrincipalAxes:
+def principal_axes(P: Float[np.ndarray, "N 3"], tolerance: Scalar = 0.05) -> PrincipalAxes:
     """Find the principal axes of a cloud: the eigenvectors of its covariance, the widest spread first.
 
     Where two variances differ by less than `tolerance` of the larger one, any direction in their plane would do, so
@@ -286,7 +288,7 @@ def principal_axes(P: Float[np.ndarray, "N 3"], tolerance: float = 0.05) -> Prin
     variances, axes = np.maximum(variances[::-1], 0.0), axes[:, ::-1]  # rounding can leave -1e-20
 
     # A spread below a millionth of the coordinates is the rounding of float32, not a shape.
-    rounding = (1e-6 * np.abs(P).max()) ** 2
+    rounding = (1e-6 * float(np.abs(P).max())) ** 2
     gap = variances[:2] - variances[1:] > np.maximum(tolerance * variances[:2], rounding)
     determined, problem = _determined_axes(len(P), variances, gap, rounding)
 
@@ -316,7 +318,7 @@ def _determined_axes(count: int, variances, gap, rounding: float) -> tuple[tuple
 
 
 def remove_outliers(
-    P: Float[np.ndarray, "N 3"], radius: float = 0.01, min_neighbours: int = 4
+    P: Float[np.ndarray, "N 3"], radius: Scalar = 0.01, min_neighbours: int = 4
 ) -> Float[np.ndarray, "M 3"]:
     """Drop the points with fewer than `min_neighbours` other points within `radius` metres (radius outlier removal).
 
@@ -339,7 +341,7 @@ def remove_outliers(
     return P[keep]
 
 
-def cluster(P: Float[np.ndarray, "N 3"], gap: float = 0.015, min_points: int = 30) -> list[Float[np.ndarray, "_ 3"]]:
+def cluster(P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 30) -> list[Float[np.ndarray, "_ 3"]]:
     """Split a cloud into separate objects, the one with the most points first.
 
     Two points belong together if a chain of points with steps of at most `gap` metres joins them (single linkage).
