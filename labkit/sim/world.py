@@ -5,14 +5,14 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 import pybullet
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.labels import BACKGROUND, SURFACE
 from labkit.sim.client import Client
 from labkit.sim.kinematics import HOME, PANDA_URDF
-from labkit.sim.shapes import data_path, file_for, part_mesh, parts_file
+from labkit.sim.shapes import data_path, file_for, object_mesh, part_mesh, parts_file
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
 from labkit.sim.textures import paint
 from labkit.validation import check_T
@@ -79,6 +79,13 @@ class World:
         T_object_mass = _pose_matrix(*self.client.getDynamicsInfo(body, -1)[3:5])
         return T_base_mass @ np.linalg.inv(T_object_mass)
 
+    def centre(self, name: str) -> Float[np.ndarray, "3"]:
+        """The middle of an object's bounding box in its own frame, as a point of the base frame now."""
+        thing = next((thing for thing in self.spec.objects if thing.name == name), None)
+        T_base_object = self.pose(name)
+        vertices = object_mesh(thing).vertices
+        return T_base_object[:3, :3] @ ((vertices.min(axis=0) + vertices.max(axis=0)) / 2.0) + T_base_object[:3, 3]
+
     def poses(self) -> dict[str, np.ndarray]:
         """The true poses of all objects now, by name."""
         return {name: self.pose(name) for name in self.bodies}
@@ -121,6 +128,18 @@ class World:
             labels=labels,
             instances=instances,
         )
+
+    def silhouette(self, name: str, size: tuple[int, int] = (320, 240)) -> Bool[np.ndarray, "H W"]:
+        """The pixels that an object would cover if no other object stood before it; the simulation is left as it was."""
+        number = 1 + [thing.name for thing in self.spec.objects].index(name)
+        state = self.client.saveState()
+        for other, body in self.bodies.items():
+            if other != name:
+                self.client.resetBasePositionAndOrientation(body, (0.0, 0.0, -100.0), (0.0, 0.0, 0.0, 1.0))
+        mask = self.render(size).instances == number
+        self.client.restoreState(state)
+        self.client.removeState(state)
+        return mask
 
     def _label(self, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Turn the renderer's body numbers (-1 for nothing) into labels and instances."""
@@ -218,7 +237,7 @@ class World:
 
     def _rests(self, body: int) -> bool:
         linear, angular = self.client.getBaseVelocity(body)
-        return np.dot(linear, linear) < 0.002**2 and np.dot(angular, angular) < 0.05**2
+        return bool(np.dot(linear, linear) < 0.002**2 and np.dot(angular, angular) < 0.05**2)
 
 
 def intrinsics(fov_y: float, width: int, height: int) -> Float[np.ndarray, "3 3"]:

@@ -1,0 +1,61 @@
+"""What a config's scenes are like, in numbers: for the model card, and for the tests that hold them to it."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from data_gen.families import BOXES
+from data_gen.scenes import sample_scene
+from labkit.labels import TARGET
+from labkit.sim.world import World
+
+HIDDEN = 0.05  # a target counts as partly occluded when other objects hide more than this share of its silhouette
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Shares are of all targets. target_pixels: share of the image in the median frame. camera: least and largest metres.
+
+    families: share of each target family. not_boxes: share of targets that are no boxes. obstacles: mean a scene.
+    """
+
+    scenes: int
+    families: dict[str, float]
+    not_boxes: float
+    obstacles: float
+    occluded: float
+    camera: tuple[float, float]
+    target_pixels: float
+
+
+def statistics(seeds: Iterable[int], config: str, size=(320, 240), progress: bool = False) -> Statistics:
+    """Build and render the scenes of `seeds` and count."""
+    families, obstacles, hidden, distances, pixels = Counter(), [], [], [], []
+    for seed in tqdm(list(seeds), unit="scene", disable=not progress):
+        spec = sample_scene(seed, config)
+        targets = [thing for thing in spec.objects if thing.class_id == TARGET]
+        families.update(thing.family for thing in targets)
+        obstacles.append(len(spec.objects) - len(targets))
+        with World(spec) as world:
+            frame = world.render(size)
+            for number, thing in enumerate(spec.objects, start=1):
+                if thing.class_id == TARGET:
+                    whole = np.count_nonzero(world.silhouette(thing.name, size))
+                    seen = np.count_nonzero(frame.instances == number)
+                    hidden.append(1.0 - seen / whole if whole else 1.0)
+            middle = np.mean([world.centre(thing.name) for thing in targets], axis=0)
+        distances.append(float(np.linalg.norm(frame.T_base_cam[:3, 3] - middle)))
+        pixels.append(np.mean(frame.labels == TARGET))
+    total = sum(families.values())
+    return Statistics(
+        scenes=len(pixels),
+        families={name: count / total for name, count in families.most_common()},
+        not_boxes=1.0 - sum(families[name] for name in BOXES) / total,
+        obstacles=float(np.mean(obstacles)),
+        occluded=float(np.mean(np.array(hidden) > HIDDEN)),
+        camera=(min(distances), max(distances)),
+        target_pixels=float(np.median(pixels)),
+    )

@@ -1,0 +1,172 @@
+"""The whole chain: RGBDFrame -> class probabilities -> labels -> target clouds in the base frame -> grasps."""
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Integer, UInt8
+
+from labkit.frame import RGBDFrame
+from labkit.geometry import back_project_to_base, cluster, remove_outliers
+from labkit.grasp import GraspPlan, plan_grasps
+from labkit.labels import CLASSES, TARGET, one_hot
+from labkit.validation import check_labels, check_rgb, check_same_size, check_shape
+
+# What the arm can meet: points outside this box (base frame, metres; z from the table) do not concern the grasp.
+WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
+
+
+@dataclass(frozen=True, eq=False)
+class Perception:
+    """What a robot knows after one frame.
+
+    probabilities: (H, W, C) in 0..1. labels: uint8 (H, W). points: every pixel in the base frame, (H, W, 3), metres,
+    NaN without depth. clouds: one (N, 3) a target, largest first. scene: all points of the workspace, (M, 3). plan: the
+    ranked grasps, or the reason why there is none. seconds: time spent by stage.
+    """
+
+    probabilities: Float[np.ndarray, "H W C"]
+    labels: UInt8[np.ndarray, "H W"]
+    points: Float[np.ndarray, "H W 3"]
+    clouds: list[np.ndarray]
+    scene: Float[np.ndarray, "M 3"]
+    plan: GraspPlan
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+class Pipeline:
+    """The chain as one object: `Pipeline(model, table_z).run(frame)`.
+
+    model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
+    (H, W, C). table_z: height of the calibrated table plane in the base frame, metres. target_class: what to grasp.
+    back_project: function (depth, K, T_base_cam) -> (H, W, 3); split: function of the target's points to a list of
+    clouds; grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan. The defaults are the kit's; each
+    may be replaced by one's own, as the labs do. Raises ValueError for an argument that does not fit. Sections 1 to 5.
+
+    >>> def sees_nothing(rgb):
+    ...     return np.dstack([np.ones(rgb.shape[:2]), np.zeros((*rgb.shape[:2], 3))])
+    >>> rgb, depth = np.zeros((6, 8, 3), np.uint8), np.ones((6, 8), np.float32)
+    >>> frame = RGBDFrame(rgb, depth, K=np.diag([9.0, 9.0, 1.0]), T_base_cam=np.eye(4))
+    >>> perception = Pipeline(sees_nothing).run(frame)
+    >>> len(perception.clouds), perception.plan.grasps
+    (0, ())
+    """
+
+    def __init__(
+        self,
+        model,
+        table_z: float = 0.0,
+        target_class: int = TARGET,
+        *,
+        back_project: Callable = back_project_to_base,
+        split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
+        grasp: Callable[..., GraspPlan] = plan_grasps,
+    ):
+        if not callable(model):
+            raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
+        if not np.isfinite(table_z):
+            raise ValueError(f"table_z: expected a height in metres, got {table_z}")
+        if target_class not in range(len(CLASSES)):
+            raise ValueError(f"target_class: expected 0 to {len(CLASSES) - 1}, got {target_class!r}")
+        self.model = model
+        self.table_z = float(table_z)
+        self.target_class = target_class
+        self.back_project = back_project
+        self.split = split or separate_objects
+        self.grasp = grasp
+
+    def run(self, frame: RGBDFrame, labels: Integer[np.ndarray, "H W"] | None = None) -> Perception:
+        """Perceive one frame. `labels`, when given, stand in for the network's: true masks, or anyone else's."""
+        seconds = {}
+        with _timed(seconds, "network"):
+            if labels is None:
+                probabilities = class_probabilities(self.model, frame.rgb)
+            else:
+                labels = check_shape("labels", check_labels("labels", labels, len(CLASSES)), (None, None))
+                check_same_size("frame.rgb", frame.rgb, "labels", labels)
+                probabilities = one_hot(labels).astype(np.float32)
+        with _timed(seconds, "labels"):
+            labels = most_probable(probabilities)
+        with _timed(seconds, "back_projection"):
+            points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
+        with _timed(seconds, "clouds"):
+            seen = np.isfinite(points[..., 2])
+            clouds = list(self.split(points[seen & (labels == self.target_class)]))
+            scene = self._in_workspace(points)
+        with _timed(seconds, "grasps"):
+            plan = self.grasp(clouds, scene, self.table_z, frame.T_base_cam[:3, 3])
+        return Perception(probabilities, labels, points, clouds, scene, plan, seconds)
+
+    def _in_workspace(self, points: Float[np.ndarray, "H W 3"]) -> Float[np.ndarray, "M 3"]:
+        flat = points.reshape(-1, 3)
+        offset = (0.0, 0.0, self.table_z)
+        inside = np.ones(len(flat), bool)
+        for axis, (low, high) in enumerate(WORKSPACE):  # NaN compares false, and so falls out here
+            inside &= (flat[:, axis] > low + offset[axis]) & (flat[:, axis] < high + offset[axis])
+        return flat[inside]
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str):
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
+
+
+def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[np.ndarray, "H W C"]:
+    """Class probabilities of an RGB image from a network or from a function; checks that they are some.
+
+    Raises ValueError if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
+    """
+    torch = sys.modules.get("torch")  # heavy: a pipeline around a plain function does without it
+    if torch is not None and isinstance(model, torch.nn.Module):
+        from labkit.network import predict_probabilities
+
+        p = predict_probabilities(model, rgb)
+    else:
+        p = np.asarray(model(check_rgb("rgb", rgb)))
+    p = check_shape("probabilities", p, (*rgb.shape[:2], None))
+    if not np.isfinite(p).all():
+        raise ValueError("probabilities: expected finite numbers from the model, got NaN or infinity")
+    return p
+
+
+def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray, "H W"]:
+    """The label of each pixel: the class of highest probability (problem 3 of the text), the first one of equals.
+
+    >>> most_probable(np.array([[[0.2, 0.8], [0.5, 0.5]]]))
+    array([[1, 0]], dtype=uint8)
+    """
+    # One pass a class over whole images: several times as fast as argmax over a short last axis.
+    best = probabilities[..., 0].copy()
+    labels = np.zeros(best.shape, np.uint8)
+    for c in range(1, probabilities.shape[-1]):
+        better = probabilities[..., c] > best
+        labels[better] = c
+        np.maximum(best, probabilities[..., c], out=best)
+    return labels
+
+
+def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Float[np.ndarray, "_ 3"]]:
+    """Clean the points of the target class and split them: two targets are two clouds."""
+    return cluster(remove_outliers(P))
+
+
+def segment_rgb_image(model, image: UInt8[np.ndarray, "H W 3"], order: str = "rgb") -> UInt8[np.ndarray, "H W"]:
+    """Label each pixel of an image (the text's function of section 6).
+
+    order: "rgb", or "bgr" for an image as OpenCV and many ROS cameras give it. The text's version takes either and
+    always swaps; here the caller says which it is. Raises ValueError for another order or no uint8 image.
+
+    >>> segment_rgb_image(lambda rgb: rgb / 255.0, np.array([[[255, 0, 0]]], np.uint8), order="bgr")
+    array([[2]], dtype=uint8)
+    """
+    if order not in ("rgb", "bgr"):
+        raise ValueError(f'order: expected "rgb" or "bgr", got {order!r}')
+    image = check_rgb("image", image)
+    rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if order == "bgr" else image
+    return most_probable(class_probabilities(model, rgb))
