@@ -63,7 +63,7 @@ def train(
 def main() -> None:
     """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
     try:
-        app()
+        app(prog_name="labkit")
     except (ValueError, OSError, ModuleNotFoundError) as error:
         if "--debug" in sys.argv:
             raise

@@ -1,0 +1,347 @@
+"""Facts about the repository as a whole: what make does, what is pinned, what may import what, what the files hold."""
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from graphlib import TopologicalSorter
+from itertools import chain
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+import labkit
+from labkit.doctor import canonical, read_pins, requirements
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+PINS = read_pins(ROOT / "constraints.txt")
+MAX_LINES = 400
+# Who may import whom inside labkit, lowest first: a package or module imports from its own row and the rows above it.
+LAYERS = [
+    ["labkit.validation", "labkit.labels", "labkit.files"],
+    ["labkit.frame"],
+    ["labkit.geometry", "labkit.losses", "labkit.metrics", "labkit.network", "labkit.augment", "labkit.crf"],
+    ["labkit.sim", "labkit.grasp", "labkit.training", "labkit.engines", "labkit.baselines"],
+    ["labkit.pipeline"],
+    ["labkit.evaluation", "labkit.demo", "labkit.node", "labkit.doctor"],
+    ["labkit.cli"],
+]
+COMMANDS = {"labkit.cli", "labkit.demo", "labkit.evaluation"}  # these may import data_gen, inside a function
+
+
+def tracked(*patterns: str) -> list[Path]:
+    """Files that git knows or would add, so that a new file is judged before it is committed."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *patterns]
+    names = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+    return [ROOT / name for name in names if name and (ROOT / name).is_file()]
+
+
+def modules() -> dict[str, Path]:
+    """Dotted names of all modules of labkit and data_gen, with their files."""
+    files = tracked("labkit/*.py", "data_gen/*.py")
+    return {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
+
+
+def imports(path: Path, everywhere: bool) -> set[str]:
+    """Names that a file imports as dotted paths: everywhere, or only when it is imported itself."""
+    tree = ast.parse(path.read_text())
+    found, waiting = set(), [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute here"
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+        elif everywhere or not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            waiting += ast.iter_child_nodes(node)
+    return found
+
+
+def import_graph(everywhere: bool) -> dict[str, set[str]]:
+    """For each of our modules, which of our modules it imports."""
+    ours = modules()
+    return {name: (imports(path, everywhere) & ours.keys()) - {name} for name, path in ours.items()}
+
+
+# -------------------------------------------------------------------------------- what may import what
+
+
+def test_pybullet_is_named_only_under_sim():
+    named = {name for name, path in modules().items() if "pybullet" in imports(path, everywhere=True)}
+    assert named and all(name.startswith("labkit.sim.") for name in named), named
+
+
+def test_the_pipeline_imports_without_pybullet():
+    """Only labkit.sim needs it, and the demo, which shows the simulator."""
+    names = [name for name in modules() if name.startswith("labkit") and not re.match(r"labkit\.(sim|demo)\b", name)]
+    code = (
+        f"import importlib, sys\nfor name in {names}: importlib.import_module(name)\nprint('pybullet' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1:] == ["False"], done.stderr
+
+
+def test_no_import_cycles():
+    for everywhere in (False, True):
+        TopologicalSorter(import_graph(everywhere)).prepare()  # raises CycleError, and names the cycle
+
+
+def test_labkit_does_not_import_data_gen_but_in_a_command():
+    for name, path in modules().items():
+        if name.startswith("labkit"):
+            in_functions = name in COMMANDS
+            named = {found.split(".")[0] for found in imports(path, everywhere=not in_functions)}
+            assert "data_gen" not in named, name
+
+
+def test_no_module_imports_tests_or_notebooks():
+    for name, path in modules().items():
+        named = {found.split(".")[0] for found in imports(path, everywhere=True)}
+        assert not named & {"tests", "lessons", "labs", "solutions"}, name
+
+
+def layer(name: str) -> int:
+    """The row of LAYERS that a module belongs to; raises ValueError if it has none."""
+    for number, row in enumerate(LAYERS):
+        if any(name == entry or name.startswith((f"{entry}.", f"{entry}_kernels")) for entry in row):
+            return number
+    raise ValueError(f"{name}: give it a place in LAYERS")
+
+
+def test_modules_of_labkit_import_only_from_below():
+    graph = {name: found for name, found in import_graph(False).items() if name.startswith("labkit.")}
+    upward = [f"{a} imports {b}" for a, found in graph.items() for b in found - {"labkit"} if layer(b) > layer(a)]
+    assert not upward, upward
+
+
+# --------------------------------------------------------------------------------- what the files hold
+
+
+def test_every_module_is_read_in_one_sitting():
+    long = {name: n for name, path in modules().items() if (n := len(path.read_text().splitlines())) > MAX_LINES}
+    assert not long, long
+
+
+def test_every_module_says_what_it_is():
+    assert all(ast.get_docstring(ast.parse(path.read_text())) for path in modules().values())
+
+
+def test_no_file_names_a_registry_or_a_place_of_one_machine():
+    hosts = ["pypi" + ".org", "python" + "hosted", "download." + "pytorch", "deb." + "debian", "npm" + "js"]
+    places = ["/" + place for place in ("home/", "root/", "work/", "Users/", "opt/")]
+    forbidden = re.compile("|".join(map(re.escape, hosts)) + "|" + "|".join(rf"(?<![\w.~-]){p}" for p in places))
+    text = [path for path in tracked() if b"\0" not in path.read_bytes()[:4096]]
+    found = {str(path.relative_to(ROOT)): m[0] for path in text if (m := forbidden.search(path.read_text()))}
+    assert not found, found
+
+
+def test_the_licence_and_the_changelog_belong_to_this_version():
+    assert PROJECT["version"] == labkit.__version__
+    assert re.search(rf"^## {re.escape(labkit.__version__)}\b", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert (ROOT / "LICENSE").read_text().startswith("MIT License")
+
+
+def test_links_in_the_pages_lead_to_files():
+    for page in tracked("*.md"):
+        for link in re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text()):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+# ----------------------------------------------------------------------------------- packages and pins
+
+
+def test_every_requirement_is_pinned_and_the_pin_fits():
+    for line in chain(PROJECT["dependencies"], *EXTRAS.values()):
+        needed = Requirement(line)
+        (pin,) = PINS[canonical(needed.name)].specifier
+        assert pin.operator == "==" and needed.specifier.contains(pin.version, prereleases=True), line
+
+
+def test_whatever_is_installed_for_labkit_is_pinned():
+    for extra in ("", *EXTRAS):
+        installed = {name for name, version in requirements("labkit", extra).items() if version is not None}
+        assert not installed - PINS.keys(), f"pin these in constraints.txt: {sorted(installed - PINS.keys())}"
+
+
+def test_pins_leave_the_build_of_a_package_open():
+    for pin in PINS.values():
+        (specifier,) = pin.specifier
+        assert "+" not in specifier.version, pin
+
+
+def test_every_import_of_the_kit_is_required():
+    """An import that works here only because another package brought it along breaks when that one lets go of it."""
+    brought_by = {"cv2": "opencv-python-headless", "PIL": "pillow", "pybullet_data": "pybullet"}
+    required = {canonical(Requirement(line).name) for line in PROJECT["dependencies"]}
+    for name, path in modules().items():
+        roots = {found.split(".")[0] for found in imports(path, everywhere=True)}
+        foreign = roots - sys.stdlib_module_names - {"labkit", "data_gen"}
+        missing = {root for root in foreign if canonical(brought_by.get(root, root)) not in required}
+        assert not missing, f"{name} imports {missing}"
+
+
+# ------------------------------------------------------------------------------------------------ make
+
+
+def make(folder: Path, *arguments: str, path: str | None = None) -> subprocess.CompletedProcess:
+    """Run make in a folder."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+    environment |= {} if path is None else {"PATH": path}
+    return subprocess.run(["make", *arguments], cwd=folder, env=environment, capture_output=True, text=True)
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A checkout of nothing but what the setup needs, with a Python 3.11 that only writes down what it is asked.
+
+    Its `-m venv DIR` makes DIR/bin/python, a copy of itself; pip fails while a file `offline` is there.
+    """
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, tmp_path)
+    (tmp_path / "bin").mkdir()
+    python = tmp_path / "bin" / "python3.11"
+    python.write_text(
+        "#!/bin/bash\n"
+        'if [ "$1" = -c ]; then exit 0; fi\n'
+        f'echo "$@" >> "{tmp_path}/log"\n'
+        'if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; fi\n'
+        f'if [ "$2" = pip ] && [ -e "{tmp_path}/offline" ]; then exit 1; fi\n'
+    )
+    python.chmod(0o755)
+    return tmp_path
+
+
+def set_up(checkout: Path) -> tuple[int, list[str]]:
+    """Run the setup; return make's status and what Python was asked to do."""
+    log = checkout / "log"
+    log.write_text("")
+    done = make(checkout, ".venv/installed", f"PYTHON={checkout / 'bin/python3.11'}")
+    return done.returncode, log.read_text().splitlines()
+
+
+def test_setup_runs_once_and_again_when_the_pins_change(checkout):
+    status, asked = set_up(checkout)
+    assert status == 0 and asked[0] == "-m venv .venv" and "-c constraints.txt" in asked[-1]
+    assert set_up(checkout) == (0, [])
+    later = (checkout / ".venv/installed").stat().st_mtime + 5
+    os.utime(checkout / "constraints.txt", (later, later))
+    status, asked = set_up(checkout)
+    assert status == 0 and asked and "-m venv .venv" not in asked
+
+
+def test_an_unfinished_setup_is_made_again_from_nothing(checkout):
+    (checkout / "offline").touch()
+    assert set_up(checkout)[0] != 0
+    (checkout / ".venv/half-written").touch()
+    assert set_up(checkout)[0] != 0
+    assert not (checkout / ".venv/half-written").exists()
+    (checkout / "offline").unlink()
+    status, asked = set_up(checkout)
+    assert status == 0 and asked[0] == "-m venv .venv"
+
+
+def test_setup_installs_every_extra_but_the_peers(checkout):
+    _, asked = set_up(checkout)
+    named = re.search(r"-e \.\[(.*)\]", asked[-1])[1].split(",")
+    assert set(named) == EXTRAS.keys() - {"bench"}
+
+
+@pytest.mark.parametrize("arguments", [[], ["PYTHON=./python3.12"]])
+def test_the_wrong_python_gets_one_line(checkout, arguments):
+    """A PATH on which every Python is of another version."""
+    tools = checkout / "tools"
+    tools.mkdir()
+    for tool in ("make", "bash", "sh", "env"):
+        (tools / tool).symlink_to(shutil.which(tool))
+    for folder, name in ((tools, "python3"), (tools, "python3.11"), (checkout, "python3.12")):
+        (folder / name).write_text("#!/bin/sh\nexit 1\n")
+        (folder / name).chmod(0o755)
+    done = make(checkout, "test", *arguments, path=str(tools))
+    assert done.returncode != 0
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("make")]
+    assert len(lines) == 1 and "Python 3.11" in lines[0]
+    assert not (checkout / ".venv").exists()
+
+
+def test_import_with_the_wrong_python_says_which_one_is_needed():
+    code = "import sys; sys.version_info = (3, 12, 1, 'final', 0); import labkit"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("ImportError: labkit needs Python 3.11, this is 3.12")
+
+
+def test_every_target_runs_something_and_readme_commands_exist():
+    targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)[1].split()
+    assert set(targets) >= {"demo", "test", "lab", "train", "bench", "clean"}
+    for target in targets:
+        planned = make(ROOT, "-n", "-o", ".venv/installed", "-o", ".venv/installed-bench", target)
+        assert planned.returncode == 0 and planned.stdout.strip(), target
+    for target in re.findall(r"(?:`|^    )make ([a-z]+)\b", (ROOT / "README.md").read_text(), re.MULTILINE):
+        assert target in targets
+
+
+def test_clean_removes_what_was_generated_and_nothing_else(checkout):
+    for name in ("out/demo.png", "build/x", ".pytest_cache/x", "labkit/__pycache__/x.pyc"):
+        (checkout / name).parent.mkdir(parents=True)
+        (checkout / name).touch()
+    kept = ["labkit/frame.py", "data/train/dataset.json", ".venv/lib/__pycache__/x.pyc", "log"]
+    for name in kept:
+        (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+        (checkout / name).touch()
+    assert make(checkout, "clean").returncode == 0
+    files = {str(p.relative_to(checkout)) for p in checkout.rglob("*") if p.is_file()}
+    assert files == {*kept, "Makefile", "pyproject.toml", "constraints.txt", "bin/python3.11"}
+
+
+def test_ci_runs_the_readmes_test_command():
+    script = (ROOT / ".ci/run").read_text()
+    assert os.access(ROOT / ".ci/run", os.X_OK)
+    assert script.rstrip().splitlines()[-1] == "make test" and "set -e" in script
+    assert "make test" in (ROOT / "README.md").read_text()
+
+
+# ------------------------------------------------------------------------------ the benchmarks' runner
+
+
+def bench(folder: Path, page: Path, *names: str) -> int:
+    """Run the benchmarks of a folder; the runner is imported by its path because it is a script."""
+    sys.path.insert(0, str(ROOT))
+    try:
+        from tests.bench import run
+    finally:
+        sys.path.remove(str(ROOT))
+    return run.main([*names, "--page", str(page)], folder)
+
+
+def test_the_benchmark_page_keeps_what_was_not_measured_again(tmp_path, capsys):
+    for name in ("one", "two"):
+        (tmp_path / f"bench_{name}.py").write_text(
+            f'"""Title {name}.\n\nHow to read it."""\n\ndef main():\n    return "| a |\\n|---|\\n| {name} first |"\n'
+        )
+    page = tmp_path / "PAGE.md"
+    assert bench(tmp_path, page) == 0
+    first = page.read_text()
+    assert first.index("## Title one\n\nHow to read it.") < first.index("| one first |") < first.index("## Title two")
+    two = tmp_path / "bench_two.py"
+    two.write_text(two.read_text().replace("first", "second"))
+    assert bench(tmp_path, page, "two") == 0
+    assert "| one first |" in page.read_text() and "| two second |" in page.read_text()
+    two.write_text("raise RuntimeError('broken')")
+    assert bench(tmp_path, page, "two") == 1
+    assert "| two second |" in page.read_text() and "failed: two" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        bench(tmp_path, page, "three")
+
+
+def test_every_benchmark_has_a_title_and_a_main():
+    for path in (ROOT / "tests" / "bench").glob("bench_*.py"):
+        tree = ast.parse(path.read_text())
+        assert ast.get_docstring(tree), path
+        assert any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body), path
