@@ -1,0 +1,116 @@
+"""The dense CRF: every pixel is every other's neighbour (Kraehenbuehl and Koltun 2011).
+
+    w_pq = w_appearance exp(-|p - q|^2 / (2 theta_alpha^2) - |I_p - I_q|^2 / (2 theta_beta^2))
+         + w_smoothness exp(-|p - q|^2 / (2 theta_gamma^2))
+
+Section 2's model with all pairs as neighbours. N^2 pairs are too many for a cut, but in mean field the message to a
+pixel is a weighted mean of all q's, which is one Gaussian filter in the space of positions and colours.
+"""
+
+import numpy as np
+from jaxtyping import Float, Num
+
+from labkit.crf.energy import as_channels
+from labkit.validation import check_finite, check_shape
+
+
+def dense_crf(
+    unary: Num[np.ndarray, "H W C"],
+    image: Num[np.ndarray, "H W *channels"],
+    *,
+    theta_alpha: float = 60.0,
+    theta_beta: float = 10.0,
+    w_appearance: float = 10.0,
+    theta_gamma: float = 3.0,
+    w_smoothness: float = 3.0,
+    iterations: int = 10,
+) -> Float[np.ndarray, "H W C"]:
+    """Return the mean-field probabilities (H, W, C), float32, of a dense CRF; argmax over the last axis labels.
+
+    unary: finite costs. theta_alpha and theta_gamma in pixels, theta_beta in the image's units. The kernels are
+    normalised symmetrically, so that the weights do not depend on the image's size; they are approximated on the
+    permutohedral lattice. Raises ValueError naming the argument that does not fit.
+
+    >>> unary = np.zeros((4, 4, 2)) + (0.0, 1.0)
+    >>> unary[1, 1] = (1.0, 0.0)  # one pixel stands out
+    >>> dense_crf(unary, np.zeros((4, 4, 3), np.uint8)).argmax(axis=2)[1, 1]
+    np.int64(0)
+    """
+    from labkit.crf.lattice_kernels import LANES, softmax
+
+    unary = check_finite("unary", check_shape("unary", unary, (None, None, None)))
+    if 0 in unary.shape:
+        raise ValueError(f"unary: expected at least one pixel and class, got shape {unary.shape}")
+    numbers = {"theta_alpha": theta_alpha, "theta_beta": theta_beta, "theta_gamma": theta_gamma}
+    numbers |= {"w_appearance": w_appearance, "w_smoothness": w_smoothness}
+    for name, number in numbers.items():
+        if not (0.0 <= number < np.inf) or (number == 0.0 and name.startswith("theta")):
+            raise ValueError(f"{name}: expected a finite number {'above' if 'theta' in name else '>='} 0, got {number}")
+    if iterations < 0:
+        raise ValueError(f"iterations: expected at least 0, got {iterations}")
+    H, W, C = unary.shape
+    colours = as_channels("image", check_finite("image", image), unary)
+    places = np.stack(np.meshgrid(np.arange(W), np.arange(H)), axis=-1)
+    kernels = [
+        (w_appearance, GaussianFilter(np.dstack([places / theta_alpha, colours / theta_beta]).reshape(H * W, -1))),
+        (w_smoothness, GaussianFilter((places / theta_gamma).reshape(H * W, -1))),
+    ]
+    minus_unary = np.zeros((H * W, -(-C // LANES), LANES), np.float32)
+    minus_unary.reshape(H * W, -1)[:, :C] = -unary.reshape(H * W, C)
+    q = np.zeros_like(minus_unary)
+    softmax(minus_unary, C, q)
+    for _ in range(iterations):
+        z = minus_unary.copy()
+        for weight, gaussian in kernels:
+            gaussian.add_filtered(q, weight, z)
+        softmax(z, C, q)
+    return q.reshape(H, W, -1)[..., :C]
+
+
+class GaussianFilter:
+    """exp(-|f_p - f_q|^2 / 2) between all pixels, symmetrically normalised: K_pq / sqrt(sum_q K_pq sum_p K_pq)."""
+
+    def __init__(self, features: Float[np.ndarray, "N d"]):
+        """features: one row a pixel, each column divided by its standard deviation."""
+        from labkit.crf import lattice_kernels as lattice
+
+        N, d = features.shape
+        elevated = features @ elevation(d).T
+        lowest = np.floor(elevated.min(axis=0)).astype(np.int64) - 3 * (d + 1)
+        size = np.ceil(elevated.max(axis=0)).astype(np.int64) + 3 * (d + 1) - lowest
+        if np.prod(size[:d].astype(np.float64)) > 2.0**62:
+            raise ValueError(f"theta: expected scales above a {2**12}th of the features' ranges, got {d} much smaller")
+        stride = np.cumprod(np.concatenate([[1], size[: d - 1]]))
+        keys, self.weights = lattice.corners_of_pixels(elevated.astype(np.float32), lowest, stride)
+        self.corner, found, *table = lattice.number_corners(keys)
+        # A step along direction j adds d + 1 to coordinate j and takes 1 from all; the last one has no place in keys.
+        steps = np.append((d + 1) * stride, 0) - stride.sum()
+        self.near = lattice.neighbour_corners(found, *table, steps)
+        ones = np.zeros((N, 1, lattice.LANES), np.float32)
+        ones[..., 0] = 1.0
+        total = np.zeros_like(ones)
+        lattice.lattice_filter(ones, np.ones(N, np.float32), self.corner, self.weights, self.near, total)
+        self.scale = (1.0 / np.sqrt(total[:, 0, 0] + 1e-20)).astype(np.float32)
+
+    def add_filtered(self, values: np.ndarray, weight: float, out: np.ndarray) -> None:
+        """out += weight * filtered values, float32 (N, groups, LANES)."""
+        from labkit.crf.lattice_kernels import lattice_filter
+
+        scale = (np.sqrt(weight) * self.scale).astype(np.float32)
+        lattice_filter(values, scale, self.corner, self.weights, self.near, out)
+
+
+def elevation(d: int) -> Float[np.ndarray, "d+1 d"]:
+    """Return the map from d features to the plane sum(x) = 0 in d + 1 dimensions on which the lattice lies.
+
+    Its columns are orthogonal; its scale makes splatting, blurring and slicing together a Gaussian of deviation 1.
+
+    >>> (elevation(2).T @ elevation(2)).round(6)
+    array([[6., 0.], [0., 6.]])
+    """
+    E = np.zeros((d + 1, d))
+    for j in range(d):
+        E[: j + 1, j] = 1.0
+        E[j + 1, j] = -(j + 1.0)
+        E[:, j] /= np.sqrt((j + 1.0) * (j + 2.0))
+    return E * (d + 1) * np.sqrt(2.0 / 3.0)

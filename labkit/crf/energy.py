@@ -1,0 +1,200 @@
+"""The energy: a Potts model over the pixel grid, whose lowest labelling is the answer (section 2 of the text).
+
+    E(y) = sum over pixels p of psi_p(y_p)  +  sum over neighbours {p, q} of w_pq [y_p != y_q]
+    w_pq = lam exp(-|I_p - I_q|^2 / (2 sigma_I^2) - |p - q|^2 / (2 sigma_p^2))
+
+The unary term psi says what each pixel looks like on its own; the pairwise term makes neighbours agree, less so
+across an edge of the image. Every solver of this package takes a `PottsCRF` and gives a `MapResult`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Integer, Num, UInt8
+
+from labkit.validation import check_finite, check_labels, check_same_size, check_shape
+
+# Each unordered pair of neighbours counts once: a pixel owns the pairs with these neighbours, (down, right) of it.
+OFFSETS = {4: ((0, 1), (1, 0)), 8: ((0, 1), (1, 0), (1, 1), (1, -1))}
+MAX_CLASSES = 255
+
+
+@dataclass(frozen=True, eq=False)
+class PottsCRF:
+    """A Potts model: what each class costs at each pixel, and what it costs neighbours to disagree.
+
+    unary: psi, (H, W, C), any unit; +inf forbids a class at a pixel. weights: w >= 0, (D, H, W) with D = 2 for 4
+    neighbours and D = 4 for 8; weights[d, v, u] belongs to the pair of pixel (v, u) and the one OFFSETS[...][d] from
+    it, and is 0 where that one is outside the image. Raises ValueError naming the argument that does not fit.
+    Section 2 of the text.
+
+    >>> crf = PottsCRF(np.array([[[0.0, 1.0], [1.0, 0.0]]]), np.array([[[0.5, 0.0]], [[0.0, 0.0]]]))
+    >>> crf.energy(np.array([[0, 1]])), crf.energy(np.array([[0, 0]]))
+    (0.5, 1.0)
+    """
+
+    unary: Float[np.ndarray, "H W C"]
+    weights: Float[np.ndarray, "D H W"]
+
+    def __post_init__(self):
+        unary = check_shape("unary", self.unary, (None, None, None))
+        if unary.dtype.kind not in "fiu":
+            raise ValueError(f"unary: expected real costs, got dtype {unary.dtype}")
+        if 0 in unary.shape or not 2 <= unary.shape[2] <= MAX_CLASSES:
+            raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
+        unary = unary.astype(np.float64, copy=False)
+        if np.isnan(unary).any() or np.isneginf(unary).any():
+            raise ValueError("unary: expected costs that are finite or +inf (forbidden), got NaN or -inf")
+        if np.isinf(unary.min(axis=2)).any():
+            raise ValueError("unary: expected at least one allowed class a pixel, got a pixel with only +inf")
+        weights = check_finite("weights", check_shape("weights", self.weights, (None, *unary.shape[:2])))
+        if len(weights) not in (2, 4):
+            raise ValueError(f"weights: expected 2 or 4 pairs a pixel (4 or 8 neighbours), got {len(weights)}")
+        if weights.min() < 0.0:
+            raise ValueError(
+                f"weights: expected costs >= 0, got {weights.min():.6g}; a negative one rewards disagreement, "
+                "which is not submodular, so that no cut can represent it"
+            )
+        weights = weights.astype(np.float64, copy=False)
+        for d, offset in enumerate(OFFSETS[2 * len(weights)]):
+            outside = np.ones(unary.shape[:2], bool)
+            outside[pair_slices(offset)[0]] = False
+            if weights[d][outside].any():
+                raise ValueError(f"weights: expected 0 where a pair leaves the image, got others in weights[{d}]")
+        object.__setattr__(self, "unary", unary)
+        object.__setattr__(self, "weights", weights)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Height, width and number of classes."""
+        return self.unary.shape
+
+    @property
+    def connectivity(self) -> int:
+        """Neighbours of an inner pixel: 4 or 8."""
+        return 2 * len(self.weights)
+
+    @property
+    def offsets(self) -> tuple[tuple[int, int], ...]:
+        """Steps (down, right) from a pixel to the neighbours whose pairs it owns."""
+        return OFFSETS[self.connectivity]
+
+    @classmethod
+    def from_image(
+        cls,
+        unary: Num[np.ndarray, "H W C"],
+        image: Num[np.ndarray, "H W *channels"],
+        lam: float,
+        sigma_I: float,
+        sigma_p: float = 1.0,
+        connectivity: int = 4,
+        extra: tuple = (),
+    ) -> "PottsCRF":
+        """Build the contrast-sensitive Potts model of section 2 over an image.
+
+        image: (H, W) or (H, W, channels), any real dtype; sigma_I is in its own units (0 to 255 for uint8). lam >= 0,
+        sigma_p in pixels. extra: pairs (channels, sigma) such as a depth image and its scale in metres; each adds its
+        own -|d|^2 / (2 sigma^2) to the exponent, and NaN there (no reading) adds nothing. Raises ValueError.
+
+        >>> unary, image = np.zeros((2, 3, 2)), np.zeros((2, 3, 3), np.uint8)
+        >>> crf = PottsCRF.from_image(unary, image, lam=2.0, sigma_I=10.0, sigma_p=1.0)
+        >>> crf.weights.shape, int((crf.weights > 0).sum()), crf.weights.max().round(3)  # 2 * 2 + 1 * 3 pairs
+        ((2, 2, 3), 7, np.float64(1.213))
+        """
+        for name, sigma in (("sigma_I", sigma_I), ("sigma_p", sigma_p), *(("extra", sigma) for _, sigma in extra)):
+            if not (np.isfinite(sigma) and sigma > 0.0):
+                raise ValueError(f"{name}: expected a scale above 0, got {sigma}")
+        if not (np.isfinite(lam) and lam >= 0.0):
+            raise ValueError(f"lam: expected a weight >= 0, got {lam}")
+        if connectivity not in OFFSETS:
+            raise ValueError(f"connectivity: expected 4 or 8 neighbours, got {connectivity}")
+        unary = check_shape("unary", unary, (None, None, None))
+        features = [(as_channels("image", check_finite("image", image), unary) / sigma_I)]
+        features += [as_channels("extra", channels, unary) / sigma for channels, sigma in extra]
+        weights = np.zeros((connectivity // 2, *unary.shape[:2]))
+        for d, offset in enumerate(OFFSETS[connectivity]):
+            p, q = pair_slices(offset)
+            exponent = np.full(weights[d][p].shape, -sum(step**2 for step in offset) / (2.0 * sigma_p**2))
+            for feature in features:
+                difference = np.nan_to_num(feature[p] - feature[q], posinf=np.inf, neginf=-np.inf)
+                exponent -= 0.5 * np.einsum("ijk,ijk->ij", difference, difference)
+            weights[d][p] = lam * np.exp(exponent)
+        return cls(unary, weights)
+
+    def check_labelling(self, name: str, y: Integer[np.ndarray, "H W"]) -> Integer[np.ndarray, "H W"]:
+        """Return `y` if it labels every pixel of this model; raise a ValueError that calls it `name` if not."""
+        return check_labels(name, check_shape(name, y, self.shape[:2]), self.shape[2], ignore=None)
+
+    def energy(self, y: Integer[np.ndarray, "H W"]) -> float:
+        """Return E(y) in float64, for labels of any integer dtype; +inf if a forbidden class is used.
+
+        Raises ValueError if y has another size than the image or a label outside 0 .. C - 1.
+        """
+        y = self.check_labelling("y", y)
+        total = np.take_along_axis(self.unary, y[..., None].astype(np.intp), axis=2).sum()
+        for w, offset in zip(self.weights, self.offsets, strict=True):
+            p, q = pair_slices(offset)
+            total += w[p][y[p] != y[q]].sum()
+        return float(total)
+
+
+@dataclass(frozen=True, eq=False)
+class MapResult:
+    """What a solver found, and how far from the optimum it can be at most.
+
+    labels: uint8 (H, W). energy: E(labels). lower_bound: proven, no labelling has less energy (-inf from a method that
+    proves nothing). gap: (energy - lower_bound) / |energy|. iterations: sweeps or moves. seconds: wall time.
+    """
+
+    labels: UInt8[np.ndarray, "H W"]
+    energy: float
+    lower_bound: float = -np.inf
+    iterations: int = 0
+    seconds: float = 0.0
+
+    @property
+    def gap(self) -> float:
+        """How far above the optimum the energy can be, relative to it: 0 is proven optimal, inf is no proof."""
+        excess = self.energy - self.lower_bound
+        return excess / abs(self.energy) if self.energy and excess else excess
+
+
+def unary_from_probabilities(
+    probabilities: Float[np.ndarray, "H W C"], floor: float = 1e-6
+) -> Float[np.ndarray, "H W C"]:
+    """Turn class probabilities into costs, -log p, with p clipped at `floor` so that no class is ruled out.
+
+    Raises ValueError unless each pixel's probabilities lie in 0..1 and sum to 1 (within 1e-3). Section 2 of the text.
+
+    >>> unary_from_probabilities(np.array([[[1.0, 0.0]]]), floor=1e-2).round(3) + 0.0
+    array([[[0.   , 4.605]]])
+    """
+    p = check_finite("probabilities", check_shape("probabilities", probabilities, (None, None, None)))
+    if not 0.0 < floor < 1.0:
+        raise ValueError(f"floor: expected a probability between 0 and 1, got {floor}")
+    if p.size and (p.min() < 0.0 or p.max() > 1.0 + 1e-3 or np.abs(p.sum(axis=2, dtype=np.float64) - 1.0).max() > 1e-3):
+        raise ValueError(
+            f"probabilities: expected 0..1 summing to 1 at each pixel, got {p.min():.4g} to {p.max():.4g} "
+            f"with sums from {p.sum(axis=2).min():.4g}; are they logits?"
+        )
+    return -np.log(np.clip(p.astype(np.float64, copy=False), floor, 1.0))
+
+
+def pair_slices(offset: tuple[int, int]) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Return the slices of an image that hold the first and the second pixels of all pairs one `offset` apart.
+
+    >>> p, q = pair_slices((1, -1))
+    >>> np.arange(6).reshape(2, 3)[p], np.arange(6).reshape(2, 3)[q]
+    (array([[1, 2]]), array([[3, 4]]))
+    """
+    ahead = {-1: slice(None, -1), 0: slice(None), 1: slice(1, None)}
+    return tuple(ahead[-step] for step in offset), tuple(ahead[step] for step in offset)
+
+
+def as_channels(name: str, image: Num[np.ndarray, "H W *channels"], unary: np.ndarray) -> Float[np.ndarray, "H W k"]:
+    """Return an image or a single channel as float64 (H, W, k), of the unary term's size."""
+    image = np.asarray(image)
+    if image.ndim not in (2, 3) or image.dtype.kind not in "fiub":
+        raise ValueError(f"{name}: expected real numbers (H, W) or (H, W, k), got {image.dtype} {image.shape}")
+    check_same_size("unary", unary, name, image)
+    return image.reshape(*image.shape[:2], -1).astype(np.float64)

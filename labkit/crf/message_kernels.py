@@ -1,0 +1,196 @@
+"""TRW-S and ICM sweeps, compiled by numba.
+
+TRW-S visits the pixels in an order and uses each new message at once, which looks hopelessly sequential. But pixels on
+one diagonal of the image do not touch each other. So the image is stored in skewed coordinates: pixel (v, u) is at
+diagonal k = u + slant * v and place v on it, with slant 1 for 4 neighbours and 2 for 8. Then every neighbour is on
+an earlier or a later diagonal, a diagonal is a contiguous row, and the processor works on many pixels of it at once.
+
+Arrays: unary[k, c, v], weights[d, k, v], messages[d, k, c, v] where (d, k, v) names the pair of a pixel and the one
+hop[d] = (diagonals, places) further. There are MARGIN empty diagonals and one empty place on either side.
+"""
+
+import numpy as np
+from numba import njit
+
+MARGIN = 3  # the longest hop: right and down among 8 neighbours
+
+
+@njit(cache=True)
+def skewed(image, slant):
+    """Store an image (H, W, C) by diagonals: (diagonals, C, places)."""
+    H, W, C = image.shape
+    out = np.zeros((W + slant * (H - 1) + 2 * MARGIN, C, H + 2), image.dtype)
+    for v in range(H):
+        for u in range(W):
+            for c in range(C):
+                out[MARGIN + u + slant * v, c, 1 + v] = image[v, u, c]
+    return out
+
+
+@njit(cache=True)
+def straightened(rows, slant, W):
+    """Bring one channel (diagonals, places) back to an image (H, W)."""
+    H = rows.shape[1] - 2
+    out = np.empty((H, W), rows.dtype)
+    for v in range(H):
+        for u in range(W):
+            out[v, u] = rows[MARGIN + u + slant * v, 1 + v]
+    return out
+
+
+@njit(cache=True)
+def places(k, slant, H, W):
+    """Range of places on diagonal k that hold pixels."""
+    k -= MARGIN
+    return 1 + max(0, -((W - 1 - k) // slant)), 1 + min(H - 1, k // slant) + 1
+
+
+@njit(cache=True)
+def add(total, terms):
+    """Add element by element; as all loops below, over pixels that are neighbours in memory."""
+    for i in range(len(total)):
+        total[i] += terms[i]
+
+
+@njit(cache=True)
+def smaller(least, values):
+    """Keep the smaller of each pair of elements."""
+    for i in range(len(least)):
+        least[i] = min(least[i], values[i])
+
+
+@njit(cache=True)
+def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forward):
+    """Send new messages along all pairs, forward or backward; return the lower bound that this proves.
+
+    A pixel's belief h sums its unary cost and the messages to it. It gives an equal share of h to each pair ahead,
+    which is a tree's part of the belief; what the pair can still cost at the least is the message on:
+    min over j of share(j) - message back(j) + w [j != c], for Potts one minimum over all j, cut off at w above it.
+    That minimum goes to the bound. So does what the pixel keeps, with the remainders of the division, at its least.
+    """
+    D, C, H = len(hop), unary.shape[1], unary.shape[2] - 2
+    h, rest = np.empty((C, H), unary.dtype), np.empty((C, H), unary.dtype)
+    low, kept = np.empty(H, unary.dtype), np.empty(H, unary.dtype)
+    bound = np.int64(0)
+    diagonals = unary.shape[0] - 2 * MARGIN
+    for i in range(diagonals):
+        k = MARGIN + (i if forward else diagonals - 1 - i)
+        a, b = places(k, slant, H, W)
+        n = b - a
+        if n <= 0:
+            continue
+        share, ahead = shift[k, a:b], pairs_ahead[k, a:b]
+        for c in range(C):
+            belief = h[c, :n]
+            belief[:] = unary[k, c, a:b]
+            for d in range(D):
+                add(belief, messages[d, k, c, a:b])
+                add(belief, messages[d, k - hop[d, 0], c, a - hop[d, 1] : b - hop[d, 1]])
+            divide(belief, share, ahead, rest[c, :n])
+            if c == 0:
+                kept[:n] = rest[0, :n]
+            else:
+                smaller(kept[:n], rest[c, :n])
+        for j in range(n):
+            bound += kept[j]
+        for d in range(D):
+            row, shifted = (k, 0) if forward else (k - hop[d, 0], hop[d, 1])
+            w = weights[d, row, a - shifted : b - shifted]
+            for c in range(C):
+                subtract(rest[c, :n], h[c, :n], messages[d, row, c, a - shifted : b - shifted])
+                if c == 0:
+                    low[:n] = rest[0, :n]
+                else:
+                    smaller(low[:n], rest[c, :n])
+            for c in range(C):
+                cut_off(messages[d, row, c, a - shifted : b - shifted], rest[c, :n], low[:n], w)
+            for j in range(n):
+                bound += low[j] if w[j] > 0 else 0
+    return bound
+
+
+@njit(cache=True)
+def divide(belief, shift, ahead, rest):
+    """Replace a belief by the share of one pair; `rest` is what remains after all pairs ahead took theirs."""
+    for i in range(len(belief)):
+        share = belief[i] >> shift[i]
+        rest[i] = belief[i] - share * ahead[i]
+        belief[i] = share
+
+
+@njit(cache=True)
+def subtract(out, x, y):
+    """out = x - y."""
+    for i in range(len(out)):
+        out[i] = x[i] - y[i]
+
+
+@njit(cache=True)
+def cut_off(message, values, low, w):
+    """message = min(values - low, w): the distance transform of a Potts term."""
+    for i in range(len(message)):
+        message[i] = min(values[i] - low[i], w[i])
+
+
+@njit(cache=True)
+def trws_labels(unary, weights, messages, hop, slant, W):
+    """Read labels off the messages of a backward sweep: each pixel in turn, given the labels already chosen."""
+    D, C, H = len(hop), unary.shape[1], unary.shape[2] - 2
+    labels = np.zeros((unary.shape[0], H + 2), np.uint8)
+    cost, least = np.empty(H, unary.dtype), np.empty(H, unary.dtype)
+    for k in range(MARGIN, unary.shape[0] - MARGIN):
+        a, b = places(k, slant, H, W)
+        n = b - a
+        if n <= 0:
+            continue
+        for c in range(C):
+            cost[:n] = unary[k, c, a:b]
+            for d in range(D):
+                add(cost[:n], messages[d, k, c, a:b])
+                back, first, last = k - hop[d, 0], a - hop[d, 1], b - hop[d, 1]
+                add_where_differs(cost[:n], weights[d, back, first:last], labels[back, first:last], c)
+            choose(labels[k, a:b], least[:n], cost[:n], c)
+    return straightened(labels, slant, W)
+
+
+@njit(cache=True)
+def add_where_differs(cost, w, labels, c):
+    """Charge class c for each pair whose other pixel has another label."""
+    for i in range(len(cost)):
+        cost[i] += w[i] if labels[i] != c else 0
+
+
+@njit(cache=True)
+def choose(labels, least, cost, c):
+    """Take class c where it is the first or the cheapest so far."""
+    for i in range(len(labels)):
+        if c == 0 or cost[i] < least[i]:
+            least[i] = cost[i]
+            labels[i] = c
+
+
+@njit(cache=True)
+def icm_sweep(unary, weights, offsets, labels):
+    """Give each pixel in turn the class that is best given its neighbours; return how many changed."""
+    H, W, C = unary.shape
+    cost = np.empty(C)
+    changed = 0
+    for v in range(H):
+        for u in range(W):
+            for c in range(C):
+                cost[c] = unary[v, u, c]
+            for d in range(len(offsets)):
+                down, right = offsets[d]
+                if weights[d, v, u] > 0.0:  # agreeing saves what disagreeing costs
+                    cost[labels[v + down, u + right]] -= weights[d, v, u]
+                up, left = v - down, u - right
+                if up >= 0 and 0 <= left < W and weights[d, up, left] > 0.0:
+                    cost[labels[up, left]] -= weights[d, up, left]
+            best = labels[v, u]
+            for c in range(C):
+                if cost[c] < cost[best]:
+                    best = c
+            if best != labels[v, u]:
+                labels[v, u] = best
+                changed += 1
+    return changed

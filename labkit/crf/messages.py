@@ -1,0 +1,84 @@
+"""Message passing: TRW-S, which proves how good a labelling is, and ICM, which only walks downhill.
+
+TRW-S (Kolmogorov 2006) splits the energy into chains of pixels, whose minima are easy, and moves cost between them
+until the chains agree as far as they can. The sum of the chains' minima is a lower bound on the energy of every
+labelling. For two classes it reaches the optimum; for more it usually comes within a fraction of a percent.
+"""
+
+import numpy as np
+from jaxtyping import Int, Integer
+
+from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.integers import quantise
+
+# How often labels are read off the messages, in iterations.
+LABEL_EVERY = 5
+
+
+def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapResult:
+    """Minimise by sequential tree-reweighted message passing, with a proven lower bound.
+
+    One iteration is a sweep forward and one backward. It stops early once the gap is below `tolerance`. Exact integer
+    arithmetic makes the bound a proof. Section 2 of the text.
+
+    >>> psi = np.array([[[0.0, 2.0, 2.0], [1.0, 2.0, 0.8], [0.0, 2.0, 2.0]]])
+    >>> result = trws(PottsCRF(psi, np.array([[[0.5, 0.5, 0.0]], [[0.0, 0.0, 0.0]]])))
+    >>> result.labels, round(result.energy, 3), result.gap < 1e-6
+    (array([[0, 0, 0]], dtype=uint8), 1.0, True)
+    """
+    if iterations < 1:
+        raise ValueError(f"iterations: expected at least 1, got {iterations}")
+    from labkit.crf.message_kernels import skewed, trws_labels, trws_sweep
+
+    W = crf.shape[1]
+    slant = 1 if crf.connectivity == 4 else 2
+    hop = np.array([(right + slant * down, down) for down, right in crf.offsets])
+    integer = quantise(crf)
+    unary = skewed(integer.unary, slant)
+    ahead, behind = (skewed(count[..., None], slant)[:, 0] for count in pair_counts(integer.weights, crf.offsets))
+    # A belief is shared among 1, 2 or 4 pairs, at least as many as there are: powers of two divide by a shift.
+    shift = np.ceil(np.log2(np.maximum(np.maximum(ahead, behind), 1))).astype(unary.dtype)
+    weights = np.stack([skewed(w[..., None], slant)[:, 0] for w in integer.weights])
+    messages = np.zeros((len(hop), *unary.shape), unary.dtype)
+    best = MapResult(crf.unary.argmin(axis=2).astype(np.uint8), np.inf)
+    for iteration in range(1, iterations + 1):
+        trws_sweep(unary, weights, messages, hop, shift, ahead, slant, W, True)
+        bound = trws_sweep(unary, weights, messages, hop, shift, behind, slant, W, False)
+        if iteration % LABEL_EVERY == 0 or iteration == iterations:
+            labels = trws_labels(unary, weights, messages, hop, slant, W)
+            energy = crf.energy(labels)
+            if energy > best.energy:
+                labels, energy = best.labels, best.energy
+            best = MapResult(labels, energy, integer.lower_bound(bound, energy), iteration)
+            if best.gap <= tolerance:
+                break
+    return best
+
+
+def icm(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None, iterations: int = 100) -> MapResult:
+    """Iterated conditional modes: change single pixels while that lowers the energy, from the unary one or `labels`.
+
+    iterations counts sweeps over the image. A local minimum only: it is the baseline for the others, and the finish
+    after them, because it works on the float64 energy.
+    """
+    from labkit.crf.message_kernels import icm_sweep
+
+    labels = (crf.unary.argmin(axis=2) if labels is None else crf.check_labelling("labels", labels)).astype(np.uint8)
+    sweep = 0
+    while sweep < iterations:
+        sweep += 1
+        if not icm_sweep(crf.unary, crf.weights, np.array(crf.offsets), labels):
+            break
+    return MapResult(labels, crf.energy(labels), iterations=sweep)
+
+
+def pair_counts(
+    weights: Int[np.ndarray, "D H W"], offsets: tuple
+) -> tuple[Int[np.ndarray, "H W"], Int[np.ndarray, "H W"]]:
+    """Count each pixel's pairs of weight above 0: those it owns (ahead), and those that pixels behind it own."""
+    ahead = (weights > 0).sum(axis=0, dtype=weights.dtype)
+    behind = np.zeros_like(ahead)
+    for w, offset in zip(weights, offsets, strict=True):
+        p, q = pair_slices(offset)
+        behind[q] += w[p] > 0
+    return ahead, behind

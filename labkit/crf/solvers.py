@@ -1,0 +1,88 @@
+"""One entrance to all solvers, and the refinement of a network's probabilities."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Num
+
+from labkit.crf.cuts import expansion, swap
+from labkit.crf.energy import MapResult, PottsCRF, unary_from_probabilities
+from labkit.crf.exact import brute_force, min_cut, unary
+from labkit.crf.mean_field import mean_field
+from labkit.crf.messages import icm, trws
+from labkit.validation import check_depth
+
+
+def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4) -> MapResult:
+    """Let TRW-S find the bound and a start, and expansion moves the rest of the way down: the default.
+
+    TRW-S stops after `iterations`, or once its own gap is below `tolerance`; the moves then shrink it further.
+    """
+    start = trws(crf, iterations, tolerance)
+    finish = expansion(crf, start.labels)
+    best = min(start, finish, key=lambda result: result.energy)
+    return replace(best, lower_bound=start.lower_bound, iterations=start.iterations + finish.iterations)
+
+
+METHODS = {
+    "brute_force": brute_force,
+    "unary": unary,
+    "min_cut": min_cut,
+    "icm": icm,
+    "mean_field": mean_field,
+    "expansion": expansion,
+    "swap": swap,
+    "trws": trws,
+    "trws+expansion": trws_expansion,
+}
+
+
+def solve(crf: PottsCRF, method: str = "trws+expansion", **options) -> MapResult:
+    """Look for the labelling of least energy; `options` go to the method's function. Section 2 of the text.
+
+    method: a name of METHODS. "brute_force" (tiny grids) and "min_cut" (two classes) are exact; "trws" and
+    "trws+expansion" prove how far they can be from the optimum. Raises ValueError for any other name.
+
+    >>> psi = np.array([[[0.0, 2.0, 2.0], [1.0, 2.0, 0.8], [0.0, 2.0, 2.0]]])
+    >>> crf = PottsCRF.from_image(psi, np.zeros((1, 3, 3), np.uint8), lam=0.5, sigma_I=10.0)
+    >>> solve(crf).labels, solve(crf, "unary").labels
+    (array([[0, 0, 0]], dtype=uint8), array([[0, 2, 0]], dtype=uint8))
+    """
+    if method not in METHODS:
+        raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    start = time.perf_counter()
+    result = METHODS[method](crf, **options)
+    return replace(result, seconds=time.perf_counter() - start)
+
+
+def refine(
+    probabilities: Float[np.ndarray, "H W C"],
+    image: Num[np.ndarray, "H W *channels"],
+    depth: Float[np.ndarray, "H W"] | None = None,
+    *,
+    lam: float = 2.0,
+    sigma_I: float = 15.0,
+    sigma_p: float = 1.0,
+    sigma_depth: float = 0.02,
+    connectivity: int = 8,
+    floor: float = 1e-4,
+    method: str = "trws+expansion",
+) -> MapResult:
+    """Refine a network's class probabilities with the image: labels that are smooth except across edges.
+
+    image: RGB, uint8; sigma_I in its units. depth: metres, 0 or NaN where there is no reading; with it the labels may
+    also break at jumps of about sigma_depth metres, where objects end. Probabilities are clipped at `floor`. Raises
+    ValueError naming the argument that does not fit. Section 2 of the text.
+
+    >>> p = np.full((3, 3, 2), (0.9, 0.1))
+    >>> p[1, 1] = (0.4, 0.6)
+    >>> refine(p, np.zeros((3, 3, 3), np.uint8)).labels[1, 1]
+    np.uint8(0)
+    """
+    extra = ()
+    if depth is not None:
+        depth = check_depth("depth", depth)
+        extra = ((np.where(depth > 0.0, depth, np.nan), sigma_depth),)
+    psi = unary_from_probabilities(probabilities, floor)
+    return solve(PottsCRF.from_image(psi, image, lam, sigma_I, sigma_p, connectivity, extra), method)
