@@ -34,12 +34,18 @@ def confusion_matrix(
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.
     dtype = np.uint8 if y_true.dtype == y_pred.dtype == np.uint8 else np.int64
-    flat_true, flat_pred = (np.ascontiguousarray(y, dtype).reshape(-1) for y in (y_true, y_pred))
-    no_label = np.iinfo(np.int64).min
-    n, complete = count_pairs(flat_true, flat_pred, int(num_classes), no_label if ignore is None else int(ignore))
-    if not complete:
-        _check_counted(y_true, y_pred, num_classes, ignore)
-    return n
+    pairs, all_bytes = count_pairs(*(np.ascontiguousarray(y, dtype).reshape(-1) for y in (y_true, y_pred)))
+    n = pairs[:num_classes, :num_classes].copy()
+    left_out = 0
+    if ignore in range(256):
+        left_out = pairs[ignore].sum()
+        n[ignore : ignore + 1] = 0
+    if all_bytes and n.sum() + left_out == y_true.size:
+        return n
+    # Some label is no class: an error, unless all such labels stand at ignored pixels.
+    _check_counted(y_true, y_pred, num_classes, ignore)
+    counted = y_true != ignore
+    return confusion_matrix(y_true[counted], y_pred[counted], num_classes, ignore=None)
 
 
 def iou(n: Num[np.ndarray, "C C"]) -> Float64[np.ndarray, " C"]:
@@ -131,8 +137,6 @@ def boundary_counts(
     """
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     check_shape("y_true", y_true, (None, None))
-    if num_classes > IGNORE:
-        raise ValueError(f"num_classes: expected at most {IGNORE} for boundaries, got {num_classes}")
     _check_counted(y_true, y_pred, num_classes, ignore)
     if width is None:
         width = max(1, round(0.02 * np.hypot(*y_true.shape)))
@@ -203,8 +207,8 @@ def _check_counts(n) -> np.ndarray:
 
 
 def _check_pair(y_true, y_pred, num_classes) -> tuple[np.ndarray, np.ndarray]:
-    if not isinstance(num_classes, int | np.integer) or num_classes < 1:
-        raise ValueError(f"num_classes: expected a whole number of at least 1, got {num_classes!r}")
+    if not isinstance(num_classes, int | np.integer) or not 1 <= num_classes <= IGNORE:
+        raise ValueError(f"num_classes: expected a whole number, 1 to {IGNORE}, got {num_classes!r}")
     y_true, y_pred = np.asarray(y_true), np.asarray(y_pred)
     for name, y in (("y_true", y_true), ("y_pred", y_pred)):
         if y.dtype.kind not in "iu":

@@ -113,8 +113,8 @@ def test_an_image_of_ignored_pixels_counts_nothing_and_scores_nan():
 def test_what_is_predicted_at_an_ignored_pixel_changes_no_count():
     # Mistake 21: the loss leaves 255 out, and so must the metric, whatever stands in the prediction there.
     y_true, y_pred = random_labels(0)
-    for anything in (0, 3, 255):
-        other = np.where(y_true == 255, np.uint8(anything), y_pred)
+    for anything in (0, 3, 255, -1, 256):
+        other = np.where(y_true == 255, anything, y_pred.astype(int))
         np.testing.assert_array_equal(
             metrics.confusion_matrix(y_true, other, C), metrics.confusion_matrix(y_true, y_pred, C)
         )
@@ -127,7 +127,7 @@ def test_loss_and_metric_leave_out_the_same_pixels():
     assert pixels_in_loss == pytest.approx(metrics.confusion_matrix(y_true, y_pred, C).sum())
 
 
-@pytest.mark.parametrize("ignore", [-1, 0, 3, 7])
+@pytest.mark.parametrize("ignore", [-100, -1, 0, 3, 7, 1000])
 def test_any_label_can_be_the_one_to_ignore(ignore):
     y_true = np.array([0, 1, 2, 3, ignore])
     y_pred = np.array([0, 0, 2, 1, 2])
@@ -137,7 +137,7 @@ def test_any_label_can_be_the_one_to_ignore(ignore):
 
 def test_without_a_label_to_ignore_every_label_must_be_a_class():
     y = np.array([[0, 255]], np.uint8)
-    assert metrics.confusion_matrix(y, y, 256, ignore=None)[255, 255] == 1
+    assert metrics.confusion_matrix(y[:, :1], y[:, :1], C, ignore=None)[0, 0] == 1
     with pytest.raises(ValueError, match=r"y_true: expected labels 0 to 3, got \[255\]"):
         metrics.confusion_matrix(y, y, C, ignore=None)
 
@@ -157,7 +157,11 @@ def test_without_a_label_to_ignore_every_label_must_be_a_class():
         ("y_pred", np.array([0, 1]), np.array([True, False]), C),
         ("y_pred", np.zeros((2, 3), int), np.zeros((3, 2), int), C),
         ("y_pred", np.zeros((2, 3), int), np.zeros(6, int), C),
+        ("y_true", np.array([0, 256]), np.array([0, 0]), C),
+        ("y_pred", np.array([0, 1]), np.array([0, 256]), C),
+        ("y_pred", np.array([0, 255]), np.array([-1, -1]), C),
         ("num_classes", np.array([0]), np.array([0]), 0),
+        ("num_classes", np.array([0]), np.array([0]), 256),
         ("num_classes", np.array([0]), np.array([0]), 2.0),
     ],
 )
