@@ -1,0 +1,182 @@
+"""The loss of the text and its gradient, in NumPy to be read and in PyTorch to be trained with.
+
+Sections 3 and 6 and problems 1 and 5 of the text. The NumPy functions sum over pixels, as the text does, and reduce
+in float64; a pixel labelled 255 adds neither loss nor gradient.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float64, Integer, Num
+
+from labkit.labels import IGNORE, one_hot
+from labkit.validation import check_finite, check_shape
+
+if TYPE_CHECKING:
+    import torch
+
+SCHEMES = ("none", "inverse", "sqrt")
+
+
+def softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
+    """Turn logits into probabilities over the last axis, the classes.
+
+    Adding a constant to all logits of a pixel changes nothing, so the largest is taken off first: exp cannot overflow.
+    Raises ValueError if z has a NaN or infinite entry, or no class. Section 3 of the text.
+
+    >>> softmax(np.array([1e4, 1e4, -1e4]))
+    array([0.5, 0.5, 0. ])
+    """
+    z = _check_logits(z)
+    exponentials = np.exp(z - z.max(axis=-1, keepdims=True))
+    return exponentials / exponentials.sum(axis=-1, keepdims=True)
+
+
+def log_softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
+    """Give the logarithm of the softmax, z - log(sum(exp(z))), right also where the probability itself rounds to 0.
+
+    Raises ValueError as softmax does. Problem 1 of the text.
+
+    >>> log_softmax(np.array([0.0, -1e4]))
+    array([ 0., -10000.])
+    """
+    z = _check_logits(z)
+    shifted = z - z.max(axis=-1, keepdims=True)
+    return shifted - np.log(np.exp(shifted).sum(axis=-1, keepdims=True))
+
+
+def cross_entropy(
+    z: Num[np.ndarray, "*shape C"], y: Integer[np.ndarray, "*shape"], weights: Num[np.ndarray, " C"] | None = None
+) -> float:
+    """Sum -w[y_p] log p(y_p) over the pixels p: the text's loss, weighted if `weights` are given.
+
+    z: logits; y: labels; weights: one number above 0 for each class. Raises ValueError if shapes do not fit, z has NaN,
+    a label is neither in 0 .. C - 1 nor 255, or a weight is not above 0. Section 3 of the text.
+
+    >>> round(cross_entropy(np.zeros((2, 4)), np.array([2, 255])), 4)  # one counted pixel, four equal classes: log 4
+    1.3863
+    """
+    z, Y, w = _check_pixels(z, y, weights)
+    return float(np.sum(Y * w * -log_softmax(z)))
+
+
+def cross_entropy_grad(
+    z: Num[np.ndarray, "*shape C"], y: Integer[np.ndarray, "*shape"], weights: Num[np.ndarray, " C"] | None = None
+) -> Float64[np.ndarray, "*shape C"]:
+    """Differentiate cross_entropy by its logits: w[y_p] (p - one-hot of y_p) at each pixel, which sums to 0 there.
+
+    Arguments and errors as in cross_entropy. Problems 1 and 5 of the text.
+
+    >>> cross_entropy_grad(np.zeros((1, 2)), np.array([1]), weights=np.array([1.0, 10.0]))
+    array([[ 5., -5.]])
+    """
+    z, Y, w = _check_pixels(z, y, weights)
+    pixel_weights = Y @ w  # w[y_p], and 0 where the pixel is ignored
+    return pixel_weights[..., None] * (softmax(z) - Y)
+
+
+def class_weights(counts: Num[np.ndarray, " C"], scheme: str) -> Float64[np.ndarray, " C"]:
+    """Choose class weights from the number of pixels of each class.
+
+    scheme: "none", all 1; "inverse", w_c proportional to 1 / counts_c; "sqrt", to 1 / sqrt(counts_c), which is milder.
+    Scaled so that the mean weight over the counted pixels is 1: a learning rate found without weights still fits. A
+    class without pixels gets 1, the mean, and has no part in the scaling. Raises ValueError for an unknown scheme, a
+    negative count, or no pixel at all. Section 3 of the text.
+
+    >>> class_weights(np.array([900, 100, 0]), "inverse")
+    array([0.55555556, 5. , 1. ])
+    """
+    counts = check_finite("counts", check_shape("counts", counts, (None,))).astype(np.float64)
+    if counts.size and counts.min() < 0:
+        raise ValueError(f"counts: expected numbers of pixels, at least 0, got {counts.min():g}")
+    if not counts.any():
+        raise ValueError("counts: expected at least one pixel of some class, got none")
+    if scheme not in SCHEMES:
+        raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")
+    exponent = {"none": 0.0, "inverse": -1.0, "sqrt": -0.5}[scheme]
+    present = counts > 0
+    w = np.ones(counts.size)
+    w[present] = counts[present] ** exponent
+    w[present] *= counts.sum() / (counts @ w)
+    return w
+
+
+def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -> Float64[np.ndarray, "*shape C"]:
+    """Predict where training with weights ends: q_c = w_c p_c / sum_k(w_k p_k), not at the true probabilities p.
+
+    p: probabilities of the classes where pixels look alike, summing to 1 over the last axis; w: class weights above 0.
+    This q minimises the expected weighted loss -sum_c w_c p_c log q_c, so a weighted network answers with q; it is the
+    price of weights, and dividing its answer by w undoes it. Raises ValueError if p is no distribution or a weight is
+    not above 0. Problem 5 of the text, continued.
+
+    >>> weighted_optimum(np.array([0.9, 0.1]), np.array([1.0, 9.0]))
+    array([0.5, 0.5])
+    """
+    p = check_finite("p", p).astype(np.float64)
+    if p.ndim < 1 or (p.size and p.min() < 0.0) or not np.allclose(p.sum(axis=-1), 1.0, rtol=0.0, atol=1e-5):
+        raise ValueError("p: expected probabilities of at least 0 that sum to 1 over the last axis")
+    weighted = _check_weights("w", w, p.shape[-1]) * p
+    return weighted / weighted.sum(axis=-1, keepdims=True)
+
+
+def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=None) -> "torch.Tensor":
+    """Give the loss to train with: the text's weighted sum, divided by the number of counted pixels.
+
+    logits: (N, C, H, W), any floating dtype; labels: (N, H, W), any integer dtype, 255 is left out; weights: (C,),
+    array or tensor, or None. Returns a scalar, 0 if no pixel is counted. PyTorch's `CrossEntropyLoss(weight=...)`
+    divides by the sum of the counted pixels' weights instead: there weights cancel in a batch of one class, here they
+    never do. Raises ValueError if shapes do not fit, a label or weight is out of range, or logits have NaN or infinity.
+    Section 6 of the text.
+
+    >>> import torch
+    >>> segmentation_loss(torch.zeros(1, 2, 1, 1), torch.tensor([[[1]]]), weights=[1.0, 10.0]) / 10.0
+    tensor(0.6931)
+    """
+    import torch  # here, so that the NumPy half of this module does not wait for it
+    from torch.nn.functional import cross_entropy
+
+    if logits.ndim != 4 or labels.shape != (logits.shape[0], *logits.shape[2:]):
+        raise ValueError(
+            f"labels: expected (N, H, W) to logits (N, C, H, W), got {tuple(labels.shape)} to {tuple(logits.shape)}"
+        )
+    if labels.is_floating_point() or labels.is_complex() or labels.dtype == torch.bool:
+        raise ValueError(f"labels: expected integers, got {labels.dtype}")
+    num_classes = logits.shape[1]
+    labels = labels.long()
+    counted = labels != IGNORE
+    if (counted & ((labels < 0) | (labels >= num_classes))).any():
+        raise ValueError(f"labels: expected 0 to {num_classes - 1} or {IGNORE}, got others too")
+    logits = logits if logits.dtype == torch.float64 else logits.float()
+    # One sum finds any NaN or infinity; at an ignored pixel it would spare the loss and spoil the gradient.
+    if not torch.isfinite(logits.detach().sum()):
+        raise ValueError("logits: expected finite numbers, got NaN or infinity; has the training diverged?")
+    if weights is not None:
+        array = torch.as_tensor(weights, dtype=torch.float64, device="cpu").detach().numpy()
+        weights = torch.from_numpy(_check_weights("weights", array, num_classes)).to(logits)
+    losses = cross_entropy(logits, labels, weight=weights, ignore_index=IGNORE, reduction="none")
+    # Summed in float64: in float32, a batch of some 100,000 pixels is off in the fourth digit.
+    return (losses.sum(dtype=torch.float64) / counted.sum().clamp(min=1)).to(logits.dtype)
+
+
+def _check_logits(z) -> np.ndarray:
+    z = check_finite("z", z)
+    if z.ndim < 1 or z.shape[-1] < 1:
+        raise ValueError(f"z: expected logits (..., C) of at least one class, got shape {z.shape}")
+    return z.astype(np.float64, copy=False)
+
+
+def _check_weights(name: str, w, num_classes: int) -> np.ndarray:
+    w = check_finite(name, check_shape(name, w, (num_classes,)))
+    if w.min() <= 0:
+        raise ValueError(f"{name}: expected one number above 0 for each class, got {w.min():g}")
+    return w.astype(np.float64)
+
+
+def _check_pixels(z, y, weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the logits, the one-hot tensor Y of the text (all zeros where ignored) and one weight a class."""
+    z, y = _check_logits(z), np.asarray(y)
+    if y.shape != z.shape[:-1]:
+        raise ValueError(f"y: expected one label to each pixel of z, shape {z.shape[:-1]}, got {y.shape}")
+    num_classes = z.shape[-1]
+    w = np.ones(num_classes) if weights is None else _check_weights("weights", weights, num_classes)
+    return z, one_hot(y, num_classes), w
