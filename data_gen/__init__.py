@@ -1,7 +1,7 @@
 """Random scenes, rendered and written as a dataset.
 
-sample_scene(seed, config) draws a scene, render(spec, size) takes its picture, generate(out, seeds, ...) writes a dataset,
-load(path) reads it.
+sample_scene(seed, config) draws a scene, render(spec, size) takes its picture, generate(out, seeds, ...) writes a
+dataset, load(path) reads it.
 """
 
 from data_gen.dataset import Dataset, generate, load, render, verify

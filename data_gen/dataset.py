@@ -263,5 +263,5 @@ class Dataset(Sequence):
 
 
 def load(path) -> Dataset:
-    """Open a dataset: a sequence of RGBDFrame. Raises FileNotFoundError if there is none, ValueError if it is too new."""
+    """Open a dataset: a sequence of RGBDFrame. Raises FileNotFoundError without one, ValueError if it is too new."""
     return Dataset(path)

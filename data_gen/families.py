@@ -1,7 +1,8 @@
 """What can stand on the table: families of targets and obstacles, each a recipe from random numbers to an ObjectSpec.
 
-A family is recognised by its shape alone: colours are drawn from one distribution for all. No family is both target and
-obstacle. Each recipe takes a generator and `hard`, which asks for proportions, poses or models that training never sees.
+A family is recognised by its shape alone: colours are drawn from one distribution for all. No family is both target
+and obstacle. Each recipe takes a generator and `hard`, which asks for proportions, poses or models that training
+never sees.
 """
 
 from collections.abc import Callable
@@ -19,7 +20,10 @@ ON_SIDE = (np.pi / 2, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Body:
-    """A recipe's result: what an ObjectSpec needs beside its place, colour, mass and friction; `tilt` is in radians (x, y, z)."""
+    """A recipe's result, what an ObjectSpec needs beside its place, colour, mass and friction.
+
+    tilt: rotations about the fixed x, y and z axes, radians, before any turn about the vertical.
+    """
 
     tilt: tuple[float, float, float]
     urdf: str | None = None
@@ -142,7 +146,7 @@ def bottle(rng: np.random.Generator, hard: bool) -> Body:
     body = (
         frustum(radius * 1.15, neck * 1.2, height, 24)
         if hard
-        else Part("cylinder", (radius, height), (0, 0, height / 2))
+        else Part("cylinder", (radius, height), (0.0, 0.0, height / 2))
     )
     parts = (body, Part("cylinder", (neck, reach), (0.0, 0.0, height + reach / 2)))
     return Body(UPRIGHT if rng.random() < 0.6 else ON_SIDE, parts=parts)

@@ -50,8 +50,8 @@ CONFIGS = {
 def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     """Draw a scene; the same seed and config give the same scene.
 
-    config: "train", "test" (the same distribution, other scenes) or "hard" (shapes, textures and viewpoints that are not
-    in train). Raises ValueError for a negative seed or an unknown config.
+    config: "train", "test" (the same distribution, other scenes) or "hard" (shapes, textures and viewpoints that are
+    not in train). Raises ValueError for a negative seed or an unknown config.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
@@ -121,7 +121,7 @@ def _light(rng: np.random.Generator) -> Light:
 
 
 def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects: tuple[ObjectSpec, ...]) -> Camera:
-    """A camera on the side of `azimuth` (radians from the base's x axis), redrawn until it sees every target's centre."""
+    """A camera on the side of `azimuth` (radians from the base's x axis), drawn until it sees every target's centre."""
     targets = np.array([thing.position for thing in objects if thing.class_id == TARGET])
     while True:
         low, high = kind.elevations[rng.integers(len(kind.elevations))]

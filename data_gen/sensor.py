@@ -25,7 +25,8 @@ class DepthSensor:
     def apply(self, frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
         """The frame as this sensor would have seen it; only depth changes, and holes become 0.
 
-        >>> frame = RGBDFrame(np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+        >>> rgb, depth = np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32)
+        >>> frame = RGBDFrame(rgb, depth, np.diag([9.0, 9.0, 1.0]), np.eye(4))
         >>> DepthSensor(noise=0.0, step=0.3, loss=0.0).apply(frame, np.random.default_rng(0)).depth
         array([[0.9, 0.9],
                [0.9, 0.9]], dtype=float32)

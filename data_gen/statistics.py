@@ -17,7 +17,7 @@ HIDDEN = 0.05  # a target counts as partly occluded when other objects hide more
 
 @dataclass(frozen=True)
 class Statistics:
-    """Shares are of all targets. target_pixels: share of the image in the median frame. camera: least and largest metres.
+    """Shares are of all targets. target_pixels: share of the median image. camera: least and largest distance, metres.
 
     families: share of each target family. not_boxes: share of targets that are no boxes. obstacles: mean a scene.
     """

@@ -9,7 +9,7 @@ from labkit.frame import RGBDFrame
 
 
 class TorchFrames(Dataset):
-    """Pairs (rgb uint8 (H, W, 3), labels uint8 (H, W)) of a sequence of frames, for torch's DataLoader and for training.
+    """Pairs (rgb uint8 (H, W, 3), labels uint8 (H, W)) of a sequence of frames, for a DataLoader or for training.
 
     Raises ValueError at a frame that has no labels.
     """

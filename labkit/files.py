@@ -7,7 +7,7 @@ from pathlib import Path
 def write_atomically(path, data: bytes) -> None:
     """Write bytes to `path` through a temporary file beside it: readers see the old file or the new one, whole.
 
-    Creates missing folders. On any failure (a full disk, say) the temporary file is removed, and the OSError names `path`.
+    Creates missing folders. On any failure (a full disk, say) the temporary file is removed; an OSError names `path`.
     """
     path = Path(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")

@@ -20,7 +20,8 @@ class RGBDFrame:
     coordinates. labels: true classes, uint8 (H, W), if known. instances: uint8 (H, W), 0 or the number of the object,
     if known. Raises ValueError naming the argument that does not fit. Sections 1 and 4 of the text.
 
-    >>> frame = RGBDFrame(np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+    >>> rgb, depth = np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), np.float32)
+    >>> frame = RGBDFrame(rgb, depth, K=np.diag([9.0, 9.0, 1.0]), T_base_cam=np.eye(4))
     >>> frame.size
     (3, 2)
     """

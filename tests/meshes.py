@@ -20,7 +20,11 @@ def distance_to_mesh(points, vertices, faces):
             ((d6 >= 0) & (d5 <= d6), 0.0, 1.0),
             ((vc <= 0) & (d1 >= 0) & (d3 <= 0), d1 / (d1 - d3), 0.0),
             ((vb <= 0) & (d2 >= 0) & (d6 <= 0), 0.0, d2 / (d2 - d6)),
-            ((va <= 0) & (d4 >= d3) & (d5 >= d6), 1.0 - (d4 - d3) / (d4 - d3 + d5 - d6), (d4 - d3) / (d4 - d3 + d5 - d6)),
+            (
+                (va <= 0) & (d4 >= d3) & (d5 >= d6),
+                1.0 - (d4 - d3) / (d4 - d3 + d5 - d6),
+                (d4 - d3) / (d4 - d3 + d5 - d6),
+            ),
         ]
     conditions = [condition for condition, _, _ in choices]
     v = np.select(conditions, [np.broadcast_to(x, v.shape) for _, x, _ in choices], v)

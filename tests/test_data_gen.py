@@ -112,7 +112,8 @@ def test_statistics_of_test_are_as_promised():
     assert s.not_boxes >= 0.60
     assert s.obstacles >= 5.0
     assert s.occluded >= 0.25
-    assert 0.6 * 0.85 <= s.camera[0] and s.camera[1] <= 1.2 * 1.05
+    least, largest = s.camera
+    assert least >= 0.6 * 0.85 and largest <= 1.2 * 1.05
     assert s.target_pixels <= 0.02
 
 
@@ -248,24 +249,24 @@ def test_wrong_arguments_are_named_and_nothing_is_written(call, name, tmp_path):
 @pytest.mark.bad_input
 def test_another_dataset_is_never_overwritten(undisturbed, tmp_path):
     before = digest(undisturbed)
-    with pytest.raises(ValueError, match="^out: .*other seeds"):
+    with pytest.raises(ValueError, match=r"^out: .*other seeds"):
         data_gen.generate(undisturbed, range(7), "test", SIZE, progress=False)
     assert digest(undisturbed) == before
     (tmp_path / "diary.txt").write_text("dear diary")
-    with pytest.raises(ValueError, match="^out: .*other files"):
+    with pytest.raises(ValueError, match=r"^out: .*other files"):
         data_gen.generate(tmp_path, range(1), "test", SIZE, progress=False)
 
 
 @pytest.mark.bad_input
 def test_datasets_that_cannot_be_read_are_named(undisturbed, tmp_path):
-    with pytest.raises(FileNotFoundError, match="^path: .*no dataset"):
+    with pytest.raises(FileNotFoundError, match=r"^path: .*no dataset"):
         data_gen.load(tmp_path)
     description = json.loads((undisturbed / "dataset.json").read_text())
     (tmp_path / "dataset.json").write_text(json.dumps({**description, "version": dataset.VERSION + 1}))
     with pytest.raises(ValueError, match=r"^path: .*newer .*update"):
         data_gen.load(tmp_path)
     (tmp_path / "dataset.json").write_text("{")
-    with pytest.raises(ValueError, match="^path: .*damaged"):
+    with pytest.raises(ValueError, match=r"^path: .*damaged"):
         data_gen.load(tmp_path)
 
 

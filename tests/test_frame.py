@@ -100,9 +100,9 @@ def test_files_that_do_not_fit_are_named(tmp_path):
     truncated.write_bytes(rgb.read_bytes()[:20])
     with pytest.raises(FileNotFoundError, match="nowhere"):
         RGBDFrame.from_files(tmp_path / "nowhere.png", depth, K, np.eye(4))
-    with pytest.raises(ValueError, match="^rgb: .*damaged"):
+    with pytest.raises(ValueError, match=r"^rgb: .*damaged"):
         RGBDFrame.from_files(truncated, depth, K, np.eye(4))
-    with pytest.raises(ValueError, match="^depth: expected uint16"):
+    with pytest.raises(ValueError, match=r"^depth: expected uint16"):
         RGBDFrame.from_files(rgb, eight_bit, K, np.eye(4))
-    with pytest.raises(ValueError, match="^depth_scale:"):
+    with pytest.raises(ValueError, match=r"^depth_scale:"):
         RGBDFrame.from_files(rgb, depth, K, np.eye(4), depth_scale=0.0)

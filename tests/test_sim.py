@@ -41,7 +41,7 @@ def test_a_rendered_plane_is_a_plane(size, seed):
     )
     with World(scene(camera=camera, table=Table(size=(1.0, 1.4, 0.05), z=0.013))) as world:
         frame = world.render(size)
-        shifted = dataclasses.replace(frame, K=frame.K + [[0, 0, -0.5], [0, 0, 0.5], [0, 0, 0]])
+        shifted = dataclasses.replace(frame, K=frame.K + np.array([[0, 0, -0.5], [0, 0, 0.5], [0, 0, 0]]))
     mask = frame.labels == SURFACE
     assert mask.mean() > 0.5
     error = np.abs(points_of(frame, mask)[:, 2] - 0.013)
@@ -193,8 +193,8 @@ def test_wrong_scenes_are_named(call, says):
 @pytest.mark.bad_input
 def test_wrong_requests_to_a_world_are_named():
     with World(scene(thing())) as world:
-        with pytest.raises(ValueError, match="^size:"):
+        with pytest.raises(ValueError, match=r"^size:"):
             world.render((0, 240))
-        with pytest.raises(ValueError, match="^name:"):
+        with pytest.raises(ValueError, match=r"^name:"):
             world.pose("nobody")
     world.close()

@@ -167,7 +167,7 @@ def parts_file(parts: tuple[Part, ...], scale: float = 1.0) -> str:
 
 
 def _shading_normals(mesh: Mesh, smooth: bool) -> Float[np.ndarray, "F 3 3"]:
-    """A normal for each corner of each triangle: the facet's own, or averaged over neighbours less than 40 degrees off."""
+    """A normal for each corner of each triangle: the facet's own, or the mean over nearly parallel ones."""
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     area = np.cross(b - a, c - a)
     flat = area / np.linalg.norm(area, axis=1, keepdims=True)

@@ -76,7 +76,7 @@ class ObjectSpec:
 
 @dataclass(frozen=True)
 class Table:
-    """A box whose top is the surface, at height `z` of the base frame; its size is length in x, width in y, thickness."""
+    """A box whose top is the surface, at height `z` of the base frame; size: length in x, width in y, thickness."""
 
     centre: Vector = (0.55, 0.0)
     size: Vector = (0.7, 1.1, 0.05)
@@ -97,7 +97,7 @@ class Camera:
     def looking_at(
         cls, target, distance: float, azimuth: float, elevation: float, roll: float = 0.0, **rest
     ) -> "Camera":
-        """Place the camera on a sphere around `target`: angles in radians, azimuth from the base's x axis, roll about the ray."""
+        """Place the camera on a sphere around `target`; radians, azimuth from the base's x axis, roll about the ray."""
         outward = np.array(
             [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
         )

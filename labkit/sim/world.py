@@ -130,7 +130,7 @@ class World:
         )
 
     def silhouette(self, name: str, size: tuple[int, int] = (320, 240)) -> Bool[np.ndarray, "H W"]:
-        """The pixels that an object would cover if no other object stood before it; the simulation is left as it was."""
+        """The pixels that an object would cover if no other object stood before it; the simulation stays as it is."""
         number = 1 + [thing.name for thing in self.spec.objects].index(name)
         state = self.client.saveState()
         for other, body in self.bodies.items():

@@ -1,0 +1,203 @@
+"""The main job, shown: one scene from camera to lift, with a table of stages, a picture of every step and a film."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Polygon
+from PIL import Image
+
+from labkit.evaluation import lift
+from labkit.frame import RGBDFrame
+from labkit.geometry import centroid_and_covariance
+from labkit.labels import CLASSES, PALETTE, TARGET, colorize
+from labkit.metrics import confusion_matrix, iou, mean_iou
+from labkit.pipeline import Perception, Pipeline
+from labkit.sim.panda import LiftResult
+from labkit.sim.spec import Camera, SceneSpec
+from labkit.sim.world import TIME_STEP, World
+
+FILM_SIZE = (384, 288)
+FILM_RATE = 12  # pictures a second, of simulated time
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """All that the demo saw: the frame, what was perceived, what became of the lift, the film, the seconds by stage."""
+
+    spec: SceneSpec
+    frame: RGBDFrame
+    perception: Perception
+    result: LiftResult
+    film: list[UInt8[np.ndarray, "H W 3"]]
+    true_centroids: dict[str, np.ndarray]
+    seconds: dict[str, float]
+
+
+def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240)) -> Story:
+    """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
+    start = time.perf_counter()
+    with World(spec) as world:
+        built = time.perf_counter()
+        frame = world.render(size)
+        rendered = time.perf_counter()
+        perception = Pipeline(model, spec.table.z).run(frame)
+        true_centroids = {t.name: world.centre(t.name) for t in spec.objects if t.class_id == TARGET}
+        film = []
+        camera = Camera.looking_at((0.42, 0.0, spec.table.z + 0.14), 1.45, 0.75, 0.5, fov_y=0.62)
+
+        def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
+            record.steps += 1
+            if record.steps % every == 0:
+                film.append(world.render(FILM_SIZE, camera).rgb)
+
+        record.steps = -1
+        world.observers.append(record)
+        before = time.perf_counter()
+        result = lift(world, perception)
+        seconds = {"scene": built - start, "render": rendered - built, **perception.seconds}
+        seconds["lift and film"] = time.perf_counter() - before
+    return Story(spec, frame, perception, result, film, true_centroids, seconds)
+
+
+def report(story: Story) -> str:
+    """The table of stages and the outcome, for a terminal."""
+    p, counts = story.perception, story.spec.class_counts()
+    n = confusion_matrix(story.frame.labels, p.labels, len(CLASSES))
+    width, height = story.frame.size
+    found = {
+        "scene": f"seed {story.spec.seed}, {counts['target']} target(s) among {counts['obstacle']} obstacles",
+        "render": f"{width} x {height} RGB-D image",
+        "network": f"probabilities of {len(CLASSES)} classes a pixel",
+        "labels": f"{np.count_nonzero(p.labels == TARGET)} target pixels",
+        "back_projection": f"{np.count_nonzero(np.isfinite(p.points[..., 2]))} points in the base frame",
+        "clouds": f"{len(p.clouds)} target cloud(s) of {', '.join(str(len(c)) for c in p.clouds) or 'no'} points",
+        "grasps": f"{len(p.plan.grasps)} candidates" if p.plan.grasps else f"none: {p.plan.reason}",
+        "lift and film": "lifted a target" if story.result.success else f"failed: {story.result.reason}",
+    }
+    rows = [f"{'stage':<17}{'ms':>9}  result"]
+    rows += [f"{stage:<17}{1000.0 * s:>9.1f}  {found.get(stage, '')}" for stage, s in story.seconds.items()]
+    scores = ", ".join(f"{name} {value:.3f}" for name, value in zip(CLASSES, iou(n), strict=True))
+    rows += ["", f"IoU of this frame: {scores}; mean {mean_iou(n):.3f}"]
+    for number, cloud in enumerate(p.clouds, start=1):
+        centroid, _ = centroid_and_covariance(cloud)
+        name, distance = nearest(centroid, story.true_centroids)
+        place = ", ".join(f"{x:+.3f}" for x in centroid)
+        rows.append(
+            f"cloud {number}: visible centroid ({place}) m, {100.0 * distance:.1f} cm from the middle of {name}"
+        )
+    if p.plan.grasps:
+        grasp = p.plan.grasps[0]
+        place = ", ".join(f"{x:+.3f}" for x in grasp.T_base_grasp[:3, 3])
+        rows.append(f"best grasp: at ({place}) m, jaws {100.0 * grasp.width:.1f} cm apart")
+    outcome = f"lifted {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
+    return "\n".join([*rows, outcome])
+
+
+def nearest(point: np.ndarray, places: dict[str, np.ndarray]) -> tuple[str, float]:
+    """The name of the place nearest to a point, and how far it is."""
+    distances = {name: float(np.linalg.norm(place - point)) for name, place in places.items()}
+    name = min(distances, key=distances.get)
+    return name, distances[name]
+
+
+def picture(story: Story) -> Figure:
+    """Six panels: what the camera saw, labels, overlay, target cloud, grasp from above, and the arm at the end."""
+    figure = Figure(figsize=(13.5, 8.2), layout="constrained", dpi=100)
+    panels = figure.subplot_mosaic([["rgb", "labels", "overlay"], ["cloud", "grasp", "arm"]])
+    frame, p = story.frame, story.perception
+    painted = frame.rgb.copy()
+    outlines, _ = cv2.findContours((p.labels == TARGET).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    painted[p.labels == TARGET] = (0.45 * painted[p.labels == TARGET] + 0.55 * PALETTE[TARGET]).astype(np.uint8)
+    cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+    images = {
+        "rgb": (frame.rgb, "1  the camera's image"),
+        "labels": (colorize(p.labels), "2  a class for each pixel"),
+        "overlay": (painted, "3  the target mask"),
+        "arm": (story.film[-1] if story.film else frame.rgb, "6  " + outcome_in_words(story)),
+    }
+    for name, (image, title) in images.items():
+        panels[name].imshow(image)
+        panels[name].set_title(title, loc="left")
+        panels[name].set_axis_off()
+    handles = [Patch(color=PALETTE[c] / 255.0, label=name) for c, name in enumerate(CLASSES)]
+    panels["labels"].legend(handles=handles, loc="lower center", ncols=4, fontsize=8, handlelength=1.0)
+    draw_cloud(panels["cloud"], story)
+    draw_grasp(panels["grasp"], story)
+    return figure
+
+
+def outcome_in_words(story: Story) -> str:
+    return f"lifted: {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
+
+
+def draw_cloud(axes, story: Story) -> None:
+    """The target clouds from the side (x forward, z up), with visible and true centres: they are not the same point."""
+    p = story.perception
+    near = p.scene
+    axes.scatter(near[:, 1], near[:, 2] - story.spec.table.z, s=0.4, color="0.8", rasterized=True)
+    for number, cloud in enumerate(p.clouds):
+        centroid, _ = centroid_and_covariance(cloud)
+        axes.scatter(cloud[:, 1], cloud[:, 2] - story.spec.table.z, s=3, color=PALETTE[TARGET] / 255.0)
+        label = "centroid of the visible points" if number == 0 else None
+        axes.plot(centroid[1], centroid[2] - story.spec.table.z, "k+", ms=13, mew=2, label=label)
+    for number, centre in enumerate(story.true_centroids.values()):
+        label = "true middle of the object" if number == 0 else None
+        axes.plot(centre[1], centre[2] - story.spec.table.z, "x", color="tab:blue", ms=9, mew=2, label=label)
+    axes.set(
+        xlim=(-0.36, 0.36), ylim=(-0.03, 0.2), xlabel="y of the base frame (m)", ylabel="height over the table (m)"
+    )
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title("4  the target cloud in the robot's frame", loc="left")
+    axes.legend(fontsize=8, loc="upper right")
+
+
+def draw_grasp(axes, story: Story) -> None:
+    """From above: every point by its height, the target in orange, and the two jaws of the best candidates."""
+    p, table_z = story.perception, story.spec.table.z
+    axes.set_title("5  the grasp, seen from above", loc="left")
+    axes.set(xlabel="y of the base frame (m)", ylabel="x of the base frame (m)")
+    axes.set_aspect("equal")
+    middle = p.plan.grasps[0].T_base_grasp[:2, 3] if p.plan.grasps else np.array([0.52, 0.0])
+    axes.set(xlim=(middle[1] - 0.16, middle[1] + 0.16), ylim=(middle[0] - 0.12, middle[0] + 0.12))
+    raised = p.scene[p.scene[:, 2] > table_z + 0.004]
+    axes.scatter(raised[:, 1], raised[:, 0], c=raised[:, 2], s=4, cmap="Greys", vmin=table_z - 0.06, rasterized=True)
+    for cloud in p.clouds:
+        axes.scatter(cloud[:, 1], cloud[:, 0], s=4, color=PALETTE[TARGET] / 255.0, rasterized=True)
+    if not p.plan.grasps:
+        axes.text(middle[1], middle[0], p.plan.reason, ha="center", wrap=True)
+        return
+    for rank, grasp in reversed(list(enumerate(p.plan.grasps[:5]))):
+        for side in (-1.0, 1.0):
+            corners = jaw(grasp, side)[:, [1, 0]]
+            style = (
+                {"facecolor": "tab:blue", "alpha": 0.9} if rank == 0 else {"fill": False, "edgecolor": "0.5", "lw": 0.6}
+            )
+            axes.add_patch(Polygon(corners, **style))
+
+
+def jaw(grasp, side: float, width: float = 0.02, thickness: float = 0.012) -> np.ndarray:
+    """The corners of a jaw in the base frame's x and y, (4, 2); side is -1 or 1."""
+    inner = side * grasp.width / 2.0
+    outer = inner + side * thickness
+    corners = np.array([[-width / 2, inner], [width / 2, inner], [width / 2, outer], [-width / 2, outer]])
+    return corners @ grasp.T_base_grasp[:2, :2].T + grasp.T_base_grasp[:2, 3]
+
+
+def save(story: Story, out: Path) -> list[Path]:
+    """Write demo.png and demo.gif into the folder `out`; returns their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    paths = [out / "demo.png"]
+    picture(story).savefig(paths[0])
+    if story.film:
+        paths.append(out / "demo.gif")
+        frames = [Image.fromarray(image) for image in story.film]
+        palette = frames[len(frames) // 2].quantize(96)  # one palette for all: the film does not flicker
+        frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in frames]
+        pause = [1000 // FILM_RATE] * (len(frames) - 1) + [1500]
+        frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=pause, loop=0, optimize=False)
+    return paths
