@@ -1,0 +1,299 @@
+"""The arm that acts in a World: plan, move, grasp, lift, place. It moves by its motors alone.
+
+No joint is set, no constraint made, no object touched but by the fingers' friction. The simulator's true poses are read
+in one place, `_Witness`, and only to score a lift.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pybullet
+from jaxtyping import Float
+
+from labkit.labels import CLASSES, TARGET
+from labkit.sim.kinematics import (
+    FINGER_MAX,
+    FINGER_MAX_EFFORT,
+    MAX_EFFORT,
+    forward_kinematics,
+    inverse_kinematics,
+)
+from labkit.sim.planning import MotionPlan, plan_grasp, plan_transit, straight_line, straight_up, trajectory
+from labkit.sim.world import TIME_STEP, World
+from labkit.validation import check_shape, check_T
+
+ARM_JOINTS = tuple(range(7))
+FINGER_JOINTS = (9, 10)
+
+POSITION_GAIN = 0.3  # share of a joint's position error that its motor makes good in one step
+LINE_SPEED = 0.3  # m/s of the hand down to the grasp and up
+SETTLE_SECONDS = 0.05  # after each motion
+BLOCKED = 0.02  # rad, an arm this far from where it was sent is held up by something
+FINGER_SPEED = 0.1  # m/s of each finger, half its limit
+CENTRING = 4000.0  # N/m, how much force a finger gives up for being ahead of the other
+CLOSING_SECONDS = 1.0  # at most
+STALLED = 0.002  # m/s: fingers slower than this for STALLED_STEPS have met something
+STALLED_STEPS = 10
+CLOSED = 0.002  # m, jaws no wider than this hold nothing
+LETTING_GO = 0.03  # m, how much the jaws open to put an object down
+HOLD_SECONDS = 1.0
+LIFTED = 0.10  # m
+
+
+@dataclass(frozen=True)
+class LiftResult:
+    """What became of a grasp: success means a target is 10 cm up and still held one simulated second later.
+
+    reason: in words, "lifted" on success. name, class_id: the object that is up, or None. height: how far it rose,
+    metres. seconds: simulated time.
+    """
+
+    success: bool
+    reason: str
+    name: str | None = None
+    class_id: int | None = None
+    height: float = 0.0
+    seconds: float = 0.0
+
+
+class Panda:
+    """The Franka Panda of a World.
+
+    Grasps have the attributes of `labkit.grasp.Grasp`: T_base_grasp, (4, 4), and width, the distance of the pads to
+    start from in metres. Raises ValueError if the world has no robot. Section 5 of the text.
+
+    >>> from labkit.sim.spec import Camera, SceneSpec
+    >>> with World(SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.3, 0.8))) as world:
+    ...     T = forward_kinematics(Panda(world).q)
+    >>> float(T[2, 3].round(3))
+    0.442
+    """
+
+    def __init__(self, world: World):
+        if world.robot is None:
+            raise ValueError("world: expected a scene with a robot, got a spec with robot=False")
+        self.world = world
+        self._target = self.q  # the joint angles last sent to the motors
+        self._opening = self.opening  # what the hand is to keep to while open, metres
+        self._gripping = False
+        self._steps = 0
+
+    @property
+    def q(self) -> Float[np.ndarray, "7"]:
+        """The arm's joint angles now, rad."""
+        return self._joint_state(ARM_JOINTS, 0)
+
+    @property
+    def opening(self) -> float:
+        """The distance of the pads now, metres."""
+        return float(self._joint_state(FINGER_JOINTS, 0).sum())
+
+    def _joint_state(self, joints: Sequence[int], field: int) -> np.ndarray:
+        states = self.world.client.getJointStates(self.world.robot, joints)
+        return np.array([state[field] for state in states])
+
+    def inverse_kinematics(
+        self, T_base_grasp: Float[np.ndarray, "4 4"], q0: Float[np.ndarray, "7"] | None = None
+    ) -> Float[np.ndarray, "7"] | None:
+        """Joint angles within the limits for a grasp frame, near q0 (default: where the arm is), or None."""
+        return inverse_kinematics(T_base_grasp, self.q if q0 is None else q0)
+
+    def reachable(self, T_base_grasp: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether the arm can bring the grasp frame there, with the jaws either way round."""
+        turned = check_T("T_base_grasp", T_base_grasp) @ np.diag([-1.0, -1.0, 1.0, 1.0])
+        return any(self.inverse_kinematics(T) is not None for T in (T_base_grasp, turned))
+
+    def plan(self, grasp: Any, scene: Float[np.ndarray, "M 3"] | None = None) -> MotionPlan | str:
+        """Plan a motion from here to a grasp and up; the reason in words if there is none.
+
+        scene: the points that the camera saw, base frame, metres. The height of the table comes from the scene's
+        calibration, nothing else from the simulator.
+        """
+        points = np.zeros((0, 3)) if scene is None else check_shape("scene", scene, (None, 3))
+        table_z = self.world.spec.table.z
+        return plan_grasp(grasp.T_base_grasp, grasp.width, self.q, points, table_z, self.opening / 2)
+
+    def execute(self, plan: MotionPlan) -> str | None:
+        """Move by a plan: over, down, close until the fingers stall, and up; None, or what the arm felt go wrong.
+
+        An arm that is held up on its way over goes back; held up on its way down (the palm may rest on the object), it
+        closes there. Raises ValueError if the plan does not begin where the arm is.
+        """
+        off = np.abs(plan.transit[0][0] - self.q).max()
+        if off > 0.05:
+            raise ValueError(f"plan: expected one that begins at the arm's joints, got one that is {off:.2f} rad off")
+        self._opening = plan.opening
+        if not all(self._follow_or_back_off(leg) for leg in plan.transit):
+            return "blocked on the way over"
+        arrived = self._follow(plan.descent, LINE_SPEED)
+        self._close()
+        empty = self.opening < CLOSED
+        lift = plan.lift if arrived else straight_up(self.q)
+        self._follow(np.vstack([self.q, plan.lift[-1]]) if lift is None else lift, LINE_SPEED)
+        if not arrived:
+            return "blocked on the way down"
+        return "missed" if empty else None
+
+    def lift(self, grasp: Any, scene: Float[np.ndarray, "M 3"] | None = None) -> LiftResult:
+        """Try to lift: plan, execute, hold for a second, and ask the simulator what is up.
+
+        grasp: a MotionPlan, a grasp, or grasps from best to worst, of which the first with a path is tried. scene: as
+        in `plan`. Success is a target 10 cm up, still so and in contact one simulated second later.
+        """
+        plan = self._first_plan(grasp, scene)
+        if isinstance(plan, str):
+            return LiftResult(False, plan)
+        witness, start = _Witness(self.world), self._steps
+        felt = self.execute(plan)
+        up = witness.held()
+        self._wait(HOLD_SECONDS)
+        held = {name: height for name, height in witness.held().items() if name in up}
+        seconds = (self._steps - start) * TIME_STEP
+        if not held:
+            return LiftResult(False, felt or "slipped", seconds=seconds)
+        # An obstacle that came up, alone or with a target, is a failure, and is the one to name.
+        name = max(held, key=lambda name: (witness.class_of(name) != TARGET, held[name]))
+        class_id = witness.class_of(name)
+        reason = "lifted" if class_id == TARGET else f"lifted {CLASSES[class_id]}"
+        return LiftResult(class_id == TARGET, reason, name, class_id, held[name], seconds)
+
+    def _first_plan(self, grasp, scene) -> MotionPlan | str:
+        if isinstance(grasp, MotionPlan):
+            return grasp
+        plan = "no grasp"
+        for candidate in grasp if isinstance(grasp, Sequence) else [grasp]:
+            plan = self.plan(candidate, scene)
+            if isinstance(plan, MotionPlan):
+                break
+        return plan
+
+    def place(
+        self, where: Float[np.ndarray, "4 4"] | Float[np.ndarray, "3"], scene: Float[np.ndarray, "M 3"] | None = None
+    ) -> str | None:
+        """Put the held object down, open, and go back up; None when done, else the reason why not.
+
+        where: the grasp frame at which to let go, T_base_grasp, or only its position (x, y, z) to keep the hand's
+        orientation; the height at which it was gripped puts an object back on the table. scene: points to keep clear
+        of, without those of the held object.
+        """
+        T = forward_kinematics(self.q)
+        if np.shape(where) == (3,):
+            T[:3, 3] = where
+        else:
+            T = check_T("where", where)
+        T_above = T.copy()
+        T_above[2, 3] = max(T[2, 3], forward_kinematics(self.q)[2, 3])
+        across = self.inverse_kinematics(T_above)
+        down = None if across is None else straight_line(T_above, T, across)
+        if down is None:
+            return "out of reach"
+        points = np.zeros((0, 3)) if scene is None else check_shape("scene", scene, (None, 3))
+        transit = plan_transit(self.q, across, self.opening / 2, points, self.world.spec.table.z)
+        if isinstance(transit, str):
+            return f"no path: {transit}"
+        if not all(self._follow_or_back_off(leg, LINE_SPEED) for leg in (*transit, down)):
+            return "blocked on the way over"
+        self._open()
+        self._follow(down[::-1], LINE_SPEED)
+        return None
+
+    def _follow(self, path: Float[np.ndarray, "N 7"], line_speed: float = np.inf) -> bool:
+        """Send the motors along a path, from rest to rest; stop and say False where something holds the arm up."""
+        positions, velocities = trajectory(path, TIME_STEP, line_speed)
+        for q, velocity in zip(positions, velocities, strict=True):
+            self._step(q, velocity)
+            if np.abs(self.q - q).max() > BLOCKED:
+                self._target = self.q
+                self._wait(SETTLE_SECONDS)
+                return False
+        self._wait(SETTLE_SECONDS)
+        return True
+
+    def _follow_or_back_off(self, leg: Float[np.ndarray, "N 7"], line_speed: float = np.inf) -> bool:
+        """Follow a leg; where something holds the arm up, return to the leg's beginning and say False."""
+        arrived = self._follow(leg, line_speed)
+        if not arrived:
+            nearest = np.abs(leg - self.q).max(axis=1).argmin()
+            self._follow(np.vstack([self.q, leg[nearest::-1]]), LINE_SPEED)
+        return arrived
+
+    def _wait(self, seconds: float) -> None:
+        """Stand still."""
+        for _ in range(round(seconds / TIME_STEP)):
+            self._step(self._target, np.zeros(7))
+
+    def _close(self) -> None:
+        """Close the jaws until they have met something, or each other."""
+        self._gripping = True
+        still = 0
+        for _ in range(round(CLOSING_SECONDS / TIME_STEP)):
+            self._step(self._target, np.zeros(7))
+            moving = np.abs(self._joint_state(FINGER_JOINTS, 1)).max() > STALLED
+            still = 0 if moving else still + 1
+            if still == STALLED_STEPS:
+                break
+
+    def _open(self) -> None:
+        """Open the jaws enough to let go."""
+        self._gripping = False
+        self._opening = min(self.opening + LETTING_GO, 2 * FINGER_MAX)
+        self._wait((self._opening - self.opening) / 2 / FINGER_SPEED + 0.1)
+
+    def _step(self, q: Float[np.ndarray, "7"], velocity: Float[np.ndarray, "7"]) -> None:
+        """One step of the simulation with the motors' targets for it; forces are limited to the URDF's efforts."""
+        client, robot = self.world.client, self.world.robot
+        client.setJointMotorControlArray(
+            robot,
+            ARM_JOINTS,
+            pybullet.POSITION_CONTROL,
+            targetPositions=q,
+            targetVelocities=velocity,
+            forces=MAX_EFFORT,
+            positionGains=[POSITION_GAIN] * 7,
+            velocityGains=[1.0] * 7,
+        )
+        fingers = self._joint_state(FINGER_JOINTS, 0)
+        # The real fingers share one motor and stay symmetric. Here each has its own, and two equal forces would let
+        # them drift together to one side: so the finger that is further in gives up some of its force.
+        ahead = np.maximum(fingers.mean() - fingers, 0.0)
+        forces = FINGER_MAX_EFFORT - np.minimum(CENTRING * ahead, FINGER_MAX_EFFORT)
+        for joint, force in zip(FINGER_JOINTS, forces, strict=True):
+            client.setJointMotorControl2(
+                robot,
+                joint,
+                pybullet.POSITION_CONTROL,
+                targetPosition=0.0 if self._gripping else self._opening / 2,
+                force=force if self._gripping else FINGER_MAX_EFFORT,
+                maxVelocity=FINGER_SPEED,
+            )
+        self._target = q
+        self._steps += 1
+        self.world.step()
+
+
+class _Witness:
+    """What the simulator knows about the objects, for scoring a lift only."""
+
+    def __init__(self, world: World):
+        self.world = world
+        self.before = self._heights()
+
+    def _heights(self) -> dict[str, float]:
+        """Height of each object's centre of mass, metres."""
+        position = self.world.client.getBasePositionAndOrientation
+        return {name: position(body)[0][2] for name, body in self.world.bodies.items()}
+
+    def held(self) -> dict[str, float]:
+        """How far each object has risen, of those that are up and touch a finger; metres."""
+        rise = {name: height - self.before[name] for name, height in self._heights().items()}
+        return {name: up for name, up in rise.items() if up >= LIFTED and self._touches_finger(name)}
+
+    def _touches_finger(self, name: str) -> bool:
+        contacts = self.world.client.getContactPoints
+        body, robot = self.world.bodies[name], self.world.robot
+        return any(contacts(robot, body, linkIndexA=finger) for finger in FINGER_JOINTS)
+
+    def class_of(self, name: str) -> int:
+        return next(thing.class_id for thing in self.world.spec.objects if thing.name == name)
