@@ -1,6 +1,6 @@
 """The two networks of the kit, their weights on disk, and class probabilities (the text's sections 3 and 6)."""
 
-import os
+import io
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from jaxtyping import Float, UInt8
 from torch import nn
 from torch.nn import functional as F
 
+from labkit.files import write_atomically
 from labkit.labels import CLASSES
 from labkit.validation import check_rgb
 
@@ -136,18 +137,6 @@ def pad_to_multiple(x: Float[torch.Tensor, "N C H W"], multiple: int) -> Float[t
     return F.pad(x, (0, right, 0, down), mode="replicate") if down or right else x
 
 
-def write_atomically(path, write) -> None:
-    """Call `write(temporary_path)`, then put the file in place: a stop at any moment leaves the old file or the new."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        write(temporary)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def save_model(model: nn.Module, path, **meta) -> None:
     """Write a model's weights, its architecture and plain facts about it (`meta`), atomically.
 
@@ -160,7 +149,14 @@ def save_model(model: nn.Module, path, **meta) -> None:
         "state_dict": {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()},
         "meta": meta,
     }
-    write_atomically(path, lambda temporary: torch.save(checkpoint, temporary))
+    write_checkpoint(path, checkpoint)
+
+
+def write_checkpoint(path, checkpoint: dict) -> None:
+    """Write a dict of tensors and plain values as torch.save does, atomically; raises OSError if the disk is full."""
+    buffer = io.BytesIO()
+    torch.save(checkpoint, buffer)
+    write_atomically(path, buffer.getvalue())
 
 
 def read_checkpoint(name: str, path) -> dict:

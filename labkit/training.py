@@ -19,11 +19,12 @@ from torch import nn
 from tqdm.auto import tqdm
 
 from labkit.augment import augment
+from labkit.files import write_atomically
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, IGNORE, TARGET
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
-from labkit.network import ARCHITECTURES, read_checkpoint, save_model, write_atomically
+from labkit.network import ARCHITECTURES, read_checkpoint, save_model, write_checkpoint
 from labkit.validation import check_labels, check_rgb
 
 
@@ -289,9 +290,6 @@ def train(
     if resume and checkpoint.is_file():
         trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
 
-    def save():
-        write_atomically(checkpoint, lambda temporary: torch.save(trainer.state(), temporary))
-
     bar = tqdm(total=trainer.total, initial=trainer.done, desc=config.model, unit="step", disable=not progress)
     with bar, DeferredInterrupt() as interrupt:
         while trainer.done < trainer.total:
@@ -300,9 +298,9 @@ def train(
             bar.set_postfix_str(progress_line(loss, trainer.history), refresh=False)
             if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:
                 finish_epoch(trainer, val_data, out)
-                save()
+                write_checkpoint(checkpoint, trainer.state())
             if interrupt.pending:
-                save()
+                write_checkpoint(checkpoint, trainer.state())
                 raise KeyboardInterrupt
     return trainer.history
 
@@ -325,9 +323,7 @@ def finish_epoch(trainer: Trainer, val_data: ImagesInMemory | None, out: Path) -
     trainer.history.append(row)
     if last or "mean_iou" in row:
         save_model(trainer.model, out / f"{config.model}.pt", **row, config=asdict(config))
-    write_atomically(
-        out / f"{config.model}.history.json", lambda file: file.write_text(json.dumps(trainer.history, indent=1))
-    )
+    write_atomically(out / f"{config.model}.history.json", json.dumps(trainer.history, indent=1).encode())
 
 
 def progress_line(loss: float, history: list[dict]) -> str:

@@ -1,0 +1,226 @@
+"""The networks: exactly the text's layers, any image size, and weights that load or say why not."""
+
+import io
+import pickle
+
+import numpy as np
+import pytest
+import torch
+from torch.nn import functional as F
+
+from labkit.network import SmallSegNet, UNet, load_model, pad_to_multiple, predict_probabilities, save_model
+
+
+def small_unet(num_classes: int = 4) -> UNet:
+    torch.manual_seed(0)
+    return UNet(num_classes, widths=(8, 8, 16), blocks=(1, 0, 1))
+
+
+def random_image(height: int, width: int) -> np.ndarray:
+    return np.random.default_rng(0).integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+def test_smallsegnet_has_the_layers_of_the_text():
+    shapes = {name: tuple(weight.shape) for name, weight in SmallSegNet(num_classes=4).state_dict().items()}
+    assert shapes == {
+        "conv1.weight": (32, 3, 3, 3),
+        "conv1.bias": (32,),
+        "conv2.weight": (64, 32, 3, 3),
+        "conv2.bias": (64,),
+        "conv3.weight": (128, 64, 3, 3),
+        "conv3.bias": (128,),
+        "up1.weight": (128, 64, 2, 2),
+        "up1.bias": (64,),
+        "up2.weight": (64, 32, 2, 2),
+        "up2.bias": (32,),
+        "logits.weight": (4, 32, 1, 1),
+        "logits.bias": (4,),
+    }
+
+
+def test_smallsegnet_computes_what_the_text_does():
+    """The oracle is the text's forward pass, written out with functional calls on the same weights."""
+    model = SmallSegNet().double().eval()
+    w = model.state_dict()
+    x = torch.rand(2, 3, 12, 8, dtype=torch.float64)
+    z = F.max_pool2d(F.relu(F.conv2d(x, w["conv1.weight"], w["conv1.bias"], padding=1)), 2)
+    z = F.max_pool2d(F.relu(F.conv2d(z, w["conv2.weight"], w["conv2.bias"], padding=1)), 2)
+    z = F.relu(F.conv2d(z, w["conv3.weight"], w["conv3.bias"], padding=1))
+    z = F.relu(F.conv_transpose2d(z, w["up1.weight"], w["up1.bias"], stride=2))
+    z = F.relu(F.conv_transpose2d(z, w["up2.weight"], w["up2.bias"], stride=2))
+    z = F.conv2d(z, w["logits.weight"], w["logits.bias"])
+    torch.testing.assert_close(model(x), z)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("size", [(10, 8), (8, 9), (3, 3)])
+def test_smallsegnet_says_which_sizes_it_takes(size):
+    with pytest.raises(ValueError, match=r"^x: expected height and width divisible by 4"):
+        SmallSegNet()(torch.zeros(1, 3, *size))
+
+
+@pytest.mark.parametrize("size", [(37, 61), (1, 1), (16, 16), (17, 32), (50, 3)])
+def test_unet_takes_any_size(size):
+    with torch.inference_mode():
+        assert UNet(num_classes=5).eval()(torch.rand(2, 3, *size)).shape == (2, 5, *size)
+
+
+def test_unet_crops_what_it_pads():
+    """The logits of an odd size are those of the image that was padded by hand, where the two overlap."""
+    model = small_unet().eval()
+    x = torch.rand(1, 3, 21, 29)
+    padded = F.pad(x, (0, 3, 0, 3), mode="replicate")
+    torch.testing.assert_close(model(x), model(padded)[..., :21, :29])
+
+
+def test_pad_to_multiple_repeats_the_border():
+    x = torch.arange(6.0).reshape(1, 1, 2, 3)
+    assert pad_to_multiple(x, 4)[0, 0].tolist() == [[0, 1, 2, 2], [3, 4, 5, 5], [3, 4, 5, 5], [3, 4, 5, 5]]
+    assert pad_to_multiple(x, 1) is x
+
+
+def test_the_weights_of_both_fit_in_five_megabytes(tmp_path):
+    for name, model in (("a.pt", UNet()), ("b.pt", SmallSegNet())):
+        save_model(model, tmp_path / name)
+    assert sum(file.stat().st_size for file in tmp_path.iterdir()) < 5_000_000
+    assert 700_000 < sum(weight.numel() for weight in UNet().parameters()) < 1_000_000
+
+
+@pytest.mark.parametrize("model", [UNet(), SmallSegNet()], ids=["unet", "smallsegnet"])
+def test_every_weight_gets_a_gradient(model):
+    F.cross_entropy(model(torch.rand(2, 3, 32, 32)), torch.randint(0, 4, (2, 32, 32))).backward()
+    for name, weight in model.named_parameters():
+        assert weight.grad is not None and weight.grad.abs().max() > 0.0, name
+
+
+def test_unet_sees_a_whole_object_and_smallsegnet_about_twenty_pixels():
+    """The receptive field, measured: how far away a pixel can be and still move the logits in the middle."""
+    reach = {}
+    for model in (UNet().eval(), SmallSegNet().eval()):
+        x = torch.rand(1, 3, 256, 256, requires_grad=True)
+        model(x)[0, 2, 128, 128].backward()
+        touched = x.grad.abs().sum(dim=(0, 1)).nonzero()
+        reach[type(model)] = int((touched - 128).abs().max())
+    assert reach[UNet] >= 40
+    assert 8 <= reach[SmallSegNet] <= 12
+
+
+def test_unet_overfits_two_images():
+    generator = torch.Generator().manual_seed(0)
+    x = torch.rand(2, 3, 16, 24, generator=generator)
+    y = torch.zeros(2, 16, 24, dtype=torch.long)
+    y[0, 4:9, 3:11], y[1, 8:, 12:] = 2, 1
+    x = (x + 0.3 * y[:, None]).clamp(0.0, 1.0)  # noise with the objects faintly in it
+    model = small_unet().train()
+    optimiser = torch.optim.AdamW(model.parameters(), lr=1e-2)
+    for _ in range(60):
+        optimiser.zero_grad()
+        F.cross_entropy(model(x), y).backward()
+        optimiser.step()
+    assert (model(x).argmax(dim=1) == y).float().mean() > 0.98
+
+
+@pytest.mark.parametrize("model", [UNet(3), SmallSegNet(3)], ids=["unet", "smallsegnet"])
+def test_saved_weights_load_and_predict_the_same(model, tmp_path):
+    model(torch.rand(2, 3, 16, 16))  # so that the running means of UNet are not those of a fresh one
+    save_model(model.eval(), tmp_path / "sub" / "weights.pt", epoch=3, iou=[0.5, float("nan")])
+    loaded = load_model(tmp_path / "sub" / "weights.pt", num_classes=3)
+    assert type(loaded) is type(model) and not loaded.training
+    image = random_image(20, 28)
+    np.testing.assert_allclose(predict_probabilities(loaded, image), predict_probabilities(model, image), atol=1e-6)
+    assert [file.name for file in (tmp_path / "sub").iterdir()] == ["weights.pt"]
+    assert torch.load(tmp_path / "sub" / "weights.pt", weights_only=True)["meta"]["epoch"] == 3
+
+
+@pytest.mark.parametrize("kind", [UNet, SmallSegNet])
+def test_a_bare_state_dict_loads_too(kind, tmp_path):
+    """The text saves and loads nothing but the state_dict."""
+    torch.save(kind().state_dict(), tmp_path / "bare.pt")
+    assert type(load_model(tmp_path / "bare.pt", 4)) is kind
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("kind", [UNet, SmallSegNet])
+def test_probabilities_are_the_softmax_of_the_logits(kind, order):
+    model, image = kind().eval(), np.array(random_image(24, 36), order=order)
+    p = predict_probabilities(model, image)
+    x = torch.from_numpy(image.transpose(2, 0, 1).astype(np.float32) / 255.0)[None]
+    with torch.inference_mode():
+        expected = F.softmax(model(x), dim=1)[0].permute(1, 2, 0).numpy()
+    assert p.dtype == np.float32
+    np.testing.assert_allclose(p, expected, atol=1e-5)
+    np.testing.assert_allclose(p.sum(axis=-1), 1.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", [UNet, SmallSegNet])
+@pytest.mark.parametrize("size", [(37, 61), (1, 2)])
+def test_probabilities_of_any_size(kind, size):
+    assert predict_probabilities(kind().eval(), random_image(*size)).shape == (*size, 4)
+
+
+@pytest.mark.bad_input
+def test_probabilities_of_something_else():
+    with pytest.raises(ValueError, match=r"^rgb: expected uint8"):
+        predict_probabilities(SmallSegNet().eval(), np.zeros((4, 4, 3), np.float32))
+
+
+class Launcher:
+    """What a malicious file of weights would hold."""
+
+    def __reduce__(self):
+        return (print, ("a pickle ran code",))
+
+
+def truncated() -> bytes:
+    buffer = io.BytesIO()
+    torch.save(SmallSegNet().state_dict(), buffer)
+    return buffer.getvalue()[:100_000]
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    "data",
+    [truncated(), b"", b"not weights at all", pickle.dumps(Launcher(), 2), pickle.dumps([1, 2], 2)],
+    ids=["truncated", "empty", "text", "malicious", "pickle"],
+)
+def test_a_file_without_weights(data, tmp_path, capfd):
+    (tmp_path / "w.pt").write_bytes(data)
+    with pytest.raises(ValueError, match=r"^path: .*w\.pt holds no weights that can be read"):
+        load_model(tmp_path / "w.pt", 4)
+    assert "a pickle ran code" not in capfd.readouterr().out
+
+
+@pytest.mark.bad_input
+def test_other_things_than_weights(tmp_path):
+    file = tmp_path / "w.pt"
+    with pytest.raises(FileNotFoundError, match="path: no file"):
+        load_model(file, 4)
+    torch.save([1, 2], file)
+    with pytest.raises(ValueError, match="path: expected a dict of weights"):
+        load_model(file, 4)
+    torch.save({"epoch": 3}, file)
+    with pytest.raises(ValueError, match="path: expected weights by name"):
+        load_model(file, 4)
+    torch.save({"architecture": "vit", "state_dict": {}}, file)
+    with pytest.raises(ValueError, match="path: expected an architecture among"):
+        load_model(file, 4)
+    torch.save({"architecture": "unet", "state_dict": SmallSegNet().state_dict()}, file)
+    with pytest.raises(ValueError, match=r"path: the weights in .* do not fit unet"):
+        load_model(file, 4)
+    torch.save({}, file)
+    with pytest.raises(ValueError, match=r"path: the weights in .* do not fit unet"):
+        load_model(file, 4)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("kind", [UNet, SmallSegNet])
+def test_weights_for_another_number_of_classes(kind, tmp_path):
+    save_model(kind(num_classes=4), tmp_path / "w.pt")
+    with pytest.raises(ValueError, match=r"num_classes: expected 4, the classes that .*w\.pt .* got 5"):
+        load_model(tmp_path / "w.pt", 5)
+
+
+@pytest.mark.bad_input
+def test_only_the_two_networks_are_saved(tmp_path):
+    with pytest.raises(ValueError, match="model: expected one of"):
+        save_model(torch.nn.Conv2d(3, 4, 1), tmp_path / "w.pt")

@@ -1,0 +1,352 @@
+"""Training: the same result however often it is stopped, labels that stay on their pixels, checked settings."""
+
+import json
+import math
+import os
+import signal
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+
+from labkit.augment import augment, random_colour, random_crop, random_flip, random_noise, random_sharpness
+from labkit.frame import RGBDFrame
+from labkit.losses import class_weights, segmentation_loss
+from labkit.metrics import mean_iou
+from labkit.network import SmallSegNet, load_model, predict_probabilities
+from labkit.training import ImagesInMemory, TrainConfig, Trainer, bf16_is_native, choose_device, evaluate, train
+
+CONFIG = TrainConfig(model="smallsegnet", epochs=3, batch=2, lr=3e-3, crop=(12, 16))
+
+
+def scenes(count: int, height: int = 16, width: int = 24) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Images whose red is the class, so that a network can learn them; a corner is ignored."""
+    rng = np.random.default_rng(7)
+    pairs = []
+    for _ in range(count):
+        y = np.kron(rng.integers(0, 4, (height // 4, width // 4)), np.ones((4, 4))).astype(np.uint8)
+        rgb = np.stack([70 * y + 20, rng.integers(0, 256, y.shape), 0 * y], axis=-1).astype(np.uint8)
+        y[:2, :2] = 255
+        pairs.append((rgb, y))
+    return pairs
+
+
+def weights_of(folder, name="smallsegnet") -> dict:
+    return torch.load(folder / f"{name}.pt", weights_only=True)["state_dict"]
+
+
+def assert_same_weights(a: dict, b: dict):
+    assert a.keys() == b.keys()
+    for name, weight in a.items():
+        assert torch.equal(weight, b[name]), name
+
+
+@pytest.fixture
+def generator():
+    return torch.Generator().manual_seed(3)
+
+
+def batch(count: int = 6, height: int = 20, width: int = 28) -> tuple[torch.Tensor, torch.Tensor]:
+    """Images in which every pixel's labels can be read off its first channel."""
+    rgb = torch.randint(
+        0, 256, (count, height, width, 3), dtype=torch.uint8, generator=torch.Generator().manual_seed(0)
+    )
+    return rgb, rgb[..., 0] % 5
+
+
+# Augmentation
+
+
+def test_a_crop_is_a_window_of_the_image_and_of_its_labels(generator):
+    rgb, y = batch()
+    x, cut = random_crop(rgb, y, (9, 11), generator)
+    assert x.shape == (6, 3, 9, 11) and cut.shape == (6, 9, 11)
+    red = (x[:, 0] * 255.0).round().to(torch.uint8)
+    assert torch.equal(red % 5, cut)
+    places = []
+    for i in range(6):  # by brute force, the window lies somewhere in its own image
+        found = [(r, c) for r in range(12) for c in range(18) if torch.equal(rgb[i, r : r + 9, c : c + 11, 0], red[i])]
+        assert len(found) == 1
+        places += found
+    assert len(set(places)) > 1
+
+
+@pytest.mark.parametrize("zoom", [0.8, 1.25])
+def test_zoom_keeps_image_and_labels_aligned(generator, zoom):
+    """A bright square on black, labelled 1: after zooming, the pixels brighter than half are those labelled 1."""
+    rgb, y = torch.zeros(3, 40, 40, 3, dtype=torch.uint8), torch.zeros(3, 40, 40, dtype=torch.uint8)
+    rgb[:, 14:27, 13:26], y[:, 14:27, 13:26] = 255, 1
+    x, cut = random_crop(rgb, y, (32, 32), generator, zoom)
+    wrong = (x[:, 0] > 0.5) != (cut == 1)
+    assert cut.sum() / 3 == pytest.approx(169 * zoom**2, rel=0.3)
+    assert wrong.float().mean() < 0.01
+
+
+def test_a_flip_mirrors_image_and_labels_and_twice_is_none(generator):
+    rgb, y = batch(count=16)
+    x = rgb.permute(0, 3, 1, 2).float()
+    state = generator.get_state()
+    x1, y1 = random_flip(x.clone(), y.clone(), generator)
+    flipped = [i for i in range(16) if not torch.equal(y1[i], y[i])]
+    assert 0 < len(flipped) < 16
+    for i in flipped:
+        assert torch.equal(x1[i], x[i].flip(-1)) and torch.equal(y1[i], y[i].flip(-1))
+    x2, y2 = random_flip(x1, y1, generator.set_state(state))
+    assert torch.equal(x2, x) and torch.equal(y2, y)
+
+
+@pytest.mark.parametrize("change", [random_colour, random_sharpness, random_noise])
+def test_pixel_changes_change_every_image_otherwise_and_move_nothing(generator, change):
+    x = torch.zeros(8, 3, 16, 16)
+    x[:, :, 5, 9] = 1.0
+    changed = change(x.clone(), generator)
+    assert changed.shape == x.shape
+    assert len({round(float(image.std()), 6) for image in changed}) > 3
+    assert all(int(image.sum(dim=0).argmax()) == 5 * 16 + 9 for image in changed)
+
+
+def test_augmented_batch_is_a_function_of_the_generator_and_keeps_255():
+    rgb, y = batch()
+    y[:, 5:] = 255
+    runs = [augment(rgb, y, (8, 12), torch.Generator().manual_seed(seed)) for seed in (1, 1, 2)]
+    assert torch.equal(runs[0][0], runs[1][0]) and torch.equal(runs[0][1], runs[1][1])
+    assert not torch.equal(runs[0][0], runs[2][0])
+    for x, labels in runs:
+        assert x.shape == (6, 3, 8, 12) and x.is_contiguous(memory_format=torch.channels_last)
+        assert x.min() >= 0.0 and x.max() <= 1.0
+        assert (labels == 255).any() and labels[labels != 255].max() < 5
+
+
+def test_augmentation_leaves_the_data_as_they_are():
+    rgb, y = batch()
+    kept = rgb.clone(), y.clone()
+    for seed in range(4):
+        augment(rgb, y, (20, 28), torch.Generator().manual_seed(seed))
+    assert torch.equal(rgb, kept[0]) and torch.equal(y, kept[1])
+
+
+@pytest.mark.bad_input
+def test_a_window_larger_than_the_image(generator):
+    with pytest.raises(ValueError, match="size: expected a window within"):
+        random_crop(*batch(), (21, 8), generator)
+
+
+# A run
+
+
+@pytest.mark.parametrize("model", ["smallsegnet", "unet"])
+def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, tmp_path, monkeypatch):
+    """Stopped by a real SIGINT in the middle of an epoch, once in each of three steps, and gone on with each time."""
+    config, data, val = replace(CONFIG, model=model, epochs=2, crop=None), scenes(7), scenes(2)
+    expected = train(data, val, config, tmp_path / "a", progress=False)
+    plain_step = Trainer.step
+
+    def interrupted_step(self):
+        loss = plain_step(self)
+        if self.done in (1, 3, 5):
+            os.kill(os.getpid(), signal.SIGINT)
+        return loss
+
+    monkeypatch.setattr(Trainer, "step", interrupted_step)
+    for _ in range(3):
+        with pytest.raises(KeyboardInterrupt):
+            train(data, val, config, tmp_path / "b", progress=False)
+    assert train(data, val, config, tmp_path / "b", progress=False) == expected
+    assert_same_weights(weights_of(tmp_path / "a", model), weights_of(tmp_path / "b", model))
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_finished_run_is_not_run_again_and_a_seed_is_a_result(tmp_path, monkeypatch):
+    data = scenes(4)
+    history = train(data, None, CONFIG, tmp_path / "a", progress=False)
+    train(data, None, CONFIG, tmp_path / "b", progress=False)
+    train(data, None, replace(CONFIG, seed=1), tmp_path / "c", progress=False)
+    first, again, other = (weights_of(tmp_path / folder) for folder in "abc")
+    assert_same_weights(first, again)
+    assert not torch.equal(first["conv1.weight"], other["conv1.weight"])
+    monkeypatch.setattr(Trainer, "step", None)
+    assert train(data, None, CONFIG, tmp_path / "a", progress=False) == history
+
+
+def test_training_leaves_the_global_generator_alone(tmp_path):
+    torch.manual_seed(5)
+    expected = torch.rand(3)
+    torch.manual_seed(5)
+    train(scenes(2), None, replace(CONFIG, epochs=1), tmp_path, progress=False)
+    assert torch.equal(torch.rand(3), expected)
+
+
+def test_a_run_learns_and_writes_what_it_says(tmp_path):
+    data, val = scenes(8), scenes(10)[8:]
+    config = replace(CONFIG, epochs=25, lr=1e-2, val_every=10, augment=False)
+    history = train(data, val, config, tmp_path, progress=False)
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        "smallsegnet.checkpoint.pt",
+        "smallsegnet.history.json",
+        "smallsegnet.pt",
+    ]
+    assert json.loads((tmp_path / "smallsegnet.history.json").read_text()) == history
+    assert [row["epoch"] for row in history] == list(range(1, 26)) and history[-1]["steps"] == 100
+    assert [row["epoch"] for row in history if "mean_iou" in row] == [10, 20, 25]
+    assert history[-1]["loss"] < 0.5 * history[0]["loss"]
+    assert history[-1]["mean_iou"] > 0.6
+    model = load_model(tmp_path / "smallsegnet.pt", 4)
+    right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in val]
+    assert np.concatenate(right).mean() > 0.8
+
+
+def test_the_loss_of_a_step_is_the_weighted_loss_of_its_batch():
+    data = ImagesInMemory(scenes(5), progress=False)
+    trainer = Trainer(data, replace(CONFIG, weights="inverse", augment=False), torch.device("cpu"))
+    x, y = trainer.batch_of_step(0)
+    model = SmallSegNet()
+    model.load_state_dict(trainer.model.state_dict())
+    weights = class_weights(data.class_counts(4), "inverse")
+    assert trainer.step() == pytest.approx(float(segmentation_loss(model(x), y, weights)), rel=2e-2)
+
+
+def test_an_epoch_shows_every_image_once():
+    data = ImagesInMemory(scenes(7), progress=False)
+    trainer = Trainer(data, replace(CONFIG, augment=False), torch.device("cpu"))
+    assert trainer.batches == 4 and trainer.total == 12
+    whole = data.rgb.permute(0, 3, 1, 2).float() / 255.0
+    for epoch in range(2):
+        images = torch.cat([trainer.batch_of_step(4 * epoch + place)[0] for place in range(4)])
+        seen = [(image == whole).all(dim=(1, 2, 3)).nonzero().item() for image in images]
+        assert sorted(seen) == list(range(7))
+
+
+def test_learning_rate_rises_then_falls_to_zero():
+    config = TrainConfig(lr=0.5, warmup=0.1)
+    rates = [config.learning_rate(step, 100) for step in range(100)]
+    assert rates[:10] == pytest.approx([0.05 * k for k in range(1, 11)])
+    assert max(rates) == 0.5
+    assert all(later < earlier for earlier, later in pairwise(rates[10:]))
+    assert rates[55] == pytest.approx(0.25) and rates[-1] < 1e-3
+    assert math.isclose(TrainConfig(lr=0.5).learning_rate(0, 1), 0.5)
+
+
+def test_evaluate_pools_one_confusion_matrix():
+    data = ImagesInMemory(scenes(5), progress=False)
+    model = SmallSegNet()
+    n = evaluate(model, data, 4, batch=2)
+    y, p = data.y.numpy(), [predict_probabilities(model, rgb.numpy()).argmax(axis=-1) for rgb in data.rgb]
+    counted = y != 255
+    assert n.sum() == counted.sum()
+    np.testing.assert_array_equal(n.sum(axis=1), np.bincount(y[counted], minlength=4))
+    expected = np.zeros((4, 4))
+    np.add.at(expected, (y[counted], np.array(p)[counted]), 1)
+    assert np.abs(n - expected).sum() <= 0.02 * n.sum()  # bfloat16 may turn a pixel whose logits nearly tie
+    assert 0.0 <= mean_iou(n) <= 1.0
+
+
+def test_frames_and_tensors_are_datasets_too():
+    pairs = scenes(3)
+    frames = [
+        RGBDFrame(rgb, np.ones(y.shape, np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4), labels=y) for rgb, y in pairs
+    ]
+    tensors = [(torch.from_numpy(rgb), torch.from_numpy(y)) for rgb, y in pairs]
+    for dataset in (pairs, frames, tensors):
+        data = ImagesInMemory(dataset, progress=False)
+        assert len(data) == 3
+        assert all(
+            (data.rgb[i].numpy() == rgb).all() and (data.y[i].numpy() == y).all() for i, (rgb, y) in enumerate(pairs)
+        )
+    y = np.stack([y for _, y in pairs])
+    np.testing.assert_array_equal(data.class_counts(4), [(y == c).sum() for c in range(4)])
+
+
+# Bad input
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("model", "resnet"),
+        ("epochs", 0),
+        ("steps", 0),
+        ("batch", 0),
+        ("lr", 0.0),
+        ("lr", float("nan")),
+        ("weight_decay", -0.1),
+        ("warmup", 1.0),
+        ("weights", "equal"),
+        ("crop", (2, 64)),
+        ("crop", (64,)),
+        ("val_every", 0),
+        ("num_classes", 1),
+        ("seed", -1),
+    ],
+)
+def test_settings_are_checked(name, value):
+    with pytest.raises(ValueError, match=rf"^{name}: expected .* got"):
+        TrainConfig(**{name: value})
+
+
+@pytest.mark.bad_input
+def test_data_that_do_not_fit(tmp_path):
+    def run(train_set, val_set=None):
+        train(train_set, val_set, CONFIG, tmp_path, progress=False)
+
+    rgb, y = scenes(1)[0]
+    with pytest.raises(ValueError, match="train_set: expected at least one image"):
+        run([])
+    with pytest.raises(ValueError, match="val_set: expected at least one image"):
+        run(scenes(1), [])
+    with pytest.raises(ValueError, match="train_set: expected images of one size"):
+        run([*scenes(1), *scenes(1, 20, 24)])
+    with pytest.raises(ValueError, match="train_set: expected images of one size"):
+        run([(rgb, y), (rgb, y[:-1])])
+    with pytest.raises(ValueError, match=r"train_set\[0\]: expected labels 0 to 3"):
+        run([(rgb, np.full_like(y, 4))])
+    with pytest.raises(ValueError, match=r"train_set\[0\]: expected uint8 RGB"):
+        run([(rgb / 255.0, y)])
+    frame = RGBDFrame(rgb, np.ones(y.shape, np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+    with pytest.raises(ValueError, match=r"train_set\[0\]: expected a frame with labels"):
+        run([frame])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.bad_input
+def test_a_checkpoint_of_another_run_or_a_damaged_one(tmp_path):
+    config, data = replace(CONFIG, epochs=1), scenes(2)
+    train(data, None, config, tmp_path, progress=False)
+    with pytest.raises(ValueError, match=r"config: .* differs in batch, seed"):
+        train(data, None, replace(config, batch=1, seed=4), tmp_path, progress=False)
+    with pytest.raises(ValueError, match=r"config: .* differs in images"):
+        train(scenes(3), None, config, tmp_path, progress=False)
+    checkpoint = tmp_path / "smallsegnet.checkpoint.pt"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:5000])
+    with pytest.raises(ValueError, match=r"out: .*truncated"):
+        train(data, None, config, tmp_path, progress=False)
+    train(data, None, config, tmp_path, resume=False, progress=False)
+
+
+@pytest.mark.bad_input
+def test_devices(monkeypatch):
+    assert choose_device("cpu") == torch.device("cpu")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    assert choose_device("auto") == torch.device("cpu")
+    with pytest.raises(ValueError, match="device: expected a CUDA GPU"):
+        choose_device("cuda")
+    with pytest.raises(ValueError, match="device: expected auto, cpu or cuda"):
+        choose_device("tpu")
+
+
+@pytest.mark.parametrize(
+    ("able", "native"),
+    [
+        ({"avx2": True}, False),
+        ({"avx512_f": True, "avx512_bf16": False}, False),
+        ({"avx512_bf16": True}, True),
+        ({"amx_bf16": True}, True),
+    ],
+)
+def test_bf16_is_used_only_where_it_is_native(monkeypatch, able, native):
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: able)
+    assert bf16_is_native(torch.device("cpu")) is native
+    trainer = Trainer(ImagesInMemory(scenes(1), progress=False), CONFIG, torch.device("cpu"))
+    assert trainer.bf16 is native
