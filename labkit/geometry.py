@@ -4,12 +4,10 @@ Frames: "cam" is the camera's optical frame (x right, y down, z forward), "base"
 camera coordinates to base coordinates. Pixel centres lie at integer u (column) and v (row). Metres throughout.
 """
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from cv2 import COLOR_GRAY2RGB, cvtColor
 from jaxtyping import Bool, Float, Float32, Integer, Real
 
 from labkit.validation import check_depth, check_finite, check_K, check_same_size, check_shape, check_T
@@ -137,19 +135,12 @@ def _rays(M: Float[np.ndarray, "3 3"], H: int, W: int, dtype) -> Float[np.ndarra
 def _back_project(
     depth: Float[np.ndarray, "H W"], K: Float[np.ndarray, "3 3"], T: Float[np.ndarray, "4 4"]
 ) -> Float32[np.ndarray, "H W 3"]:
-    """Compute d (R q) + t for every pixel, in three passes over long rows of numbers (short axes are slow in NumPy)."""
+    """Compute d (R q) + t for every pixel; NaN where there is no reading."""
+    from labkit.geometry_kernels import scale_rays  # numba: loaded when an image is first back-projected
+
     depth = _check_depth_image(depth)
-    H, W = depth.shape
-    if not depth.min() > 0.0:
-        with np.errstate(invalid="ignore"):
-            depth = depth + np.float32(0.0) / depth  # 0 / d is 0 where there is a reading, and NaN where d is 0 or NaN
-    P = cvtColor(depth, COLOR_GRAY2RGB)  # repeats d three times, as grey becomes RGB
-    P *= _base_rays(K.tobytes(), T[:3, :3].tobytes(), H, W)
-    if T[:3, 3].any():
-        rows = math.gcd(H, 8)
-        long_rows = P.reshape(H // rows, rows * W * 3)
-        long_rows += np.tile(T[:3, 3].astype(np.float32), rows * W)
-    return P
+    rays = _base_rays(K.tobytes(), T[:3, :3].tobytes(), *depth.shape)
+    return scale_rays(depth, rays, T[:3, 3].astype(np.float32))
 
 
 # ----------------------------------------------------------------------------- how errors in u, v and d move a point
@@ -330,7 +321,7 @@ def remove_outliers(
     >>> remove_outliers(P, radius=0.01, min_neighbours=1)[:, 0].tolist()
     [0.0, 0.001]
     """
-    from labkit.geometry_kernels import count_neighbours, sort_into_cells  # numba: loaded when a cloud is first cleaned
+    from labkit.geometry_kernels import count_neighbours, sort_into_cells
 
     P = _check_cloud("P", P)
     _check_reach("radius", radius, P)

@@ -1,10 +1,33 @@
-"""Which points of a cloud are near each other: a grid of cubes, and loops over it compiled by numba.
+"""What NumPy and SciPy are too slow at, compiled by numba: one pass over a depth image, and which points are near.
 
-Measured side by side, SciPy's exact k-d tree takes several times as long, most of the time there is for a whole frame.
+For the image NumPy needs a pass over memory for each operation. For the points SciPy's exact k-d trees take several
+times as long as a grid of cubes. The benchmark of this topic measures both.
 """
 
 import numpy as np
 from numba import njit
+
+
+@njit(cache=True)
+def scale_rays(depth, rays, t):
+    """Compute d * ray + t for every pixel of a depth image (H, W), and NaN where d is not above 0 (or is NaN itself).
+
+    Row by row, d and t are first repeated for x, y and z: then the sum runs over plain rows of numbers, which the
+    compiler turns into vector instructions. Twice as fast as the obvious loop over pixels.
+    """
+    H, W = depth.shape
+    P = np.empty((H, W, 3), np.float32)
+    d_xyz, t_xyz = np.empty(3 * W, np.float32), np.empty(3 * W, np.float32)
+    for k in range(3 * W):
+        t_xyz[k] = t[k % 3]
+    for v in range(H):
+        for u in range(W):
+            d = depth[v, u] if depth[v, u] > 0.0 else np.float32(np.nan)
+            d_xyz[3 * u] = d_xyz[3 * u + 1] = d_xyz[3 * u + 2] = d
+        row, ray = P[v].reshape(3 * W), rays[v].reshape(3 * W)
+        for k in range(3 * W):
+            row[k] = d_xyz[k] * ray[k] + t_xyz[k]
+    return P
 
 
 def sort_into_cells(P, reach):
