@@ -36,7 +36,7 @@ def dense_crf(
     >>> dense_crf(unary, np.zeros((4, 4, 3), np.uint8)).argmax(axis=2)[1, 1]
     np.int64(0)
     """
-    from labkit.crf.lattice_kernels import LANES, softmax
+    from labkit.crf.lattice_kernels import softmax
 
     unary = check_finite("unary", check_shape("unary", unary, (None, None, None)))
     if 0 in unary.shape:
@@ -49,51 +49,51 @@ def dense_crf(
     if iterations < 0:
         raise ValueError(f"iterations: expected at least 0, got {iterations}")
     H, W, C = unary.shape
-    colours = as_channels("image", check_finite("image", image), unary)
-    places = np.stack(np.meshgrid(np.arange(W), np.arange(H)), axis=-1)
-    kernels = [
-        (w_appearance, GaussianFilter(np.dstack([places / theta_alpha, colours / theta_beta]).reshape(H * W, -1))),
-        (w_smoothness, GaussianFilter((places / theta_gamma).reshape(H * W, -1))),
-    ]
-    minus_unary = np.zeros((H * W, -(-C // LANES), LANES), np.float32)
-    minus_unary.reshape(H * W, -1)[:, :C] = -unary.reshape(H * W, C)
-    q = np.zeros_like(minus_unary)
-    softmax(minus_unary, C, q)
+    colours = as_channels("image", check_finite("image", image), unary).astype(np.float32)
+    v, u = np.indices((H, W), np.float32)
+    appearance = np.dstack([u / theta_alpha, v / theta_alpha, colours / theta_beta])
+    smoothness = np.dstack([u / theta_gamma, v / theta_gamma])
+    kernels = [(w_appearance, GaussianFilter(appearance)), (w_smoothness, GaussianFilter(smoothness))]
+    minus_unary = -unary.reshape(H * W, C).astype(np.float32)
+    q = np.empty_like(minus_unary)
+    softmax(minus_unary, q)
     for _ in range(iterations):
         z = minus_unary.copy()
         for weight, gaussian in kernels:
             gaussian.add_filtered(q, weight, z)
-        softmax(z, C, q)
-    return q.reshape(H, W, -1)[..., :C]
+        softmax(z, q)
+    return q.reshape(H, W, C)
 
 
 class GaussianFilter:
     """exp(-|f_p - f_q|^2 / 2) between all pixels, symmetrically normalised: K_pq / sqrt(sum_q K_pq sum_p K_pq)."""
 
-    def __init__(self, features: Float[np.ndarray, "N d"]):
-        """features: one row a pixel, each column divided by its standard deviation."""
+    def __init__(self, features: Float[np.ndarray, "H W d"]):
+        """features: each channel divided by its standard deviation; ValueError for a range too large to index."""
         from labkit.crf import lattice_kernels as lattice
 
-        N, d = features.shape
-        elevated = features @ elevation(d).T
-        lowest = np.floor(elevated.min(axis=0)).astype(np.int64) - 3 * (d + 1)
-        size = np.ceil(elevated.max(axis=0)).astype(np.int64) + 3 * (d + 1) - lowest
+        d = features.shape[2]
+        elevated, least, largest = lattice.elevate(
+            features.reshape(-1, d).astype(np.float32), elevation(d).astype(np.float32)
+        )
+        margin = 3 * (d + 1)
+        lowest = np.floor(least).astype(np.int64) - margin
+        size = np.ceil(largest).astype(np.int64) + margin - lowest
         if np.prod(size[:d].astype(np.float64)) > 2.0**62:
-            raise ValueError(f"theta: expected scales above a {2**12}th of the features' ranges, got {d} much smaller")
+            raise ValueError(f"theta: expected larger scales; {d} features span up to {size.max()} lattice steps")
         stride = np.cumprod(np.concatenate([[1], size[: d - 1]]))
-        keys, self.weights = lattice.corners_of_pixels(elevated.astype(np.float32), lowest, stride)
+        keys, self.weights = lattice.corners_of_pixels(elevated, lowest, stride)
         self.corner, found, *table = lattice.number_corners(keys)
         # A step along direction j adds d + 1 to coordinate j and takes 1 from all; the last one has no place in keys.
         steps = np.append((d + 1) * stride, 0) - stride.sum()
         self.near = lattice.neighbour_corners(found, *table, steps)
-        ones = np.zeros((N, 1, lattice.LANES), np.float32)
-        ones[..., 0] = 1.0
-        total = np.zeros_like(ones)
-        lattice.lattice_filter(ones, np.ones(N, np.float32), self.corner, self.weights, self.near, total)
-        self.scale = (1.0 / np.sqrt(total[:, 0, 0] + 1e-20)).astype(np.float32)
+        self.scale = np.ones(len(keys), np.float32)
+        total = np.zeros((len(keys), 1), np.float32)
+        self.add_filtered(np.ones_like(total), 1.0, total)
+        self.scale = 1.0 / np.sqrt(total[:, 0] + np.float32(1e-20))
 
-    def add_filtered(self, values: np.ndarray, weight: float, out: np.ndarray) -> None:
-        """out += weight * filtered values, float32 (N, groups, LANES)."""
+    def add_filtered(self, values: Float[np.ndarray, "N C"], weight: float, out: Float[np.ndarray, "N C"]) -> None:
+        """out += weight * filtered values, both float32, one row a pixel."""
         from labkit.crf.lattice_kernels import lattice_filter
 
         scale = (np.sqrt(weight) * self.scale).astype(np.float32)

@@ -11,7 +11,20 @@ direction adds a constant to the key. Corner 0 stands for "none" and always hold
 import numpy as np
 from numba import njit
 
-LANES = 8  # values come in groups of eight, which the processor adds at once
+
+@njit(cache=True)
+def elevate(features, E):
+    """Map each pixel's features to the plane sum(x) = 0: (N, d + 1), with the least and largest of each coordinate."""
+    N, d = features.shape
+    elevated = np.zeros((N, d + 1), np.float32)
+    least, largest = np.full(d + 1, np.inf, np.float32), np.full(d + 1, -np.inf, np.float32)
+    for n in range(N):
+        for i in range(d + 1):
+            for j in range(d):
+                elevated[n, i] += E[i, j] * features[n, j]
+            least[i] = min(least[i], elevated[n, i])
+            largest[i] = max(largest[i], elevated[n, i])
+    return elevated, least, largest
 
 
 @njit(cache=True)
@@ -115,46 +128,44 @@ def neighbour_corners(found, table_keys, table_corners, steps):
 
 @njit(cache=True)
 def lattice_filter(values, scale, corner, weights, near, out):
-    """Splat, blur and slice: out += filtered values * scale, with values * scale as input; (N, groups, LANES) each."""
+    """Splat, blur and slice: out += scale * filtered (scale * values); values and out (N, C), scale (N,)."""
     N, d1 = corner.shape
-    groups = values.shape[1]
-    old = np.zeros((near.shape[1], groups, LANES), np.float32)
+    C = values.shape[1]
+    old = np.zeros((near.shape[1], C), np.float32)
     new = np.zeros_like(old)
     for n in range(N):
+        pixel = values[n]
         for r in range(d1):
             w = weights[n, r] * scale[n]
-            m = corner[n, r]
-            for g in range(groups):
-                for i in range(LANES):
-                    old[m, g, i] += w * values[n, g, i]
-    half = np.float32(0.5)
+            lattice_point = old[corner[n, r]]
+            for c in range(C):
+                lattice_point[c] += w * pixel[c]
     for j in range(d1):
         for m in range(1, len(old)):
-            a, b = near[j, m, 0], near[j, m, 1]
-            for g in range(groups):
-                for i in range(LANES):
-                    new[m, g, i] = old[m, g, i] + half * (old[a, g, i] + old[b, g, i])
+            blurred, centre, one, other = new[m], old[m], old[near[j, m, 0]], old[near[j, m, 1]]
+            for c in range(C):
+                blurred[c] = centre[c] + np.float32(0.5) * (one[c] + other[c])
         old, new = new, old
     for n in range(N):
+        pixel = out[n]
         for r in range(d1):
             w = weights[n, r] * scale[n]
-            m = corner[n, r]
-            for g in range(groups):
-                for i in range(LANES):
-                    out[n, g, i] += w * old[m, g, i]
+            lattice_point = old[corner[n, r]]
+            for c in range(C):
+                pixel[c] += w * lattice_point[c]
 
 
 @njit(cache=True)
-def softmax(z, C, q):
-    """q = softmax of the first C values of each pixel, whatever the group; the rest of q stays 0."""
-    for n in range(len(z)):
-        top = z[n, 0, 0]
+def softmax(z, q):
+    """q = softmax of each row of z."""
+    N, C = z.shape
+    for n in range(N):
+        top = z[n, 0]
         for c in range(1, C):
-            top = max(top, z[n, c // LANES, c % LANES])
+            top = max(top, z[n, c])
         total = np.float32(0.0)
         for c in range(C):
-            e = np.exp(z[n, c // LANES, c % LANES] - top)
-            q[n, c // LANES, c % LANES] = e
-            total += e
+            q[n, c] = np.exp(z[n, c] - top)
+            total += q[n, c]
         for c in range(C):
-            q[n, c // LANES, c % LANES] /= total
+            q[n, c] /= total
