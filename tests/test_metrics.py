@@ -17,7 +17,7 @@ C = 4
 DTYPES = (np.int8, np.uint8, np.int32, np.int64)
 
 
-untimed = settings(deadline=None)  # the first call compiles
+untimed = settings(deadline=None)
 
 
 @st.composite
@@ -240,6 +240,7 @@ def test_the_sum_of_confusion_matrices_is_that_of_all_pixels_together(frames):
 matrices = hnp.arrays(np.int64, st.integers(1, 6).map(lambda c: (c, c)), elements=st.integers(0, 50))
 
 
+@untimed
 @given(matrices)
 def test_iou_cannot_tell_false_positives_from_false_negatives_but_precision_can(n):
     # Mistake 19: swapping truth and prediction transposes n.
@@ -249,6 +250,7 @@ def test_iou_cannot_tell_false_positives_from_false_negatives_but_precision_can(
     np.testing.assert_array_equal(recall, metrics.precision_recall(n.T)[0])
 
 
+@untimed
 @given(matrices)
 def test_precision_and_recall_give_back_the_iou(n):
     precision, recall = metrics.precision_recall(n)
@@ -387,6 +389,7 @@ def test_boundary_iou_names_the_argument_that_is_wrong(name, change):
 # Lift rates
 
 
+@untimed
 @given(st.integers(1, 2000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), st.floats(0.5, 0.999))
 def test_wilson_interval_agrees_with_scipy_and_holds_the_rate(result, confidence):
     low, high = metrics.wilson_interval(*result, confidence)
