@@ -1,0 +1,393 @@
+"""The loops of the grasp planner, compiled by numba; `labkit.grasp` explains the plan and calls them.
+
+Seen from above, a hand that comes straight down is an underside: nothing below the tips under its fingers, a slot
+between them, the palm over it all. It can go down until `height - underside` of what it covers meets the tips, so
+everything here is a map of heights: float64 metres, -inf for an empty cell. A map is turned to a yaw: its columns run
+along a, the direction in which the jaws close, its rows along b, across the pads.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+CELL = 0.004  # edge of a cell, metres
+COLUMNS = 84  # of a map: +-0.168 m, half a palm beside the furthest grip
+ROWS = 39  # +-0.078 m, half the hand's body beside the furthest grip
+REACH = 12  # rows to each side of the target's middle in which grips are tried
+STRIDE = 2  # rows from one try to the next
+BAND = 4  # rows: the best grip of each such band is kept
+STEP = 0.006  # metres between the tip heights that are tried
+SCAN = 8  # cells that an open jaw may stand off the target
+SLOT = 5  # cells: in a narrower gap of the target there is no room for a finger
+LEAST_DEPTH = 0.005  # metres that the tips must reach below the top of what they grip
+SKIN = 0.004  # metres: what lies this close behind the outermost point is touched by the pad too
+WIDE, SHALLOW, FINGERS, PALM = range(4)  # why a grip was dropped, as `search` counts them
+
+
+class Hand(NamedTuple):
+    """The gripper as the kernels need it: metres, margins included; heights are above the tips.
+
+    pad, finger, palm_half, body_half: half widths across. underside: of the finger, one height a cell outwards from its pad.
+    """
+
+    opening: float
+    pad: float
+    finger: float
+    thickness: float
+    underside: np.ndarray
+    palm: float
+    palm_half: float
+    body: float
+    body_half: float
+    palm_reach: float
+
+
+class Grip(NamedTuple):
+    """A grip found on the map: the target's edges along a, and from where to where each pad may start; metres."""
+
+    yaw: float
+    b: float
+    tip: float
+    left_near: float
+    left_far: float
+    right_near: float
+    right_far: float
+
+
+@njit(cache=True)
+def middle_of_area(points):
+    """The middle of what points cover, seen from above: every cell counts once, however many points it has."""
+    x, y = points[:, 0].min(), points[:, 1].min()
+    n = int((points[:, 0].max() - x) / CELL) + 1
+    m = int((points[:, 1].max() - y) / CELL) + 1
+    seen = np.zeros((n, m), np.bool_)
+    sum_x, sum_y, count = 0.0, 0.0, 0
+    for i in range(len(points)):
+        c, r = int((points[i, 0] - x) / CELL), int((points[i, 1] - y) / CELL)
+        if not seen[c, r]:
+            seen[c, r] = True
+            sum_x, sum_y, count = sum_x + c, sum_y + r, count + 1
+    return np.array([x + (sum_x / count + 0.5) * CELL, y + (sum_y / count + 0.5) * CELL])
+
+
+@njit(cache=True)
+def points_near(points, x, y, radius, above):
+    """Keep the points of a square around (x, y) that are higher than `above`."""
+    keep = np.empty(len(points), np.int64)
+    n = 0
+    for i in range(len(points)):
+        if abs(points[i, 0] - x) < radius and abs(points[i, 1] - y) < radius and points[i, 2] > above:
+            keep[n] = i
+            n += 1
+    return points[keep[:n]]
+
+
+@njit(cache=True)
+def hidden_points(scene, x, y, radius, camera, floor):
+    """Bound from above what the camera cannot see: one point (K, 3) a cell without a reading, if higher than `floor`.
+
+    A ray that grazes the top of what is seen passes over the cells behind it; what stood higher there would have been
+    seen. Along a ray tau = (camera height - z) / distance over ground is constant, so the tau of the last cell that was seen is
+    carried on, away from the camera.
+    """
+    n = int(2.0 * radius / CELL)
+    tau = np.full((n, n), np.inf)
+    for i in range(len(scene)):
+        dx, dy = scene[i, 0] - x + radius, scene[i, 1] - y + radius
+        if 0.0 <= dx < n * CELL and 0.0 <= dy < n * CELL:
+            r, c = int(dy / CELL), int(dx / CELL)
+            distance = max(np.sqrt((scene[i, 0] - camera[0]) ** 2 + (scene[i, 1] - camera[1]) ** 2), CELL)
+            tau[r, c] = min(tau[r, c], (camera[2] - scene[i, 2]) / distance)
+    out = np.empty((n * n, 3))
+    count = 0
+    by_rows = abs(camera[1] - y) > abs(camera[0] - x)
+    from_last = camera[1] > y if by_rows else camera[0] > x  # begin on the camera's side
+    for i in range(n):
+        outer = n - 1 - i if from_last else i
+        for inner in range(n):
+            r, c = (outer, inner) if by_rows else (inner, outer)
+            if tau[r, c] < np.inf:
+                continue
+            px, py = x - radius + (c + 0.5) * CELL, y - radius + (r + 0.5) * CELL
+            dx, dy = camera[0] - px, camera[1] - py
+            step = max(abs(dx), abs(dy), CELL)
+            before_r, before_c = int(np.rint(r + dy / step)), int(np.rint(c + dx / step))
+            if 0 <= before_r < n and 0 <= before_c < n:
+                tau[r, c] = tau[before_r, before_c]
+                z = camera[2] - tau[r, c] * np.sqrt(dx**2 + dy**2)
+                if z > floor:
+                    out[count, 0], out[count, 1], out[count, 2] = px, py, z
+                    count += 1
+    return out[:count]
+
+
+@njit(cache=True)
+def fill(heights, points, x, y, cos, sin):
+    """Make a map, turned by a yaw around (x, y): the highest point of each cell."""
+    heights[:] = -np.inf
+    for i in range(len(points)):
+        dx, dy = points[i, 0] - x, points[i, 1] - y
+        c = int(np.floor((dx * cos + dy * sin) / CELL + COLUMNS / 2))
+        r = int(np.floor((dy * cos - dx * sin) / CELL + ROWS / 2))
+        if 0 <= c < COLUMNS and 0 <= r < ROWS and points[i, 2] > heights[r, c]:
+            heights[r, c] = points[i, 2]
+
+
+@njit(cache=True)
+def profile(heights, row, half, out):
+    """Look at a map from the side: for each column the highest cell within `half` metres of the middle of a row."""
+    out[:] = -np.inf
+    n = int(half / CELL + 0.5)
+    for r in range(max(row - n, 0), min(row + n + 1, ROWS)):
+        for c in range(COLUMNS):
+            out[c] = heights[r, c] if heights[r, c] > out[c] else out[c]
+
+
+@njit(cache=True)
+def finger_floor(heights, underside, first, last, left, right):
+    """How low the tips can go with a pad at the left edge of columns first to last: the left finger, and the right one."""
+    first, last = max(first, len(underside)), min(last, COLUMNS - len(underside))
+    left[:], right[:] = np.inf, np.inf  # beyond the map there is no place
+    left[first:last], right[first:last] = -np.inf, -np.inf
+    for k in range(len(underside)):
+        for edge in range(first, last):
+            z = heights[edge - 1 - k] - underside[k]
+            left[edge] = z if z > left[edge] else left[edge]
+            z = heights[edge + k] - underside[k]
+            right[edge] = z if z > right[edge] else right[edge]
+
+
+@njit(cache=True)
+def find_runs(heights, first, last, tip, runs):
+    """Find the stretches of columns higher than the tips, as rows of `runs`: first column, one past the last; how many.
+
+    A gap too narrow for a finger does not end a stretch.
+    """
+    n, gap = 0, SLOT
+    for c in range(first, last):
+        if heights[c] <= tip:
+            gap += 1
+            continue
+        if gap >= SLOT:
+            if n == len(runs):
+                break
+            runs[n, 0] = c
+            n += 1
+        runs[n - 1, 1] = c + 1
+        gap = 0
+    return n
+
+
+@njit(cache=True)
+def free_side(floors, edge, step, tip):
+    """Where may a pad start, from an edge of the target outwards (step -1 or 1)? The nearest place and the furthest."""
+    for near in range(edge, edge + 3 * step, step):
+        if 0 <= near < COLUMNS and floors[near] <= tip:
+            far = near
+            while abs(far + step - edge) <= SCAN and 0 <= far + step < COLUMNS and floors[far + step] <= tip:
+                far += step
+            return near, far
+    return -1, -1
+
+
+@njit(cache=True)
+def end_height(heights, first, last):
+    """The lower of the two ends of a stretch of columns, each the higher of its two outermost ones."""
+    left, right = heights[first], heights[last]
+    if last > first:
+        left, right = max(left, heights[first + 1]), max(right, heights[last - 1])
+    return min(left, right)
+
+
+@njit(cache=True)
+def hand_fits(heights, row, middle, tip, hand):
+    """Is there room for the palm, and for the wider body behind it, with the tips at a height?"""
+    palm_rows, body_rows = int(hand.palm_half / CELL + 0.5), int(hand.body_half / CELL + 0.5)
+    n = int(np.ceil(hand.palm_reach / CELL))
+    for r in range(max(row - body_rows, 0), min(row + body_rows + 1, ROWS)):
+        limit = tip + (hand.palm if abs(r - row) <= palm_rows else hand.body)
+        top = heights[r, middle]
+        for c in range(max(middle - n, 0), min(middle + n + 1, COLUMNS)):
+            top = heights[r, c] if heights[r, c] > top else top
+        if top > limit:
+            return False
+    return True
+
+
+@njit(cache=True)
+def search(target, scene, hidden, centre, yaws, lowest, hand, weights):
+    """Try every yaw, row and tip height, and every pair of edges of the target there; keep the best of each band of rows.
+
+    centre: x, y of the target's middle. lowest: height of the lowest tips. weights: of the shortcomings shallow, wide,
+    offset, tight and shadow. Returns Grips as rows, their rough costs, and counts of what was dropped and why.
+    """
+    x, y = centre
+    bands = (2 * REACH + 1) // BAND + 1
+    best = np.full((len(yaws), bands), np.inf)
+    grips = np.empty((len(yaws), bands, 7))
+    dropped = np.zeros(4, np.int64)
+    maps = np.empty((3, ROWS, COLUMNS), np.float32)
+    lines = np.empty((7, COLUMNS), np.float32)
+    material, around, shadow, left, right, dark_left, dark_right = lines
+    runs = np.empty((4, 2), np.int64)
+    for n, yaw in enumerate(yaws):
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        fill(maps[0], target, x, y, cos, sin)
+        fill(maps[1], scene, x, y, cos, sin)
+        fill(maps[2], hidden, x, y, cos, sin)
+        highest = maps[1].max()
+        for row in range(ROWS // 2 - REACH, ROWS // 2 + REACH + 1, STRIDE):
+            profile(maps[0], row, hand.pad, material)
+            top = material.max()
+            if top <= lowest + LEAST_DEPTH:
+                dropped[SHALLOW] += top > lowest
+                continue
+            begin, stop = 0, COLUMNS
+            while material[begin] <= lowest:
+                begin += 1
+            while material[stop - 1] <= lowest:
+                stop -= 1
+            profile(maps[1], row, hand.finger, around)
+            profile(maps[2], row, hand.finger, shadow)
+            finger_floor(around, hand.underside, begin - SCAN, stop + SCAN + 1, left, right)
+            finger_floor(shadow, hand.underside, begin - SCAN, stop + SCAN + 1, dark_left, dark_right)
+            b = (row - ROWS // 2) * CELL
+            band = (row - ROWS // 2 + REACH) // BAND
+            tip = lowest - STEP
+            while tip + STEP < top - LEAST_DEPTH:
+                tip += STEP
+                for i in range(find_runs(material, begin, stop, tip, runs)):
+                    for j in range(i + 1):
+                        first, last = runs[j, 0], runs[i, 1] - 1
+                        width = (last - first) * CELL  # between the cells' middles
+                        depth = end_height(material, first, last) - tip
+                        if width > hand.opening or depth < LEAST_DEPTH:
+                            dropped[WIDE if width > hand.opening else SHALLOW] += 1
+                            continue
+                        offset = np.sqrt((((first + last + 1) / 2 - COLUMNS / 2) * CELL) ** 2 + b**2)
+                        cost = (
+                            weights[0] * (1.0 - min(depth / 0.02, 1.0))
+                            + weights[1] * width / 0.08
+                            + weights[2] * min(offset / 0.04, 1.0)
+                        )
+                        if cost >= best[n, band]:
+                            continue
+                        left_near, left_far = free_side(left, first, -1, tip)
+                        right_near, right_far = free_side(right, last + 1, 1, tip)
+                        if left_near < 0 or right_near < 0 or (right_near - left_near - 2) * CELL > hand.opening:
+                            dropped[FINGERS] += 1
+                            continue
+                        spare = min(
+                            (first - left_far) * CELL, (right_far - last - 1) * CELL, (hand.opening - width) / 2
+                        )
+                        dark = max(dark_left[left_near], dark_right[right_near]) - tip
+                        cost += weights[3] * (1.0 - min(max(spare, 0.0) / 0.01, 1.0))
+                        cost += weights[4] * min(max(dark, 0.0) / 0.03, 1.0)
+                        if cost >= best[n, band]:
+                            continue
+                        if highest > tip + hand.palm and not hand_fits(
+                            maps[1], row, (first + last + 1) // 2, tip, hand
+                        ):
+                            dropped[PALM] += 1
+                            continue
+                        best[n, band] = cost
+                        grips[n, band, 0], grips[n, band, 1], grips[n, band, 2] = yaw, b, tip
+                        grips[n, band, 3] = (left_near - COLUMNS / 2) * CELL
+                        grips[n, band, 4] = (left_far - COLUMNS / 2) * CELL
+                        grips[n, band, 5] = (right_near - COLUMNS / 2) * CELL
+                        grips[n, band, 6] = (right_far - COLUMNS / 2) * CELL
+    found = best.ravel() < np.inf
+    return grips.reshape(-1, 7)[found], best.ravel()[found], dropped
+
+
+@njit(cache=True)
+def turn(points, x, y, yaw, b, out):
+    """Coordinates of points along and across the jaws, relative to (x, y) and to b."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(len(points)):
+        dx, dy = points[i, 0] - x, points[i, 1] - y
+        out[i, 0], out[i, 1], out[i, 2] = dx * cos + dy * sin, dy * cos - dx * sin - b, points[i, 2]
+
+
+@njit(cache=True)
+def jaws(P, grip, hand, spare, least):
+    """Where to open the jaws around what stands between them: left and right pad, left and right edge of the target.
+
+    P: the target along and across the jaws. Both pads stand off equally, by `spare` if there is room and at least by `least`, else
+    the right pad comes out left of the left one.
+    """
+    start, end = np.inf, -np.inf
+    for a, b, z in P:
+        if abs(b) <= hand.finger and z > grip.tip and grip.left_near - CELL < a < grip.right_near + CELL:
+            start, end = min(start, a), max(end, a)
+    room = min(start - grip.left_far, grip.right_far - end, (hand.opening - (end - start)) / 2)
+    if not room >= least:
+        return 0.0, -1.0, start, end
+    off = min(room, spare)
+    return min(grip.left_near, start - off), max(grip.right_near, end + off), start, end
+
+
+@njit(cache=True)
+def contact(P, tip, half, edge, side):
+    """What a pad meets at an edge of the target (side -1 left, 1 right).
+
+    Returns the length of the patch across the pad, its middle, the height of its top over the tips, and how much the
+    target still rises towards the edge: a face that leans to the camera and ends there has a back that nobody saw.
+    """
+    low, high, top, inner = np.inf, -np.inf, -np.inf, -np.inf
+    for a, b, z in P:
+        depth = (edge - a) * side
+        if abs(b) <= half and z > tip and depth >= 0.0:
+            if depth <= SKIN:
+                low, high, top = min(low, b), max(high, b), max(top, z)
+            elif depth <= 3 * SKIN:
+                inner = max(inner, z)
+    return max(high - low, 0.0), (low + high) / 2, top - tip, top - max(inner, tip)
+
+
+@njit(cache=True)
+def shadow_height(P, tip, half, low, high):
+    """How far unseen things might stand above the tips between two places along the jaws."""
+    z = 0.0
+    for i in range(len(P)):
+        if low < P[i, 0] < high and abs(P[i, 1]) <= half:
+            z = max(z, P[i, 2] - tip)
+    return z
+
+
+@njit(cache=True)
+def measure(grips, target, hidden, centre, hand, spare, least):
+    """Measure grips on the points themselves; a row each: a of the hand, opening, and what `labkit.grasp` scores.
+
+    An opening of 0 says that the grip does not fit after all. All in metres.
+    """
+    x, y = centre
+    out = np.zeros((len(grips), 13))
+    T, H = np.empty_like(target), np.empty_like(hidden)
+    for n in range(len(grips)):
+        g = grips[n]
+        grip = Grip(g[0], g[1], g[2], g[3], g[4], g[5], g[6])
+        turn(target, x, y, grip.yaw, grip.b, T)
+        left, right, start, end = jaws(T, grip, hand, spare, least)
+        if not 0.0 < right - left <= hand.opening:
+            continue
+        turn(hidden, x, y, grip.yaw, grip.b, H)
+        patch_l, middle_l, top_l, rise_l = contact(T, grip.tip, hand.pad, start, -1)
+        patch_r, middle_r, top_r, rise_r = contact(T, grip.tip, hand.pad, end, 1)
+        dark_l = shadow_height(H, grip.tip, hand.finger, left - hand.thickness, left)
+        dark_r = shadow_height(H, grip.tip, hand.finger, right, right + hand.thickness)
+        out[n, 0] = (left + right) / 2
+        out[n, 1] = right - left
+        out[n, 2] = min(top_l, top_r)
+        out[n, 3] = end - start
+        out[n, 4] = min(start - left, right - end)
+        out[n, 5] = np.hypot((start + end) / 2, grip.b)
+        out[n, 6] = (dark_l + dark_r) / 2
+        out[n, 7] = (min(patch_l, 2 * hand.pad) + min(patch_r, 2 * hand.pad)) / 2
+        out[n, 8] = abs(middle_l - middle_r)
+        out[n, 9] = max(min(dark_l, rise_l), min(dark_r, rise_r))
+        out[n, 10] = max(dark_l, dark_r)
+        out[n, 11] = rise_l if dark_l > dark_r else rise_r
+        out[n, 12] = grip.tip
+    return out
