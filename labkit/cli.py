@@ -60,6 +60,60 @@ def train(
     typer.echo(f"{out / f'{model}.pt'}: {last['epoch']} epochs, loss {last['loss']:.3f}{scores}")
 
 
+@app.command()
+def evaluate(
+    scenes: Annotated[int, typer.Option(help="How many scenes; each is one trial.", min=1)] = 100,
+    first_seed: Annotated[int, typer.Option(help="Seed of the first scene; the others follow.", min=0)] = 900_000,
+    config: Annotated[Literal["test", "hard", "train"], typer.Option(help="Which kind of scenes.")] = "test",
+    masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
+        "predicted"
+    ),
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+) -> None:
+    """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
+    from dataclasses import asdict
+    from json import dumps
+
+    from data_gen import sample_scene
+    from labkit.evaluation import run_trials, summarise, table
+    from labkit.files import write_atomically
+    from labkit.network import load_model, weights_path
+
+    weights = None if masks == "truth" else weights_path(model)
+    if weights is not None:
+        load_model(weights)  # so that wrong weights are said before anything is simulated
+    specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
+    report = summarise(run_trials(specs, weights, workers=workers))
+    typer.echo(table(report))
+    if json is not None:
+        write_atomically(json, (dumps(asdict(report), indent=1) + "\n").encode())
+
+
+@app.command()
+def demo(
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
+    ] = None,
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
+) -> None:
+    """Show the whole chain on one random scene: from the camera's image to the object in the air."""
+    import secrets
+
+    from data_gen import sample_scene
+    from labkit import demo as show
+    from labkit.network import load_model, weights_path
+
+    seed = secrets.randbelow(1_000_000) if seed is None else seed
+    typer.echo(f"labkit demo --seed {seed}")
+    story = show.tell(sample_scene(seed, "test"), load_model(weights_path(model)))
+    typer.echo(show.report(story))
+    for path in show.save(story, out):
+        typer.echo(f"wrote {path}")
+
+
 def main() -> None:
     """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
     try:

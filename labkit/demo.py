@@ -21,7 +21,7 @@ from labkit.sim.panda import LiftResult
 from labkit.sim.spec import Camera, SceneSpec
 from labkit.sim.world import TIME_STEP, World
 
-FILM_SIZE = (384, 288)
+FILM_SIZE = (480, 360)
 FILM_RATE = 12  # pictures a second, of simulated time
 
 
@@ -45,10 +45,13 @@ def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240)) -> Story:
         built = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
-        perception = Pipeline(model, spec.table.z).run(frame)
+        pipeline = Pipeline(model, spec.table.z)
+        pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
+        warm = time.perf_counter()
+        perception = pipeline.run(frame)
         true_centroids = {t.name: world.centre(t.name) for t in spec.objects if t.class_id == TARGET}
         film = []
-        camera = Camera.looking_at((0.42, 0.0, spec.table.z + 0.14), 1.45, 0.75, 0.5, fov_y=0.62)
+        camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
 
         def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
             record.steps += 1
@@ -59,7 +62,7 @@ def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240)) -> Story:
         world.observers.append(record)
         before = time.perf_counter()
         result = lift(world, perception)
-        seconds = {"scene": built - start, "render": rendered - built, **perception.seconds}
+        seconds = {"scene": built - start, "render": rendered - built, "warm-up": warm - rendered, **perception.seconds}
         seconds["lift and film"] = time.perf_counter() - before
     return Story(spec, frame, perception, result, film, true_centroids, seconds)
 
@@ -72,6 +75,7 @@ def report(story: Story) -> str:
     found = {
         "scene": f"seed {story.spec.seed}, {counts['target']} target(s) among {counts['obstacle']} obstacles",
         "render": f"{width} x {height} RGB-D image",
+        "warm-up": "a first run, which compiles",
         "network": f"probabilities of {len(CLASSES)} classes a pixel",
         "labels": f"{np.count_nonzero(p.labels == TARGET)} target pixels",
         "back_projection": f"{np.count_nonzero(np.isfinite(p.points[..., 2]))} points in the base frame",
@@ -108,7 +112,9 @@ def nearest(point: np.ndarray, places: dict[str, np.ndarray]) -> tuple[str, floa
 def picture(story: Story) -> Figure:
     """Six panels: what the camera saw, labels, overlay, target cloud, grasp from above, and the arm at the end."""
     figure = Figure(figsize=(13.5, 8.2), layout="constrained", dpi=100)
-    panels = figure.subplot_mosaic([["rgb", "labels", "overlay"], ["cloud", "grasp", "arm"]])
+    panels = figure.subplot_mosaic(
+        [["rgb", "labels", "overlay"], ["cloud", "grasp", "arm"]], per_subplot_kw={"cloud": {"projection": "3d"}}
+    )
     frame, p = story.frame, story.perception
     painted = frame.rgb.copy()
     outlines, _ = cv2.findContours((p.labels == TARGET).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
@@ -136,24 +142,28 @@ def outcome_in_words(story: Story) -> str:
 
 
 def draw_cloud(axes, story: Story) -> None:
-    """The target clouds from the side (x forward, z up), with visible and true centres: they are not the same point."""
-    p = story.perception
-    near = p.scene
-    axes.scatter(near[:, 1], near[:, 2] - story.spec.table.z, s=0.4, color="0.8", rasterized=True)
-    for number, cloud in enumerate(p.clouds):
-        centroid, _ = centroid_and_covariance(cloud)
-        axes.scatter(cloud[:, 1], cloud[:, 2] - story.spec.table.z, s=3, color=PALETTE[TARGET] / 255.0)
-        label = "centroid of the visible points" if number == 0 else None
-        axes.plot(centroid[1], centroid[2] - story.spec.table.z, "k+", ms=13, mew=2, label=label)
-    for number, centre in enumerate(story.true_centroids.values()):
-        label = "true middle of the object" if number == 0 else None
-        axes.plot(centre[1], centre[2] - story.spec.table.z, "x", color="tab:blue", ms=9, mew=2, label=label)
-    axes.set(
-        xlim=(-0.36, 0.36), ylim=(-0.03, 0.2), xlabel="y of the base frame (m)", ylabel="height over the table (m)"
-    )
-    axes.set_aspect("equal", adjustable="datalim")
+    """The points round the targets in their colours, with visible and true centres: they are not the same point."""
+    p, frame, table_z = story.perception, story.frame, story.spec.table.z
+    middle = np.mean(list(story.true_centroids.values()), axis=0)
+    near = (np.abs(p.points[..., :2] - middle[:2]).max(axis=-1) < 0.17) & (p.points[..., 2] > table_z - 0.01)
+    shown = frame.rgb.copy()
+    shown[p.labels == TARGET] = PALETTE[TARGET]
+    axes.scatter(*p.points[near].T, s=2.5, c=shown[near] / 255.0, depthshade=False, rasterized=True)
+    marks = {"visible centroid": ("k+", [centroid_and_covariance(cloud)[0] for cloud in p.clouds])}
+    marks["true middle"] = ("wx", list(story.true_centroids.values()))
+    for label, (style, places) in marks.items():
+        if places:
+            axes.plot(*np.transpose(places), style, ms=10, mew=2, label=label, zorder=10)
+    low, high = middle - 0.17, middle + 0.17
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(table_z, table_z + 0.2))
+    axes.set_box_aspect((1.0, 1.0, 0.59), zoom=1.05)
+    eye = frame.T_base_cam[:3, 3] - middle
+    axes.view_init(elev=28.0, azim=float(np.degrees(np.arctan2(eye[1], eye[0]))) + 25.0)
+    axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    axes.tick_params(labelsize=7)
+    axes.locator_params(nbins=4)
     axes.set_title("4  the target cloud in the robot's frame", loc="left")
-    axes.legend(fontsize=8, loc="upper right")
+    axes.legend(fontsize=8, loc="upper right", facecolor="0.75")
 
 
 def draw_grasp(axes, story: Story) -> None:
@@ -161,7 +171,7 @@ def draw_grasp(axes, story: Story) -> None:
     p, table_z = story.perception, story.spec.table.z
     axes.set_title("5  the grasp, seen from above", loc="left")
     axes.set(xlabel="y of the base frame (m)", ylabel="x of the base frame (m)")
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", adjustable="box")
     middle = p.plan.grasps[0].T_base_grasp[:2, 3] if p.plan.grasps else np.array([0.52, 0.0])
     axes.set(xlim=(middle[1] - 0.16, middle[1] + 0.16), ylim=(middle[0] - 0.12, middle[0] + 0.12))
     raised = p.scene[p.scene[:, 2] > table_z + 0.004]
@@ -196,7 +206,9 @@ def save(story: Story, out: Path) -> list[Path]:
     if story.film:
         paths.append(out / "demo.gif")
         frames = [Image.fromarray(image) for image in story.film]
-        palette = frames[len(frames) // 2].quantize(96)  # one palette for all: the film does not flicker
+        # One palette for all, taken from pictures all over the film, so that it does not flicker.
+        some = np.hstack([story.film[i] for i in np.linspace(0, len(frames) - 1, 5).astype(int)])
+        palette = Image.fromarray(some).quantize(128)
         frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in frames]
         pause = [1000 // FILM_RATE] * (len(frames) - 1) + [1500]
         frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=pause, loop=0, optimize=False)

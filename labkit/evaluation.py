@@ -1,10 +1,13 @@
 """How good is the whole chain? Scores of the masks, and lifts by the simulated arm, over many scenes."""
 
+import multiprocessing
 import time
 from collections import Counter
 from collections.abc import Iterable
-from concurrent.futures import Executor
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -140,22 +143,34 @@ def summarise(trials: Iterable[Trial]) -> Report:
     )
 
 
-def evaluate(
-    specs, model=None, size=(320, 240), executor: Executor | None = None, progress: bool = True
-) -> list[Trial]:
-    """Run a trial a scene, in the order of `specs`; with an executor, `model` is best given as a path."""
+def run_trials(specs, model=None, size: tuple[int, int] = (320, 240), workers: int = 1, progress: bool = True):
+    """Run a trial a scene, in the order of `specs`, in so many processes; a list of Trial.
+
+    With several workers, give `model` as the path of its weights: each worker loads them once.
+    """
     specs = list(specs)
-    if executor is None:
-        results = (run_trial(spec, model, size) for spec in specs)
-    else:
-        results = executor.map(run_trial, specs, [model] * len(specs), [size] * len(specs))
+    pool = (
+        ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_one_thread)
+        if workers > 1
+        else nullcontext()
+    )
     trials, lifts = [], 0
-    with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
-        for trial in bar:
-            trials.append(trial)
-            lifts += trial.lifted
-            bar.set_postfix_str(f"lifted {lifts}/{len(trials)}", refresh=False)
+    with pool as executor:
+        run = partial(run_trial, model=model, size=size)
+        results = executor.map(run, specs) if executor else map(run, specs)
+        with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
+            for trial in bar:
+                trials.append(trial)
+                lifts += trial.lifted
+                bar.set_postfix_str(f"lifted {lifts}/{len(trials)}", refresh=False)
     return trials
+
+
+def _one_thread() -> None:
+    """Workers share the cores among themselves, not each with all threads of PyTorch."""
+    import torch
+
+    torch.set_num_threads(1)
 
 
 def table(report: Report) -> str:

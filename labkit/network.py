@@ -120,6 +120,7 @@ class UNet(nn.Module):
         return self.logits(x)[..., :height, :width]
 
 
+WEIGHTS = Path(__file__).parent / "weights"  # shipped with the kit; MODEL_CARD.md beside them says what they can do
 ARCHITECTURES = {"smallsegnet": SmallSegNet, "unet": UNet}
 
 
@@ -202,6 +203,15 @@ def load_model(path, num_classes: int = len(CLASSES)) -> SmallSegNet | UNet:
     except RuntimeError as error:
         raise ValueError(f"path: the weights in {path} do not fit {architecture}: {error}") from error
     return model.to(memory_format=torch.channels_last).eval()
+
+
+def weights_path(model: str) -> Path:
+    """Where weights are: the kit's own for "unet" and "smallsegnet", else `model` itself as a path.
+
+    >>> weights_path("unet").name, str(weights_path("runs/mine.pt"))
+    ('unet.pt', 'runs/mine.pt')
+    """
+    return WEIGHTS / f"{model}.pt" if model in ARCHITECTURES else Path(model)
 
 
 def predict_logits(model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[torch.Tensor, "C H W"]:

@@ -10,13 +10,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from labkit.augment import augment, random_colour, random_crop, random_flip, random_noise, random_sharpness
 from labkit.frame import RGBDFrame
 from labkit.losses import class_weights, segmentation_loss
 from labkit.metrics import mean_iou
 from labkit.network import SmallSegNet, load_model, predict_probabilities
-from labkit.training import ImagesInMemory, TrainConfig, Trainer, bf16_is_native, choose_device, evaluate, train
+from labkit.training import (
+    ImagesInMemory,
+    TrainConfig,
+    Trainer,
+    bf16_is_native,
+    choose_device,
+    evaluate,
+    train,
+    undo_weights,
+)
 
 CONFIG = TrainConfig(model="smallsegnet", epochs=3, batch=2, lr=3e-3, crop=(12, 16))
 
@@ -350,3 +360,29 @@ def test_bf16_is_used_only_where_it_is_native(monkeypatch, able, native):
     assert bf16_is_native(torch.device("cpu")) is native
     trainer = Trainer(ImagesInMemory(scenes(1), progress=False), CONFIG, torch.device("cpu"))
     assert trainer.bf16 is native
+
+
+class OnePixelRule(nn.Module):
+    """Logits that are the same everywhere: the optimum of a weighted loss when images say nothing."""
+
+    def __init__(self, z):
+        super().__init__()
+        self.logits = nn.Conv2d(3, len(z), 1)
+        self.logits.weight.data.zero_()
+        self.logits.bias.data.copy_(torch.tensor(z))
+
+    def forward(self, x):
+        return self.logits(x)
+
+
+def test_undoing_the_weights_moves_the_weighted_optimum_back():
+    """p = (0.7, 0.3) and weights (1, 9) make the rare class win everywhere; unweighted, the common one does."""
+    rng = np.random.default_rng(0)
+    y = (rng.random((2, 40, 40)) < 0.3).astype(np.uint8)
+    data = ImagesInMemory([(np.zeros((40, 40, 3), np.uint8), labels) for labels in y], 2, progress=False)
+    w = torch.tensor([1.0, 9.0])
+    model = OnePixelRule(torch.log(w * torch.tensor([0.7, 0.3])).tolist())
+    assert evaluate(model, data, 2)[:, 1].sum() == y.size
+    share, n = undo_weights(model, w, data, 2)
+    assert share > 0.5 and n[:, 0].sum() == y.size
+    assert np.array_equal(evaluate(model, data, 2), n)

@@ -1,0 +1,86 @@
+"""Scenes a second, the share of it spent inside PyBullet, two workers against one, and memory."""
+
+import cProfile
+import multiprocessing
+import pstats
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+import data_gen
+from data_gen.dataset import write_frame
+
+SCENES = 40
+FRAMES = 1000  # for the memory
+
+
+def main() -> str:
+    """Rows of a table: each figure, what was measured, and what was to be reached."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_frame(folder, 0, 0, "test", (320, 240), None)  # the first scene of a process reads all models
+        seconds, share = timed_scenes(folder)
+        ratio = one_worker_against_two(folder)
+        generating, loading = memory(folder)
+    rows = [
+        f"| seconds a scene on one core, median | {np.median(seconds):.3f} | 0.4 |",
+        f"| share of it inside PyBullet | {share:.0%} | stated |",
+        f"| scenes a second, 2 workers over 1 | {ratio:.2f} | 1.7 |",
+        f"| peak memory, generating {FRAMES} frames, MB | {generating:.0f} | 1000 |",
+        f"| peak memory, loading {FRAMES} frames, MB | {loading:.0f} | 1000 |",
+    ]
+    return "\n".join(["## Data generation, 320x240", "", "| figure | measured | to reach |", "|---|---|---|", *rows])
+
+
+def timed_scenes(folder: str) -> tuple[list[float], float]:
+    """Seconds of each scene, and the share of PyBullet's own functions in a profile of as many others."""
+    seconds = []
+    for seed in range(1, SCENES + 1):
+        start = time.perf_counter()
+        write_frame(folder, seed, seed, "test", (320, 240), None)
+        seconds.append(time.perf_counter() - start)
+    profile = cProfile.Profile()
+    profile.enable()
+    for seed in range(SCENES, 2 * SCENES):
+        write_frame(folder, seed, seed, "test", (320, 240), None)
+    profile.disable()
+    stats = pstats.Stats(profile).stats
+    inside = sum(row[2] for (_, _, name), row in stats.items() if "pybullet" in name)
+    return seconds, inside / sum(row[2] for row in stats.values())
+
+
+def one_worker_against_two(folder: str) -> float:
+    """How many times as fast two processes write the same scenes as one, the start of processes left out."""
+    rates = {}
+    for workers in (1, 2):
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
+            warm = [executor.submit(data_gen.render, data_gen.sample_scene(s, "test"), (320, 240)) for s in range(6)]
+            [future.result() for future in warm]
+            start = time.perf_counter()
+            out = Path(folder) / f"workers{workers}"
+            data_gen.generate(out, range(SCENES), "test", (320, 240), executor, progress=False)
+            rates[workers] = SCENES / (time.perf_counter() - start)
+    return rates[2] / rates[1]
+
+
+def memory(folder: str) -> tuple[float, float]:
+    """Peak resident megabytes of a fresh process that generates many frames, and of one that loads them."""
+    out = Path(folder) / "many"
+    call = "import resource, data_gen; {}; print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
+    work = (
+        f"data_gen.generate({str(out)!r}, range({FRAMES}), 'test', (320, 240), progress=False)",
+        f"[frame.depth.max() for frame in data_gen.load({str(out)!r})]",
+    )
+    results = [
+        subprocess.run([sys.executable, "-c", call.format(code)], capture_output=True, text=True, check=True)
+        for code in work
+    ]
+    return tuple(float(result.stdout.split()[-1]) for result in results)
+
+
+if __name__ == "__main__":
+    print(main())

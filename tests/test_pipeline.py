@@ -1,0 +1,175 @@
+"""The chain from frame to grasps, judged by the simulator's own poses."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+import data_gen
+from labkit.frame import RGBDFrame
+from labkit.grasp import GraspPlan
+from labkit.labels import OBSTACLE, SURFACE, TARGET, one_hot
+from labkit.network import SmallSegNet
+from labkit.pipeline import Pipeline, class_probabilities, most_probable, segment_rgb_image
+from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
+from labkit.sim.world import World
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Two blocks and a post, seen from the front; the frame and the true middles of the blocks."""
+    block = (Part("box", (0.04, 0.06, 0.04)),)
+    spec = SceneSpec(
+        objects=(
+            ObjectSpec("left", "block", TARGET, (0.5, 0.08, 0.022), parts=block),
+            ObjectSpec("right", "block", TARGET, (0.5, -0.08, 0.022), parts=block),
+            ObjectSpec("post", "post", OBSTACLE, (0.62, 0.0, 0.05), parts=(Part("cylinder", (0.02, 0.09)),)),
+        ),
+        camera=Camera.looking_at((0.52, 0.0, 0.0), 0.7, 0.3, 0.8),
+    )
+    with World(spec) as world:
+        return world.render(), {name: world.centre(name) for name in ("left", "right")}
+
+
+def test_two_targets_are_two_clouds_where_the_objects_are(scene):
+    frame, middles = scene
+    p = Pipeline(np.asarray).run(frame, labels=frame.labels)
+    assert len(p.clouds) == 2
+    for middle in middles.values():
+        distances = [np.linalg.norm(cloud.mean(axis=0) - middle) for cloud in p.clouds]
+        assert min(distances) < 0.03, "the visible side's centroid is within half a block of the block's"
+    assert np.array_equal(p.labels, frame.labels)
+    assert len(p.clouds[0]) + len(p.clouds[1]) <= np.count_nonzero(frame.labels == TARGET)
+
+
+def test_the_best_grasp_closes_across_the_short_side_of_a_target(scene):
+    frame, middles = scene
+    grasp = Pipeline(np.asarray).run(frame, labels=frame.labels).plan.grasps[0]
+    position = grasp.T_base_grasp[:3, 3]
+    assert min(np.linalg.norm(position[:2] - middle[:2]) for middle in middles.values()) < 0.02
+    closing = grasp.T_base_grasp[:3, 1]
+    assert abs(closing[0]) > 0.9, "the blocks are 4 cm along x and 6 cm along y"
+
+
+def test_a_network_or_a_function_of_the_image_may_be_the_model(scene):
+    frame, _ = scene
+    network = SmallSegNet().eval()
+    with torch.no_grad():
+        x = torch.from_numpy(frame.rgb).permute(2, 0, 1)[None] / 255.0
+        expected = network(x)[0].argmax(dim=0).numpy()
+    p = Pipeline(network).run(frame)
+    assert np.mean(p.labels != expected) < 1e-3
+    assert np.allclose(p.probabilities.sum(axis=-1), 1.0, atol=1e-5)
+    q = Pipeline(lambda rgb: class_probabilities(network, rgb)).run(frame)
+    assert np.array_equal(p.labels, q.labels)
+
+
+def test_ones_own_functions_take_the_stages_places(scene):
+    frame, _ = scene
+    calls = []
+
+    def back_project(depth, K, T_base_cam):
+        calls.append("back_project")
+        v, u = np.indices(depth.shape)
+        P = depth[..., None] * (np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(K).T)
+        return P @ T_base_cam[:3, :3].T + T_base_cam[:3, 3]
+
+    def split(P):
+        calls.append("split")
+        return [P[P[:, 1] > 0.0], P[P[:, 1] <= 0.0]]
+
+    def grasp(clouds, scene, table_z, camera_position):
+        calls.append("grasp")
+        return GraspPlan((), f"{len(clouds)} clouds at {table_z}")
+
+    p = Pipeline(np.asarray, 0.0, back_project=back_project, split=split, grasp=grasp).run(frame, frame.labels)
+    assert calls == ["back_project", "split", "grasp"] and p.plan.reason == "2 clouds at 0.0"
+    kit = Pipeline(np.asarray).run(frame, labels=frame.labels)
+    assert np.nanmax(np.abs(p.points - kit.points)) < 1e-5
+
+
+def test_no_target_is_no_grasp_with_a_reason(scene):
+    frame, _ = scene
+    p = Pipeline(np.asarray).run(frame, labels=np.full(frame.labels.shape, SURFACE))
+    assert p.clouds == [] and p.plan.grasps == () and "target" in p.plan.reason
+
+
+def test_pixels_without_depth_become_no_points(scene):
+    frame, _ = scene
+    depth = np.where(frame.labels == TARGET, 0.0, frame.depth).astype(np.float32)
+    depth[:100] = np.nan
+    p = Pipeline(np.asarray).run(dataclasses.replace(frame, depth=depth), labels=frame.labels)
+    assert p.clouds == [] and np.isnan(p.points[:100]).all()
+    assert np.isfinite(p.scene).all()
+
+
+def test_every_stage_is_timed(scene):
+    frame, _ = scene
+    seconds = Pipeline(np.asarray).run(frame, labels=frame.labels).seconds
+    assert list(seconds) == ["network", "labels", "back_projection", "clouds", "grasps"]
+    assert all(value >= 0.0 for value in seconds.values())
+
+
+def test_most_probable_is_argmax():
+    p = np.random.default_rng(0).integers(0, 3, (7, 5, 4)) / 2.0  # with ties
+    assert np.array_equal(most_probable(p), p.argmax(axis=-1))
+
+
+def test_the_channel_order_is_the_callers_word():
+    """The text's function swaps channels whatever it is given; here an RGB image is not swapped."""
+    seen = []
+
+    def model(rgb):
+        seen.append(rgb.copy())
+        return one_hot(np.zeros(rgb.shape[:2], int)).astype(float)
+
+    image = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
+    segment_rgb_image(model, image)
+    segment_rgb_image(model, image[..., ::-1], order="bgr")
+    assert np.array_equal(seen[0], image) and np.array_equal(seen[1], image)
+
+
+class Broken(nn.Module):
+    divisor = 1
+
+    def __init__(self):
+        super().__init__()
+        self.scale = nn.Parameter(torch.tensor(float("nan")))
+
+    def forward(self, x):
+        return self.scale * x.repeat(1, 2, 1, 1)[:, :4]
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda f: Pipeline("unet"), "model"),
+        (lambda f: Pipeline(np.asarray, table_z=float("nan")), "table_z"),
+        (lambda f: Pipeline(np.asarray, target_class=4), "target_class"),
+        (lambda f: Pipeline(np.asarray).run(f, labels=np.zeros((3, 3), int)), "labels"),
+        (lambda f: Pipeline(np.asarray).run(f, labels=np.full(f.labels.shape, 9)), "labels"),
+        (lambda f: Pipeline(lambda rgb: rgb[:5]).run(f), "probabilities"),
+        (lambda f: Pipeline(Broken()).run(f), "probabilities"),
+        (lambda f: segment_rgb_image(np.asarray, f.rgb, order="hsv"), "order"),
+        (lambda f: segment_rgb_image(np.asarray, f.rgb / 255.0), "image"),
+    ],
+)
+def test_wrong_arguments_are_named(call, name, scene):
+    with pytest.raises(ValueError, match=rf"^{name}:"):
+        call(scene[0])
+
+
+def test_a_tiny_image_is_fine():
+    frame = RGBDFrame(np.zeros((1, 1, 3), np.uint8), np.ones((1, 1), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+    p = Pipeline(SmallSegNet().eval()).run(frame)
+    assert p.labels.shape == (1, 1)
+
+
+def test_a_dataset_feeds_the_pipeline(tmp_path):
+    data_gen.generate(tmp_path / "d", [3], "test", (80, 60), progress=False)
+    frame = data_gen.load(tmp_path / "d")[0]
+    p = Pipeline(np.asarray, data_gen.sample_scene(3, "test").table.z).run(frame, labels=frame.labels)
+    assert p.points.shape == (60, 80, 3)
