@@ -69,6 +69,7 @@ def evaluate(
         "predicted"
     ),
     model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")] = False,
     json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
 ) -> None:
@@ -85,7 +86,7 @@ def evaluate(
     if weights is not None:
         load_model(weights)  # so that wrong weights are said before anything is simulated
     specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
-    report = summarise(run_trials(specs, weights, workers=workers))
+    report = summarise(run_trials(specs, weights, crf=crf, workers=workers))
     typer.echo(table(report))
     if json is not None:
         write_atomically(json, (dumps(asdict(report), indent=1) + "\n").encode())
@@ -97,6 +98,7 @@ def demo(
         int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
     ] = None,
     model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's mask with the CRF.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
 ) -> None:
     """Show the whole chain on one random scene: from the camera's image to the object in the air."""
@@ -108,7 +110,7 @@ def demo(
 
     seed = secrets.randbelow(1_000_000) if seed is None else seed
     typer.echo(f"labkit demo --seed {seed}")
-    story = show.tell(sample_scene(seed, "test"), load_model(weights_path(model)))
+    story = show.tell(sample_scene(seed, "test"), load_model(weights_path(model)), crf=crf)
     typer.echo(show.report(story))
     for path in show.save(story, out):
         typer.echo(f"wrote {path}")

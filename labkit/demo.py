@@ -38,14 +38,14 @@ class Story:
     seconds: dict[str, float]
 
 
-def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240)) -> Story:
+def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool = False) -> Story:
     """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
     start = time.perf_counter()
     with World(spec) as world:
         built = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
-        pipeline = Pipeline(model, spec.table.z)
+        pipeline = Pipeline(model, spec.table.z, crf=crf)
         pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
         warm = time.perf_counter()
         perception = pipeline.run(frame)
@@ -78,6 +78,7 @@ def report(story: Story) -> str:
         "warm-up": "a first run, which compiles",
         "network": f"probabilities of {len(CLASSES)} classes a pixel",
         "labels": f"{np.count_nonzero(p.labels == TARGET)} target pixels",
+        "crf": "labels refined along edges of colour and depth",
         "back_projection": f"{np.count_nonzero(np.isfinite(p.points[..., 2]))} points in the base frame",
         "clouds": f"{len(p.clouds)} target cloud(s) of {', '.join(str(len(c)) for c in p.clouds) or 'no'} points",
         "grasps": f"{len(p.plan.grasps)} candidates" if p.plan.grasps else f"none: {p.plan.reason}",

@@ -34,11 +34,12 @@ class Trial:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
-def run_trial(spec, model=None, size: tuple[int, int] = (320, 240)) -> Trial:
+def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = False) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
-    spec: a SceneSpec. model: network or path of its weights; None for true masks. No reachable candidate is a failure,
-    and so is lifting anything but a target. Only the score reads the simulator's truth.
+    spec: a SceneSpec. model: network or path of its weights; None for true masks. crf: refine the network's labels. No
+    reachable candidate is a failure, and so is lifting anything but a target. Only the score reads the simulator's
+    truth.
     """
     from labkit.sim.world import World  # PyBullet stays out of this module's import
 
@@ -48,7 +49,7 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240)) -> Trial:
         start = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
-        perception = perceive(frame, model, spec.table.z)
+        perception = perceive(frame, model, spec.table.z, crf)
         before = time.perf_counter()
         result = lift(world, perception)
         seconds = {
@@ -68,11 +69,11 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240)) -> Trial:
     )
 
 
-def perceive(frame: RGBDFrame, model, table_z: float):
+def perceive(frame: RGBDFrame, model, table_z: float, crf: bool = False):
     """Run the pipeline on a frame with a network, or with the frame's own labels if `model` is None."""
     if model is None:
         return Pipeline(lambda rgb: rgb, table_z).run(frame, labels=frame.labels)
-    return Pipeline(model, table_z).run(frame)
+    return Pipeline(model, table_z, crf=crf).run(frame)
 
 
 def lift(world, perception):
@@ -143,8 +144,10 @@ def summarise(trials: Iterable[Trial]) -> Report:
     )
 
 
-def run_trials(specs, model=None, size: tuple[int, int] = (320, 240), workers: int = 1, progress: bool = True):
-    """Run a trial a scene, in the order of `specs`, in so many processes; a list of Trial.
+def run_trials(
+    specs, model=None, size: tuple[int, int] = (320, 240), crf: bool = False, workers: int = 1, progress: bool = True
+) -> list[Trial]:
+    """Run a trial a scene, in the order of `specs`, in so many processes.
 
     With several workers, give `model` as the path of its weights: each worker loads them once.
     """
@@ -156,7 +159,7 @@ def run_trials(specs, model=None, size: tuple[int, int] = (320, 240), workers: i
     )
     trials, lifts = [], 0
     with pool as executor:
-        run = partial(run_trial, model=model, size=size)
+        run = partial(run_trial, model=model, size=size, crf=crf)
         results = executor.map(run, specs) if executor else map(run, specs)
         with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
             for trial in bar:

@@ -43,6 +43,7 @@ class Pipeline:
 
     model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
     (H, W, C). table_z: height of the calibrated table plane in the base frame, metres. target_class: what to grasp.
+    crf: True refines the labels with the kit's CRF; or a function (probabilities, frame) -> labels (H, W).
     back_project: function (depth, K, T_base_cam) -> (H, W, 3); split: function of the target's points to a list of
     clouds; grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan. The defaults are the kit's; each
     may be replaced by one's own, as the labs do. Raises ValueError for an argument that does not fit. Sections 1 to 5.
@@ -62,6 +63,7 @@ class Pipeline:
         table_z: float = 0.0,
         target_class: int = TARGET,
         *,
+        crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] = False,
         back_project: Callable = back_project_to_base,
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
         grasp: Callable[..., GraspPlan] = plan_grasps,
@@ -75,6 +77,7 @@ class Pipeline:
         self.model = model
         self.table_z = float(table_z)
         self.target_class = target_class
+        self.crf = refine_labels if crf is True else crf
         self.back_project = back_project
         self.split = split or separate_objects
         self.grasp = grasp
@@ -91,6 +94,9 @@ class Pipeline:
                 probabilities = one_hot(labels).astype(np.float32)
         with _timed(seconds, "labels"):
             labels = most_probable(probabilities)
+        if self.crf:
+            with _timed(seconds, "crf"):
+                labels = self.crf(probabilities, frame)
         with _timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
         with _timed(seconds, "clouds"):
@@ -149,6 +155,13 @@ def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray
         labels[better] = c
         np.maximum(best, probabilities[..., c], out=best)
     return labels
+
+
+def refine_labels(probabilities: Float[np.ndarray, "H W C"], frame: RGBDFrame) -> UInt8[np.ndarray, "H W"]:
+    """Labels that are smooth except at edges of colour or depth: the CRF of section 2 on top of a network."""
+    from labkit.crf import refine  # numba: loaded only where it is wanted
+
+    return refine(probabilities, frame.rgb, frame.depth).labels
 
 
 def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Float[np.ndarray, "_ 3"]]:

@@ -112,6 +112,19 @@ def test_every_stage_is_timed(scene):
     assert all(value >= 0.0 for value in seconds.values())
 
 
+def test_the_crf_removes_speckles_and_may_be_ones_own(scene):
+    frame, _ = scene
+    clean = 0.9 * one_hot(frame.labels) + 0.025
+    speckled = clean.copy()
+    speckled[::9, ::9] = 0.25  # no opinion
+    speckled[::9, ::9, OBSTACLE] = 0.4
+    p = Pipeline(lambda rgb: speckled, crf=True).run(frame)
+    assert np.mean(p.labels != frame.labels) < 0.2 * np.mean(most_probable(speckled) != frame.labels)
+    assert "crf" in p.seconds
+    q = Pipeline(lambda rgb: speckled, crf=lambda probabilities, frame: frame.labels).run(frame)
+    assert np.array_equal(q.labels, frame.labels)
+
+
 def test_most_probable_is_argmax():
     p = np.random.default_rng(0).integers(0, 3, (7, 5, 4)) / 2.0  # with ties
     assert np.array_equal(most_probable(p), p.argmax(axis=-1))

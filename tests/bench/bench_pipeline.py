@@ -34,7 +34,7 @@ def main() -> str:
             "|---|---|---|",
             *rows,
             "",
-            f"{len(three)} scenes, true masks, {np.median(candidates):.0f} ranked grasps in the median. To reach: 5 ms.",
+            f"{len(three)} scenes, true masks, a median of {np.median(candidates):.0f} ranked grasps. To reach: 5 ms.",
         ]
     )
 
