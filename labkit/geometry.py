@@ -107,7 +107,8 @@ def project(
     P_cam, K = _check_points("P_cam", P_cam), check_K("K", K)
     x, y, z = np.moveaxis(P_cam.astype(np.float64, copy=False), -1, 0)
     z = np.where(z > 0.0, z, np.nan)
-    return (K[0, 0] * x + K[0, 1] * y) / z + K[0, 2], K[1, 1] * y / z + K[1, 2]
+    u, v = (K[0, 0] * x + K[0, 1] * y) / z + K[0, 2], K[1, 1] * y / z + K[1, 2]
+    return np.asarray(u), np.asarray(v)  # of a single point too, which NumPy would make plain numbers
 
 
 @lru_cache(maxsize=4)  # a few cameras: each entry takes 12 bytes a pixel. Its lock makes it safe to share by threads.

@@ -150,6 +150,12 @@ def test_what_is_not_in_front_of_the_camera_has_no_pixel():
     assert (u[3], v[3]) == (K[0, 2], K[1, 2])
 
 
+def test_a_single_point_has_a_single_pixel():
+    u, v = project(np.array([0.2, -0.1, 0.5]), K)
+    assert u.shape == v.shape == ()
+    np.testing.assert_allclose(0.5 * np.linalg.solve(K, [u, v, 1.0]), [0.2, -0.1, 0.5], atol=1e-12)
+
+
 # ------------------------------------------------------------------------------------------------------ the mask
 
 
