@@ -228,13 +228,20 @@ def predict_logits(model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[t
         return model(x)[0, :, : rgb.shape[0], : rgb.shape[1]].float()
 
 
-def predict_probabilities(model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[np.ndarray, "H W C"]:
+def predict_probabilities(
+    model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = False
+) -> Float[np.ndarray, "H W C"]:
     """Give each pixel's class probabilities, float32, the softmax of the network's logits (section 3 of the text).
 
-    `model` is in eval mode. Raises ValueError if `rgb` is no RGB image.
+    mirror: average them with those of the mirrored image, mirrored back: two opinions, of twice the price, whose
+    errors differ. `model` is in eval mode. Raises ValueError if `rgb` is no RGB image.
 
     >>> predict_probabilities(SmallSegNet().eval(), np.zeros((5, 7, 3), np.uint8)).shape
     (5, 7, 4)
     """
     with torch.inference_mode():
-        return F.softmax(predict_logits(model, rgb).permute(1, 2, 0), dim=-1).cpu().numpy()
+        p = F.softmax(predict_logits(model, rgb).permute(1, 2, 0), dim=-1)
+        if mirror:
+            mirrored = predict_logits(model, np.ascontiguousarray(rgb[:, ::-1]))
+            p = 0.5 * (p + F.softmax(mirrored.permute(1, 2, 0), dim=-1).flip(1))
+        return p.cpu().numpy()

@@ -43,6 +43,7 @@ class Pipeline:
 
     model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
     (H, W, C). table_z: height of the calibrated table plane in the base frame, metres. target_class: what to grasp.
+    mirror: let a network look at the image and at its mirror image, and average: better, at twice the time.
     crf: True refines the labels with the kit's CRF; or a function (probabilities, frame) -> labels (H, W).
     back_project: function (depth, K, T_base_cam) -> (H, W, 3); split: function of the target's points to a list of
     clouds; grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan. The defaults are the kit's; each
@@ -63,6 +64,7 @@ class Pipeline:
         table_z: float = 0.0,
         target_class: int = TARGET,
         *,
+        mirror: bool = True,
         crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] = False,
         back_project: Callable = back_project_to_base,
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
@@ -77,6 +79,7 @@ class Pipeline:
         self.model = model
         self.table_z = float(table_z)
         self.target_class = target_class
+        self.mirror = mirror
         self.crf = refine_labels if crf is True else crf
         self.back_project = back_project
         self.split = split or separate_objects
@@ -87,7 +90,7 @@ class Pipeline:
         seconds = {}
         with _timed(seconds, "network"):
             if labels is None:
-                probabilities = class_probabilities(self.model, frame.rgb)
+                probabilities = class_probabilities(self.model, frame.rgb, self.mirror)
             else:
                 labels = check_shape("labels", check_labels("labels", labels, len(CLASSES)), (None, None))
                 check_same_size("frame.rgb", frame.rgb, "labels", labels)
@@ -123,16 +126,16 @@ def _timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[np.ndarray, "H W C"]:
+def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = False) -> Float[np.ndarray, "H W C"]:
     """Class probabilities of an RGB image from a network or from a function; checks that they are some.
 
-    Raises ValueError if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
+    mirror: as in `labkit.network.predict_probabilities`; a function decides for itself. Raises ValueError if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
     """
     torch = sys.modules.get("torch")  # heavy: a pipeline around a plain function does without it
     if torch is not None and isinstance(model, torch.nn.Module):
         from labkit.network import predict_probabilities
 
-        p = predict_probabilities(model, rgb)
+        p = predict_probabilities(model, rgb, mirror)
     else:
         p = np.asarray(model(check_rgb("rgb", rgb)))
     p = check_shape("probabilities", p, (*rgb.shape[:2], None))

@@ -59,11 +59,20 @@ def test_a_network_or_a_function_of_the_image_may_be_the_model(scene):
     with torch.no_grad():
         x = torch.from_numpy(frame.rgb).permute(2, 0, 1)[None] / 255.0
         expected = network(x)[0].argmax(dim=0).numpy()
-    p = Pipeline(network).run(frame)
+    p = Pipeline(network, mirror=False).run(frame)
     assert np.mean(p.labels != expected) < 1e-3
     assert np.allclose(p.probabilities.sum(axis=-1), 1.0, atol=1e-5)
     q = Pipeline(lambda rgb: class_probabilities(network, rgb)).run(frame)
     assert np.array_equal(p.labels, q.labels)
+
+
+def test_two_opinions_do_not_depend_on_which_way_the_image_is_turned(scene):
+    frame, _ = scene
+    network = SmallSegNet().eval()
+    p = class_probabilities(network, frame.rgb, mirror=True)
+    q = class_probabilities(network, np.ascontiguousarray(frame.rgb[:, ::-1]), mirror=True)
+    assert np.allclose(p, q[:, ::-1], atol=1e-5)
+    assert np.allclose(p.sum(axis=-1), 1.0, atol=1e-5)
 
 
 def test_ones_own_functions_take_the_stages_places(scene):
