@@ -242,6 +242,6 @@ def predict_probabilities(
     with torch.inference_mode():
         p = F.softmax(predict_logits(model, rgb).permute(1, 2, 0), dim=-1)
         if mirror:
-            mirrored = predict_logits(model, np.ascontiguousarray(rgb[:, ::-1]))
+            mirrored = predict_logits(model, rgb[:, ::-1].copy())
             p = 0.5 * (p + F.softmax(mirrored.permute(1, 2, 0), dim=-1).flip(1))
         return p.cpu().numpy()

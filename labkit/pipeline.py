@@ -129,7 +129,8 @@ def _timed(seconds: dict[str, float], stage: str):
 def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = False) -> Float[np.ndarray, "H W C"]:
     """Class probabilities of an RGB image from a network or from a function; checks that they are some.
 
-    mirror: as in `labkit.network.predict_probabilities`; a function decides for itself. Raises ValueError if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
+    mirror: as in `labkit.network.predict_probabilities`; a function decides for itself. Raises ValueError
+    if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
     """
     torch = sys.modules.get("torch")  # heavy: a pipeline around a plain function does without it
     if torch is not None and isinstance(model, torch.nn.Module):

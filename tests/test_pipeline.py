@@ -44,13 +44,14 @@ def test_two_targets_are_two_clouds_where_the_objects_are(scene):
     assert len(p.clouds[0]) + len(p.clouds[1]) <= np.count_nonzero(frame.labels == TARGET)
 
 
-def test_the_best_grasp_closes_across_the_short_side_of_a_target(scene):
+def test_the_best_grasp_closes_square_on_a_target(scene):
     frame, middles = scene
     grasp = Pipeline(np.asarray).run(frame, labels=frame.labels).plan.grasps[0]
     position = grasp.T_base_grasp[:3, 3]
     assert min(np.linalg.norm(position[:2] - middle[:2]) for middle in middles.values()) < 0.02
-    closing = grasp.T_base_grasp[:3, 1]
-    assert abs(closing[0]) > 0.9, "the blocks are 4 cm along x and 6 cm along y"
+    closing = np.abs(grasp.T_base_grasp[:3, 1])
+    assert max(closing[:2]) > 0.99, "the blocks stand square to the base frame"
+    assert [0.04, 0.06][int(closing.argmax())] < grasp.width <= 0.08, "open wider than the block is there"
 
 
 def test_a_network_or_a_function_of_the_image_may_be_the_model(scene):
@@ -125,7 +126,7 @@ def test_the_crf_removes_speckles_and_may_be_ones_own(scene):
     frame, _ = scene
     clean = 0.9 * one_hot(frame.labels) + 0.025
     speckled = clean.copy()
-    speckled[::9, ::9] = 0.25  # no opinion
+    speckled[::9, ::9] = 0.2  # hardly an opinion
     speckled[::9, ::9, OBSTACLE] = 0.4
     p = Pipeline(lambda rgb: speckled, crf=True).run(frame)
     assert np.mean(p.labels != frame.labels) < 0.2 * np.mean(most_probable(speckled) != frame.labels)
