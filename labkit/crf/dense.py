@@ -76,7 +76,7 @@ class GaussianFilter:
         elevated, least, largest = lattice.elevate(
             features.reshape(-1, d).astype(np.float32), elevation(d).astype(np.float32)
         )
-        margin = 3 * (d + 1)
+        margin = 3 * (d + 1)  # corners and their neighbours stay within it
         lowest = np.floor(least).astype(np.int64) - margin
         size = np.ceil(largest).astype(np.int64) + margin - lowest
         if np.prod(size[:d].astype(np.float64)) > 2.0**62:
@@ -100,7 +100,7 @@ class GaussianFilter:
         lattice_filter(values, scale, self.corner, self.weights, self.near, out)
 
 
-def elevation(d: int) -> Float[np.ndarray, "d+1 d"]:
+def elevation(d: int) -> Float[np.ndarray, "d1 d"]:
     """Return the map from d features to the plane sum(x) = 0 in d + 1 dimensions on which the lattice lies.
 
     Its columns are orthogonal; its scale makes splatting, blurring and slicing together a Gaussian of deviation 1.

@@ -16,7 +16,7 @@ from labkit.crf.energy import PottsCRF, pair_slices
 WEIGHT_BITS = {np.int32: 26, np.int64: 36}
 # The mean unary cost is worth at least 2^12 integer steps, or else the integers are made wider.
 ENOUGH_BITS = 12
-# Rounding errors of the float64 sums, relative to their terms: 30 additions in a row, 2^-53 each, with room.
+# Rounding errors of float64 sums relative to their terms: 2^-53 for each of some 50 additions in a row, with room.
 ROUNDING = 2.0**-44
 
 
@@ -69,8 +69,8 @@ def quantise(crf: PottsCRF) -> IntegerPotts:
 def integer_scale(excess: Float[np.ndarray, "H W C"], weights: Float[np.ndarray, "D H W"], offsets: tuple):
     """Choose the dtype of the integers and what a cost of 1 becomes: a power of two, as large as the dtype allows."""
     largest = weights.max()
-    if largest == 0.0:  # the pixels are independent, and any order of their costs will do
-        return np.int32, float(1.0 / np.min(excess, where=excess > 1e-300, initial=1.0))
+    if largest == 0.0:  # the pixels are independent: a class is the cheapest, or it costs at least one step
+        return np.int32, float(2.0 / np.min(excess, where=excess > 1e-300, initial=1.0))
     typical = np.minimum(excess, incident_sum(weights, offsets)[..., None]).mean()
     for dtype, bits in WEIGHT_BITS.items():  # noqa: B007 (the one it stops at is returned)
         scale = float(2.0 ** min(np.floor(bits - np.log2(largest)), 1000.0))

@@ -41,15 +41,16 @@ def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapRes
     weights = np.stack([skewed(w[..., None], slant)[:, 0] for w in integer.weights])
     messages = np.zeros((len(hop), *unary.shape), unary.dtype)
     best = MapResult(crf.unary.argmin(axis=2).astype(np.uint8), np.inf)
+    proven = 0  # no integer cost is negative
     for iteration in range(1, iterations + 1):
-        trws_sweep(unary, weights, messages, hop, shift, ahead, slant, W, True)
-        bound = trws_sweep(unary, weights, messages, hop, shift, behind, slant, W, False)
+        proven = max(proven, trws_sweep(unary, weights, messages, hop, shift, ahead, slant, W, True))
+        proven = max(proven, trws_sweep(unary, weights, messages, hop, shift, behind, slant, W, False))
         if iteration % LABEL_EVERY == 0 or iteration == iterations:
             labels = trws_labels(unary, weights, messages, hop, slant, W)
             energy = crf.energy(labels)
             if energy > best.energy:
                 labels, energy = best.labels, best.energy
-            best = MapResult(labels, energy, integer.lower_bound(bound, energy), iteration)
+            best = MapResult(labels, energy, integer.lower_bound(proven, energy), iteration)
             if best.gap <= tolerance:
                 break
     return best
@@ -58,8 +59,7 @@ def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapRes
 def icm(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None, iterations: int = 100) -> MapResult:
     """Iterated conditional modes: change single pixels while that lowers the energy, from the unary one or `labels`.
 
-    iterations counts sweeps over the image. A local minimum only: it is the baseline for the others, and the finish
-    after them, because it works on the float64 energy.
+    iterations counts sweeps over the image. A local minimum only: the baseline for the others.
     """
     from labkit.crf.message_kernels import icm_sweep
 
