@@ -53,7 +53,7 @@ clean:
 
 # .venv/installing is there while an installation runs and becomes .venv/installed when it ends. One that was killed
 # leaves `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
-# A changed pyproject.toml or constraints.txt only adds and removes the difference.
+# A changed pyproject.toml or constraints.txt only installs the difference.
 .venv/installed: pyproject.toml constraints.txt
 	@python=""; \
 	for candidate in $(or $(PYTHON),python3.11 python3 python); do \
