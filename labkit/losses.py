@@ -15,7 +15,8 @@ from labkit.validation import check_finite, check_shape
 if TYPE_CHECKING:
     import torch
 
-SCHEMES = ("none", "inverse", "sqrt")
+# Each scheme of class weights by its exponent of the class's number of pixels.
+SCHEMES = {"none": 0.0, "inverse": -1.0, "sqrt": -0.5}
 
 
 def softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
@@ -93,10 +94,9 @@ def class_weights(counts: Num[np.ndarray, " C"], scheme: str) -> Float64[np.ndar
         raise ValueError("counts: expected at least one pixel of some class, got none")
     if scheme not in SCHEMES:
         raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")
-    exponent = {"none": 0.0, "inverse": -1.0, "sqrt": -0.5}[scheme]
     present = counts > 0
     w = np.ones(counts.size)
-    w[present] = counts[present] ** exponent
+    w[present] = counts[present] ** SCHEMES[scheme]
     w[present] *= counts.sum() / (counts @ w)
     return w
 
@@ -113,8 +113,14 @@ def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -
     array([0.5, 0.5])
     """
     p = check_finite("p", p).astype(np.float64)
-    if p.ndim < 1 or (p.size and p.min() < 0.0) or not np.allclose(p.sum(axis=-1), 1.0, rtol=0.0, atol=1e-5):
-        raise ValueError("p: expected probabilities of at least 0 that sum to 1 over the last axis")
+    if p.ndim < 1 or p.shape[-1] < 1:
+        raise ValueError(f"p: expected probabilities (..., C) of at least one class, got shape {p.shape}")
+    off = np.abs(p.sum(axis=-1) - 1.0).max(initial=0.0)
+    if p.min(initial=0.0) < 0.0 or off > 1e-5:
+        raise ValueError(
+            f"p: expected probabilities of at least 0 that sum to 1 over the last axis, "
+            f"got a minimum of {p.min():.3g} and a sum that is off by {off:.3g}"
+        )
     weighted = _check_weights("w", w, p.shape[-1]) * p
     return weighted / weighted.sum(axis=-1, keepdims=True)
 
@@ -135,21 +141,25 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
     import torch  # here, so that the NumPy half of this module does not wait for it
     from torch.nn.functional import cross_entropy
 
-    if logits.ndim != 4 or labels.shape != (logits.shape[0], *logits.shape[2:]):
-        raise ValueError(
-            f"labels: expected (N, H, W) to logits (N, C, H, W), got {tuple(labels.shape)} to {tuple(logits.shape)}"
-        )
+    if logits.ndim != 4:
+        raise ValueError(f"logits: expected shape (N, C, H, W), got {tuple(logits.shape)}")
+    image_shape = (logits.shape[0], *logits.shape[2:])
+    if labels.shape != image_shape:
+        raise ValueError(f"labels: expected the shape (N, H, W) of logits, {image_shape}, got {tuple(labels.shape)}")
     if labels.is_floating_point() or labels.is_complex() or labels.dtype == torch.bool:
         raise ValueError(f"labels: expected integers, got {labels.dtype}")
     num_classes = logits.shape[1]
     labels = labels.long()
     counted = labels != IGNORE
-    if (counted & ((labels < 0) | (labels >= num_classes))).any():
-        raise ValueError(f"labels: expected 0 to {num_classes - 1} or {IGNORE}, got others too")
+    wrong = counted & ((labels < 0) | (labels >= num_classes))
+    if wrong.any():
+        values = labels[wrong].unique()[:5].tolist()
+        raise ValueError(f"labels: expected labels 0 to {num_classes - 1} or {IGNORE}, got {values}")
     logits = logits if logits.dtype == torch.float64 else logits.float()
     # One sum finds any NaN or infinity; at an ignored pixel it would spare the loss and spoil the gradient.
     if not torch.isfinite(logits.detach().sum()):
-        raise ValueError("logits: expected finite numbers, got NaN or infinity; has the training diverged?")
+        bad = logits.numel() - torch.isfinite(logits).sum().item()
+        raise ValueError(f"logits: expected finite numbers, got {bad} NaN or infinite; has the training diverged?")
     if weights is not None:
         array = torch.as_tensor(weights, dtype=torch.float64, device="cpu").detach().numpy()
         weights = torch.from_numpy(_check_weights("weights", array, num_classes)).to(logits)

@@ -253,7 +253,7 @@ counts = hnp.arrays(np.int64, st.integers(1, 6), elements=st.integers(0, 10**6))
 
 
 @untimed
-@given(counts, st.sampled_from(losses.SCHEMES))
+@given(counts, st.sampled_from(list(losses.SCHEMES)))
 def test_the_mean_weight_of_the_counted_pixels_is_one(n, scheme):
     w = losses.class_weights(n, scheme)
     assert (w > 0).all() and np.isfinite(w).all()
@@ -311,9 +311,9 @@ def test_gradient_descent_on_the_weighted_loss_ends_at_the_weighted_optimum():
     often = np.array([70, 24, 1, 5])
     y = np.repeat(np.arange(4), often)
     z = np.zeros(4)
-    for _ in range(3000):
+    for _ in range(200):
         everywhere = np.broadcast_to(z, (100, 4))
-        z = z - 0.003 * losses.cross_entropy_grad(everywhere, y, WEIGHTS).sum(axis=0)
+        z = z - 0.02 * losses.cross_entropy_grad(everywhere, y, WEIGHTS).sum(axis=0)
     q = losses.weighted_optimum(often / 100, WEIGHTS)
     np.testing.assert_allclose(losses.softmax(z), q, atol=1e-10)
     assert np.abs(q - often / 100).max() > 0.1  # which is not where the data are
@@ -477,7 +477,7 @@ def test_a_batch_of_ignored_pixels_trains_nothing():
     [
         ("logits", {"logits": torch.full((1, 4, 2, 3), torch.nan)}),
         ("logits", {"logits": torch.full((1, 4, 2, 3), torch.inf)}),
-        ("labels", {"logits": torch.zeros(4, 2, 3)}),
+        ("logits", {"logits": torch.zeros(4, 2, 3)}),
         ("labels", {"labels": torch.zeros((1, 3, 2), dtype=torch.int64)}),
         ("labels", {"labels": torch.zeros((1, 2, 3))}),
         ("labels", {"labels": torch.zeros((1, 2, 3), dtype=torch.bool)}),
