@@ -160,10 +160,10 @@ def draw_cloud(axes, story: Story) -> None:
     axes.set_box_aspect((1.0, 1.0, 0.59), zoom=1.05)
     eye = frame.T_base_cam[:3, 3] - middle
     axes.view_init(elev=28.0, azim=float(np.degrees(np.arctan2(eye[1], eye[0]))) + 25.0)
-    axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.tick_params(labelsize=7)
     axes.locator_params(nbins=4)
-    axes.set_title("4  the target cloud in the robot's frame", loc="left")
+    axes.set_title("4  the target cloud in the robot's frame, z up", loc="left")
     axes.legend(fontsize=8, loc="upper right", facecolor="0.75")
 
 
