@@ -146,7 +146,7 @@ def inverse_kinematics(
 def _wrist_out_of_reach(T_base_grasp) -> bool:
     """Whether joint 6, wherever joint 7 turns it on its circle about the hand's axis, is too far from the shoulder."""
     circle = (T_base_grasp @ np.array([0.0, 0.0, -FLANGE - HAND_TO_GRASP, 1.0]))[:3] - (0.0, 0.0, D[0])
-    return np.linalg.norm(circle) > np.hypot(D[2], A[3]) + np.hypot(D[4], A[3]) + A[6]
+    return bool(np.linalg.norm(circle) > np.hypot(D[2], A[3]) + np.hypot(D[4], A[3]) + A[6])
 
 
 def _damped_least_squares(T, q: Float[np.ndarray, "starts 7"], iterations: int = 60) -> Float[np.ndarray, "7"] | None:

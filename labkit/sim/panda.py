@@ -201,9 +201,8 @@ class Panda:
 
     def _follow(self, path: Float[np.ndarray, "N 7"], line_speed: float = np.inf) -> bool:
         """Send the motors along a path, from rest to rest; stop and say False where something holds the arm up."""
-        positions, velocities = trajectory(path, TIME_STEP, line_speed)
-        for q, velocity in zip(positions, velocities, strict=True):
-            self._step(q, velocity)
+        for q in trajectory(path, TIME_STEP, line_speed):
+            self._step(q)
             if np.abs(self.q - q).max() > BLOCKED:
                 self._target = self.q
                 self._wait(SETTLE_SECONDS)
@@ -222,14 +221,14 @@ class Panda:
     def _wait(self, seconds: float) -> None:
         """Stand still."""
         for _ in range(round(seconds / TIME_STEP)):
-            self._step(self._target, np.zeros(7))
+            self._step(self._target)
 
     def _close(self) -> None:
         """Close the jaws until they have met something, or each other."""
         self._gripping = True
         still = 0
         for _ in range(round(CLOSING_SECONDS / TIME_STEP)):
-            self._step(self._target, np.zeros(7))
+            self._step(self._target)
             moving = np.abs(self._joint_state(FINGER_JOINTS, 1)).max() > STALLED
             still = 0 if moving else still + 1
             if still == STALLED_STEPS:
@@ -241,15 +240,15 @@ class Panda:
         self._opening = min(self.opening + LETTING_GO, 2 * FINGER_MAX)
         self._wait((self._opening - self.opening) / 2 / FINGER_SPEED + 0.1)
 
-    def _step(self, q: Float[np.ndarray, "7"], velocity: Float[np.ndarray, "7"]) -> None:
-        """One step of the simulation with the motors' targets for it; forces are limited to the URDF's efforts."""
+    def _step(self, q: Float[np.ndarray, "7"]) -> None:
+        """One step of the simulation, at whose end the arm is to be at q; forces are limited to the URDF's efforts."""
         client, robot = self.world.client, self.world.robot
         client.setJointMotorControlArray(
             robot,
             ARM_JOINTS,
             pybullet.POSITION_CONTROL,
-            targetPositions=q,
-            targetVelocities=velocity,
+            targetPositions=self._target,  # where the arm should be now; the velocity then takes it to q
+            targetVelocities=(q - self._target) / TIME_STEP,
             forces=MAX_EFFORT,
             positionGains=[POSITION_GAIN] * 7,
             velocityGains=[1.0] * 7,

@@ -173,15 +173,15 @@ def straight_joints(q_from: Float[np.ndarray, "7"], q_to: Float[np.ndarray, "7"]
 
 def trajectory(
     path: Float[np.ndarray, "N 7"], time_step: float, line_speed: float = np.inf
-) -> tuple[Float[np.ndarray, "K 7"], Float[np.ndarray, "K 7"]]:
-    """Joint angles (rad) and velocities (rad/s) at each time step along a path, from rest to rest.
+) -> Float[np.ndarray, "K 7"]:
+    """Joint angles (rad) after each time step along a path, from rest to rest.
 
     Speed grows evenly, stays, and falls evenly, so that no joint exceeds 0.8 of its velocity limit and the grasp point
     stays below line_speed, m/s.
 
-    >>> q, velocity = trajectory(np.array([np.zeros(7), np.ones(7)]), 1 / 240)
-    >>> q.shape == velocity.shape, bool(velocity.max() <= 0.8 * 2.175)
-    (True, True)
+    >>> q = trajectory(np.array([np.zeros(7), np.ones(7)]), 1 / 240)
+    >>> bool(np.diff(q, axis=0).max() * 240 <= 0.8 * 2.175)
+    True
     """
     position = forward_kinematics(path)[:, :3, 3]
     at_joint_limit = (np.abs(np.diff(path, axis=0)) / (SPEED_SHARE * MAX_VELOCITY)).max(axis=1)
@@ -192,5 +192,4 @@ def trajectory(
     t = time_step * np.arange(1, int(np.ceil(seconds / time_step)) + 1)
     speed = np.clip(np.minimum(t, seconds - t + time_step) / RAMP, 0.0, 1.0)
     now = np.cumsum(speed) * clock[-1] / speed.sum()
-    q = np.stack([np.interp(now, clock, joint) for joint in path.T], axis=1)
-    return q, np.diff(q, axis=0, prepend=path[:1]) / time_step
+    return np.stack([np.interp(now, clock, joint) for joint in path.T], axis=1)
