@@ -9,8 +9,8 @@ import sys
 
 if sys.version_info[:2] != (3, 11):
     raise ImportError(
-        f"labkit needs Python 3.11, this is {sys.version_info[0]}.{sys.version_info[1]}: PyBullet and other packages that "
-        "it is pinned to have wheels for no other (`make` sets up .venv with the right one)"
+        f"labkit needs Python 3.11, this is {sys.version_info[0]}.{sys.version_info[1]}: PyBullet and other packages "
+        "that it is pinned to have wheels for no other (`make` sets up .venv with the right one)"
     )
 
 __version__ = "0.1.0"
