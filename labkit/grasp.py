@@ -2,9 +2,9 @@
 
 The text ends with a centroid and a covariance, "heuristic top-down grasps aligned with principal directions"; that
 is `principal_axis_grasp`. `plan_grasps` starts there and looks around first: it turns the hand through many yaws, lets
-it down beside every part of the target, and keeps what fits between the points of the scene, above the table, and as far as
-possible outside the shadows that the camera could not look into. Nothing but points, the camera's position,
-the table's height and the gripper's measures goes in.
+it down beside every part of the target, and keeps what fits between the points of the scene, above the table, and as
+far as possible outside the shadows that the camera could not look into. Nothing but points, the camera's position, the
+table's height and the gripper's measures goes in.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,7 @@ from labkit.geometry import centroid_and_covariance
 from labkit.validation import check_finite, check_shape
 
 TIP_CLEARANCE = 0.004  # metres of air between the tips and the table
-FINGER_MARGIN = 0.0015  # metres around the fingers, and
-HAND_MARGIN = 0.004  # around the palm, that must be free
+FINGER_MARGIN, HAND_MARGIN = 0.0015, 0.004  # metres around fingers and palm that must be free
 SPARE, LEAST = 0.010, 0.002  # metres beside the target: what an open jaw should leave, and the least
 FAN = 12  # yaws tried besides those of the target's axes
 RADIUS = 0.17  # metres around a target in which the scene matters
@@ -29,10 +28,10 @@ RANKED = 10  # grasps of a target that are reported
 # What makes a grip bad, and how bad at worst. Each shortcoming is 0 (none) to 1; `_score` says of what.
 WEIGHTS = {
     "shallow": 1.0,
-    "wide": 0.2,
+    "wide": 0.4,
     "tight": 0.5,
     "offset": 0.6,
-    "shadow": 0.5,
+    "shadow": 1.0,
     "short": 0.3,
     "skew": 0.5,
     "unseen": 0.5,
@@ -99,15 +98,15 @@ def plan_grasps(
     """Rank top-down grasps of one or several targets among everything that the camera saw.
 
     targets: a cloud each. scene: the points of targets, table and obstacles. table_z: height of the table.
-    camera_position: where the camera stands; without it nothing is known of shadows. Metres, base frame. No candidate is
-    a reason in words, not an error. Raises ValueError for an argument that is not finite or of another shape.
+    camera_position: where the camera stands; without it nothing is known of shadows. Metres, base frame. No candidate
+    is a reason in words, not an error. Raises ValueError for an argument that is not finite or of another shape.
     Sections 4 and 5 of the text.
 
     >>> x, y, z = np.meshgrid(np.arange(0.48, 0.521, 0.002), np.arange(-0.01, 0.011, 0.002), np.arange(0, 0.031, 0.002))
     >>> box = np.stack([x, y, z], axis=-1).reshape(-1, 3)  # 4 cm long in x, 2 cm wide in y
     >>> grasp = plan_grasps([box], box, table_z=0.0).grasps[0]
-    >>> grasp.T_base_grasp[:3, 3].round(3), abs(grasp.T_base_grasp[:3, 1]).round(3)
-    (array([0.5  , 0.   , 0.011]), array([0., 1., 0.]))
+    >>> grasp.T_base_grasp[:3, 3].round(2), abs(grasp.T_base_grasp[:3, 1]).round(3)
+    (array([0.5 , 0.  , 0.01]), array([0., 1., 0.]))
     >>> plan_grasps([], box, table_z=0.0).reason
     'no target points'
     """
@@ -139,8 +138,8 @@ def top_down_grasp(
 ) -> Grasp:
     """Give the best grasp of one cloud; where the planner finds none, the one of its principal axis, with score 0.
 
-    scene: what else is there, default nothing; table_z: default the cloud's lowest point. Raises ValueError for an empty
-    cloud, which has no centroid. Section 4 of the text.
+    scene: what else is there, default nothing; table_z: default the cloud's lowest point. Raises ValueError for an
+    empty cloud, which has no centroid. Section 4 of the text.
 
     >>> stick = np.array([[0.5, 0.001 * i, 0.05] for i in range(100)])
     >>> T = top_down_grasp(stick, table_z=0.03).T_base_grasp
@@ -159,8 +158,8 @@ def principal_axis_grasp(
 ) -> Grasp:
     """Grasp as the text suggests: at the centroid, closing across the longer principal direction seen from above.
 
-    The jaws start fully open, the tips end as low as palm and table (if its height is given) let them. Nobody looks what
-    is in the way, so the score is 0. Raises ValueError for an empty cloud. Section 4 of the text.
+    The jaws start fully open, the tips end as low as palm and table (if its height is given) let them. Nobody looks
+    what is in the way, so the score is 0. Raises ValueError for an empty cloud. Section 4 of the text.
     """
     cloud = _cloud("cloud", cloud)
     mu, _ = centroid_and_covariance(cloud)
@@ -177,7 +176,8 @@ def _cloud(name: str, points) -> Float[np.ndarray, "N 3"]:
 
 def _principal_yaw(P: Float[np.ndarray, "N 3"]) -> float:
     """Direction in which a cloud is longest, seen from above; radians from x."""
-    _, C = centroid_and_covariance(P)
+    centred = P[:, :2] - P[:, :2].mean(axis=0)
+    C = centred.T @ centred
     return 0.5 * np.arctan2(2.0 * C[0, 1], C[0, 0] - C[1, 1])
 
 
@@ -204,10 +204,11 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
         return "the target is too flat: nothing of it is higher than the lowest tips"
     hand = _hand(gripper, kernels)
     centre = kernels.middle_of_area(target)
-    near = kernels.points_near(scene, *centre, RADIUS, lowest)
+    around = kernels.points_near(scene, *centre, RADIUS)
+    near = around[around[:, 2] > lowest]
     hidden = np.zeros((0, 3))
     if camera_position is not None:
-        hidden = kernels.hidden_points(scene, *centre, RADIUS, camera_position, lowest)
+        hidden = kernels.hidden_points(around, *centre, RADIUS, camera_position, lowest)
     grips, costs, dropped = kernels.search(target, near, hidden, centre, _yaws(target), lowest, hand, ROUGH)
     if len(grips) == 0:
         return _why_none(dropped, kernels)
@@ -236,7 +237,7 @@ def _hand(gripper: Gripper, kernels):
         pad=gripper.pad_width / 2,
         finger=gripper.finger_width / 2 + FINGER_MARGIN,
         thickness=gripper.tip_thickness,
-        underside=np.clip(underside, 0.0, gripper.root_above_tips),
+        underside=np.clip(underside, 0.0, gripper.root_above_tips).astype(np.float32),
         palm=gripper.palm_above_tips - HAND_MARGIN,
         palm_half=gripper.palm_width / 2 + HAND_MARGIN,
         body=gripper.body_above_tips - HAND_MARGIN,
@@ -260,7 +261,7 @@ def _score(measures: Float[np.ndarray, "n _"]) -> Float[np.ndarray, "n"]:
         width / 0.08,
         1.0 - clearance / SPARE,
         offset / 0.04,
-        shadow / 0.03,
+        shadow / 0.02,
         1.0 - patch / 0.016,
         skew / 0.0087,
         unseen / 0.01,
@@ -270,10 +271,10 @@ def _score(measures: Float[np.ndarray, "n _"]) -> Float[np.ndarray, "n"]:
 
 
 def _why_none(dropped, kernels) -> str:
-    """In words what the most promising candidates failed at."""
+    """In words: what the candidates that came furthest, else most of them, failed at."""
     if dropped[kernels.PALM]:
         return "no room for the palm: something beside the target is too high"
-    if dropped[kernels.FINGERS]:
+    if dropped[kernels.FINGERS] > dropped[kernels.WIDE]:
         return "no room for the fingers beside the target"
     if dropped[kernels.WIDE]:
         return "too wide for the gripper in every direction"

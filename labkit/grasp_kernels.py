@@ -28,7 +28,8 @@ WIDE, SHALLOW, FINGERS, PALM = range(4)  # why a grip was dropped, as `search` c
 class Hand(NamedTuple):
     """The gripper as the kernels need it: metres, margins included; heights are above the tips.
 
-    pad, finger, palm_half, body_half: half widths across. underside: of the finger, one height a cell outwards from its pad.
+    pad, finger, palm_half, body_half: half widths across. underside: of a finger, one height a cell outwards from its
+    pad, float32.
     """
 
     opening: float
@@ -72,12 +73,12 @@ def middle_of_area(points):
 
 
 @njit(cache=True)
-def points_near(points, x, y, radius, above):
-    """Keep the points of a square around (x, y) that are higher than `above`."""
+def points_near(points, x, y, radius):
+    """Keep the points of a square around (x, y)."""
     keep = np.empty(len(points), np.int64)
     n = 0
     for i in range(len(points)):
-        if abs(points[i, 0] - x) < radius and abs(points[i, 1] - y) < radius and points[i, 2] > above:
+        if abs(points[i, 0] - x) < radius and abs(points[i, 1] - y) < radius:
             keep[n] = i
             n += 1
     return points[keep[:n]]
@@ -88,8 +89,8 @@ def hidden_points(scene, x, y, radius, camera, floor):
     """Bound from above what the camera cannot see: one point (K, 3) a cell without a reading, if higher than `floor`.
 
     A ray that grazes the top of what is seen passes over the cells behind it; what stood higher there would have been
-    seen. Along a ray tau = (camera height - z) / distance over ground is constant, so the tau of the last cell that was seen is
-    carried on, away from the camera.
+    seen. So walk from the cell towards the camera to the first one that was seen, and use that along a ray
+    tau = (camera height - z) / distance over ground stays the same.
     """
     n = int(2.0 * radius / CELL)
     tau = np.full((n, n), np.inf)
@@ -101,24 +102,22 @@ def hidden_points(scene, x, y, radius, camera, floor):
             tau[r, c] = min(tau[r, c], (camera[2] - scene[i, 2]) / distance)
     out = np.empty((n * n, 3))
     count = 0
-    by_rows = abs(camera[1] - y) > abs(camera[0] - x)
-    from_last = camera[1] > y if by_rows else camera[0] > x  # begin on the camera's side
-    for i in range(n):
-        outer = n - 1 - i if from_last else i
-        for inner in range(n):
-            r, c = (outer, inner) if by_rows else (inner, outer)
+    for r in range(n):
+        for c in range(n):
             if tau[r, c] < np.inf:
                 continue
             px, py = x - radius + (c + 0.5) * CELL, y - radius + (r + 0.5) * CELL
             dx, dy = camera[0] - px, camera[1] - py
             step = max(abs(dx), abs(dy), CELL)
-            before_r, before_c = int(np.rint(r + dy / step)), int(np.rint(c + dx / step))
-            if 0 <= before_r < n and 0 <= before_c < n:
-                tau[r, c] = tau[before_r, before_c]
-                z = camera[2] - tau[r, c] * np.sqrt(dx**2 + dy**2)
-                if z > floor:
-                    out[count, 0], out[count, 1], out[count, 2] = px, py, z
-                    count += 1
+            grazed = np.inf
+            u, v = c + 0.5, r + 0.5
+            while grazed == np.inf and 0.0 <= u < n and 0.0 <= v < n:
+                grazed = tau[int(v), int(u)]
+                u, v = u + dx / step, v + dy / step
+            z = camera[2] - grazed * np.sqrt(dx**2 + dy**2)
+            if z > floor:
+                out[count, 0], out[count, 1], out[count, 2] = px, py, z
+                count += 1
     return out[:count]
 
 
@@ -128,27 +127,25 @@ def fill(heights, points, x, y, cos, sin):
     heights[:] = -np.inf
     for i in range(len(points)):
         dx, dy = points[i, 0] - x, points[i, 1] - y
-        c = int(np.floor((dx * cos + dy * sin) / CELL + COLUMNS / 2))
-        r = int(np.floor((dy * cos - dx * sin) / CELL + ROWS / 2))
-        if 0 <= c < COLUMNS and 0 <= r < ROWS and points[i, 2] > heights[r, c]:
-            heights[r, c] = points[i, 2]
+        u, v = (dx * cos + dy * sin) / CELL + COLUMNS / 2, (dy * cos - dx * sin) / CELL + ROWS / 2
+        if 0.0 <= u < COLUMNS and 0.0 <= v < ROWS:
+            heights[int(v), int(u)] = max(heights[int(v), int(u)], points[i, 2])
 
 
 @njit(cache=True)
-def profile(heights, row, half, out):
-    """Look at a map from the side: for each column the highest cell within `half` metres of the middle of a row."""
+def profile(heights, row, half, first, last, out):
+    """Look at columns first to last of a map from the side: the highest cell within `half` metres of a row's middle."""
     out[:] = -np.inf
     n = int(half / CELL + 0.5)
     for r in range(max(row - n, 0), min(row + n + 1, ROWS)):
-        for c in range(COLUMNS):
+        for c in range(first, last):
             out[c] = heights[r, c] if heights[r, c] > out[c] else out[c]
 
 
 @njit(cache=True)
 def finger_floor(heights, underside, first, last, left, right):
-    """How low the tips can go with a pad at the left edge of columns first to last: the left finger, and the right one."""
-    first, last = max(first, len(underside)), min(last, COLUMNS - len(underside))
-    left[:], right[:] = np.inf, np.inf  # beyond the map there is no place
+    """How low the tips can go with a pad at the left edge of columns first to last: left finger, right finger."""
+    left[:], right[:] = np.inf, np.inf  # beyond these there is no place
     left[first:last], right[first:last] = -np.inf, -np.inf
     for k in range(len(underside)):
         for edge in range(first, last):
@@ -204,7 +201,7 @@ def end_height(heights, first, last):
 def hand_fits(heights, row, middle, tip, hand):
     """Is there room for the palm, and for the wider body behind it, with the tips at a height?"""
     palm_rows, body_rows = int(hand.palm_half / CELL + 0.5), int(hand.body_half / CELL + 0.5)
-    n = int(np.ceil(hand.palm_reach / CELL))
+    n = int(np.ceil(hand.palm_reach / CELL)) + 1  # the jaws need not open evenly around the middle
     for r in range(max(row - body_rows, 0), min(row + body_rows + 1, ROWS)):
         limit = tip + (hand.palm if abs(r - row) <= palm_rows else hand.body)
         top = heights[r, middle]
@@ -217,88 +214,102 @@ def hand_fits(heights, row, middle, tip, hand):
 
 @njit(cache=True)
 def search(target, scene, hidden, centre, yaws, lowest, hand, weights):
-    """Try every yaw, row and tip height, and every pair of edges of the target there; keep the best of each band of rows.
+    """Try every yaw, row and tip height, and every pair of edges of the target there; keep the best of each few rows.
 
     centre: x, y of the target's middle. lowest: height of the lowest tips. weights: of the shortcomings shallow, wide,
     offset, tight and shadow. Returns Grips as rows, their rough costs, and counts of what was dropped and why.
     """
     x, y = centre
-    bands = (2 * REACH + 1) // BAND + 1
-    best = np.full((len(yaws), bands), np.inf)
+    bands = 2 * REACH // BAND + 1
+    costs = np.full((len(yaws), bands), np.inf)
     grips = np.empty((len(yaws), bands, 7))
     dropped = np.zeros(4, np.int64)
     maps = np.empty((3, ROWS, COLUMNS), np.float32)
     lines = np.empty((7, COLUMNS), np.float32)
-    material, around, shadow, left, right, dark_left, dark_right = lines
-    runs = np.empty((4, 2), np.int64)
+    highest = scene[:, 2].max() if len(scene) else -np.inf
     for n, yaw in enumerate(yaws):
         cos, sin = np.cos(yaw), np.sin(yaw)
         fill(maps[0], target, x, y, cos, sin)
         fill(maps[1], scene, x, y, cos, sin)
         fill(maps[2], hidden, x, y, cos, sin)
-        highest = maps[1].max()
         for row in range(ROWS // 2 - REACH, ROWS // 2 + REACH + 1, STRIDE):
-            profile(maps[0], row, hand.pad, material)
-            top = material.max()
-            if top <= lowest + LEAST_DEPTH:
-                dropped[SHALLOW] += top > lowest
-                continue
-            begin, stop = 0, COLUMNS
-            while material[begin] <= lowest:
-                begin += 1
-            while material[stop - 1] <= lowest:
-                stop -= 1
-            profile(maps[1], row, hand.finger, around)
-            profile(maps[2], row, hand.finger, shadow)
-            finger_floor(around, hand.underside, begin - SCAN, stop + SCAN + 1, left, right)
-            finger_floor(shadow, hand.underside, begin - SCAN, stop + SCAN + 1, dark_left, dark_right)
-            b = (row - ROWS // 2) * CELL
             band = (row - ROWS // 2 + REACH) // BAND
-            tip = lowest - STEP
-            while tip + STEP < top - LEAST_DEPTH:
-                tip += STEP
-                for i in range(find_runs(material, begin, stop, tip, runs)):
-                    for j in range(i + 1):
-                        first, last = runs[j, 0], runs[i, 1] - 1
-                        width = (last - first) * CELL  # between the cells' middles
-                        depth = end_height(material, first, last) - tip
-                        if width > hand.opening or depth < LEAST_DEPTH:
-                            dropped[WIDE if width > hand.opening else SHALLOW] += 1
-                            continue
-                        offset = np.sqrt((((first + last + 1) / 2 - COLUMNS / 2) * CELL) ** 2 + b**2)
-                        cost = (
-                            weights[0] * (1.0 - min(depth / 0.02, 1.0))
-                            + weights[1] * width / 0.08
-                            + weights[2] * min(offset / 0.04, 1.0)
-                        )
-                        if cost >= best[n, band]:
-                            continue
-                        left_near, left_far = free_side(left, first, -1, tip)
-                        right_near, right_far = free_side(right, last + 1, 1, tip)
-                        if left_near < 0 or right_near < 0 or (right_near - left_near - 2) * CELL > hand.opening:
-                            dropped[FINGERS] += 1
-                            continue
-                        spare = min(
-                            (first - left_far) * CELL, (right_far - last - 1) * CELL, (hand.opening - width) / 2
-                        )
-                        dark = max(dark_left[left_near], dark_right[right_near]) - tip
-                        cost += weights[3] * (1.0 - min(max(spare, 0.0) / 0.01, 1.0))
-                        cost += weights[4] * min(max(dark, 0.0) / 0.03, 1.0)
-                        if cost >= best[n, band]:
-                            continue
-                        if highest > tip + hand.palm and not hand_fits(
-                            maps[1], row, (first + last + 1) // 2, tip, hand
-                        ):
-                            dropped[PALM] += 1
-                            continue
-                        best[n, band] = cost
-                        grips[n, band, 0], grips[n, band, 1], grips[n, band, 2] = yaw, b, tip
-                        grips[n, band, 3] = (left_near - COLUMNS / 2) * CELL
-                        grips[n, band, 4] = (left_far - COLUMNS / 2) * CELL
-                        grips[n, band, 5] = (right_near - COLUMNS / 2) * CELL
-                        grips[n, band, 6] = (right_far - COLUMNS / 2) * CELL
-    found = best.ravel() < np.inf
-    return grips.reshape(-1, 7)[found], best.ravel()[found], dropped
+            cost, grip = search_row(maps, lines, row, lowest, highest, hand, weights, costs[n, band], dropped)
+            if cost < costs[n, band]:
+                costs[n, band] = cost
+                grips[n, band, 0], grips[n, band, 1] = yaw, (row - ROWS // 2) * CELL
+                for i in range(5):
+                    grips[n, band, 2 + i] = grip[i]
+    found = costs.ravel() < np.inf
+    return grips.reshape(-1, 7)[found], costs.ravel()[found], dropped
+
+
+@njit(cache=True)
+def search_row(maps, lines, row, lowest, highest, hand, weights, best, dropped):
+    """Find the best grip of one row that costs less than `best`: its cost, and tip, left and right places of a Grip."""
+    material, around, shadow, left, right, dark_left, dark_right = lines
+    grip = (0.0, 0.0, 0.0, 0.0, 0.0)
+    profile(maps[0], row, hand.pad, 0, COLUMNS, material)
+    top = material.max()
+    if top <= lowest + LEAST_DEPTH:
+        dropped[SHALLOW] += top > lowest
+        return np.inf, grip
+    begin, stop = 0, COLUMNS
+    while material[begin] <= lowest:
+        begin += 1
+    while material[stop - 1] <= lowest:
+        stop -= 1
+    thick = len(hand.underside)
+    first, last = max(begin - SCAN, thick), min(stop + SCAN + 1, COLUMNS - thick)
+    profile(maps[1], row, hand.finger, first - thick, last + thick, around)
+    profile(maps[2], row, hand.finger, first - thick, last + thick, shadow)
+    finger_floor(around, hand.underside, first, last, left, right)
+    finger_floor(shadow, hand.underside, first, last, dark_left, dark_right)
+    runs = np.empty((4, 2), np.int64)
+    b = (row - ROWS // 2) * CELL
+    tip = lowest - STEP
+    while tip + STEP < top - LEAST_DEPTH:
+        tip += STEP
+        for i in range(find_runs(material, begin, stop, tip, runs)):
+            for j in range(i + 1):
+                first, last = runs[j, 0], runs[i, 1] - 1
+                width = (last - first) * CELL  # between the cells' middles
+                depth = end_height(material, first, last) - tip
+                if width > hand.opening or depth < LEAST_DEPTH:
+                    dropped[WIDE if width > hand.opening else SHALLOW] += 1
+                    continue
+                offset = np.sqrt((((first + last + 1) / 2 - COLUMNS / 2) * CELL) ** 2 + b**2)
+                cost = weights[0] * lack(depth, 0.02) + weights[1] * width / 0.08 + weights[2] * min(offset / 0.04, 1.0)
+                if cost >= best:
+                    continue
+                left_near, left_far = free_side(left, first, -1, tip)
+                right_near, right_far = free_side(right, last + 1, 1, tip)
+                if left_near < 0 or right_near < 0 or (right_near - left_near - 2) * CELL > hand.opening:
+                    dropped[FINGERS] += 1
+                    continue
+                spare = min(min(first - left_far, right_far - last - 1) * CELL, (hand.opening - width) / 2)
+                dark = max(dark_left[left_near], dark_right[right_near]) - tip
+                cost += weights[3] * lack(spare, 0.01) + weights[4] * (1.0 - lack(dark, 0.03))
+                if cost >= best:
+                    continue
+                if highest > tip + hand.palm and not hand_fits(maps[1], row, (first + last + 1) // 2, tip, hand):
+                    dropped[PALM] += 1
+                    continue
+                best = cost
+                grip = (tip, place(left_near), place(left_far), place(right_near), place(right_far))
+    return best, grip
+
+
+@njit(cache=True)
+def lack(value, enough):
+    """How much of `enough` is missing: 0 none, 1 all."""
+    return 1.0 - min(max(value, 0.0) / enough, 1.0)
+
+
+@njit(cache=True)
+def place(column):
+    """Where the left edge of a column lies along the jaws, metres."""
+    return (column - COLUMNS / 2) * CELL
 
 
 @njit(cache=True)
@@ -314,8 +325,8 @@ def turn(points, x, y, yaw, b, out):
 def jaws(P, grip, hand, spare, least):
     """Where to open the jaws around what stands between them: left and right pad, left and right edge of the target.
 
-    P: the target along and across the jaws. Both pads stand off equally, by `spare` if there is room and at least by `least`, else
-    the right pad comes out left of the left one.
+    P: the target along and across the jaws. Both pads stand off equally, by `spare` if there is room; without room for
+    `least` the right pad comes out left of the left one.
     """
     start, end = np.inf, -np.inf
     for a, b, z in P:
@@ -343,16 +354,18 @@ def contact(P, tip, half, edge, side):
                 low, high, top = min(low, b), max(high, b), max(top, z)
             elif depth <= 3 * SKIN:
                 inner = max(inner, z)
-    return max(high - low, 0.0), (low + high) / 2, top - tip, top - max(inner, tip)
+    if high < low:  # what reaches out furthest passes beside the pad
+        return 0.0, float(side), 0.0, 0.0
+    return high - low, (low + high) / 2, top - tip, top - max(inner, tip)
 
 
 @njit(cache=True)
-def shadow_height(P, tip, half, low, high):
-    """How far unseen things might stand above the tips between two places along the jaws."""
+def shadow_height(P, height, half, low, high):
+    """How far unseen things might stand above a height, between two places along the jaws."""
     z = 0.0
     for i in range(len(P)):
         if low < P[i, 0] < high and abs(P[i, 1]) <= half:
-            z = max(z, P[i, 2] - tip)
+            z = max(z, P[i, 2] - height)
     return z
 
 
@@ -363,7 +376,7 @@ def measure(grips, target, hidden, centre, hand, spare, least):
     An opening of 0 says that the grip does not fit after all. All in metres.
     """
     x, y = centre
-    out = np.zeros((len(grips), 13))
+    out = np.zeros((len(grips), 10))
     T, H = np.empty_like(target), np.empty_like(hidden)
     for n in range(len(grips)):
         g = grips[n]
@@ -373,21 +386,21 @@ def measure(grips, target, hidden, centre, hand, spare, least):
         if not 0.0 < right - left <= hand.opening:
             continue
         turn(hidden, x, y, grip.yaw, grip.b, H)
-        patch_l, middle_l, top_l, rise_l = contact(T, grip.tip, hand.pad, start, -1)
-        patch_r, middle_r, top_r, rise_r = contact(T, grip.tip, hand.pad, end, 1)
-        dark_l = shadow_height(H, grip.tip, hand.finger, left - hand.thickness, left)
-        dark_r = shadow_height(H, grip.tip, hand.finger, right, right + hand.thickness)
-        out[n, 0] = (left + right) / 2
+        patch_left, middle_left, top_left, rise_left = contact(T, grip.tip, hand.pad, start, -1)
+        patch_right, middle_right, top_right, rise_right = contact(T, grip.tip, hand.pad, end, 1)
+        dark_left = shadow_height(H, grip.tip, hand.finger, left - hand.thickness, left)
+        dark_right = shadow_height(H, grip.tip, hand.finger, right, right + hand.thickness)
+        middle = (left + right) / 2
+        palm = (middle - hand.palm_reach, middle + hand.palm_reach)
+        dark_palm = shadow_height(H, grip.tip + hand.palm, hand.palm_half, palm[0], palm[1])
+        out[n, 0] = middle
         out[n, 1] = right - left
-        out[n, 2] = min(top_l, top_r)
-        out[n, 3] = end - start
-        out[n, 4] = min(start - left, right - end)
-        out[n, 5] = np.hypot((start + end) / 2, grip.b)
-        out[n, 6] = (dark_l + dark_r) / 2
-        out[n, 7] = (min(patch_l, 2 * hand.pad) + min(patch_r, 2 * hand.pad)) / 2
-        out[n, 8] = abs(middle_l - middle_r)
-        out[n, 9] = max(min(dark_l, rise_l), min(dark_r, rise_r))
-        out[n, 10] = max(dark_l, dark_r)
-        out[n, 11] = rise_l if dark_l > dark_r else rise_r
-        out[n, 12] = grip.tip
+        out[n, 2] = min(top_left, top_right)  # depth
+        out[n, 3] = end - start  # width
+        out[n, 4] = min(start - left, right - end)  # clearance
+        out[n, 5] = np.sqrt(((start + end) / 2) ** 2 + grip.b**2)  # offset
+        out[n, 6] = (dark_left + dark_right) / 2 + dark_palm  # shadow
+        out[n, 7] = (patch_left + patch_right) / 2  # patch
+        out[n, 8] = abs(middle_left - middle_right)  # skew
+        out[n, 9] = max(min(dark_left, rise_left), min(dark_right, rise_right))  # unseen
     return out
