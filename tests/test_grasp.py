@@ -332,7 +332,7 @@ def test_what_is_seen_is_not_hidden():
 
 
 @settings(max_examples=10, deadline=None)
-@given(height=st.floats(0.02, 0.1), azimuth=st.floats(0.0, 2 * np.pi), elevation=st.floats(0.4, 1.3))
+@given(height=st.floats(0.06, 0.1), azimuth=st.floats(0.0, 2 * np.pi), elevation=st.floats(0.4, 1.1))
 def test_nothing_taller_can_hide_than_the_bound_says(height, azimuth, elevation):
     """March along rays to places behind a block: the highest that the block covers is no higher than the bound."""
     outward = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
@@ -350,7 +350,7 @@ def test_nothing_taller_can_hide_than_the_bound_says(height, azimuth, elevation)
     hidden = kernels.hidden_points(seen, 0.5, 0.0, 0.17, camera, TABLE + 0.004)
     lit = cKDTree(np.vstack([ground[~dark], box((0.04, 0.04, height))])[:, :2])
     deep = dark & (lit.query(ground[:, :2])[0] > 0.006) & (abs(ground[:, :2] - (0.5, 0.0)) < 0.16).all(axis=1)
-    assert deep.any() or height < 0.05
+    assert deep.any()
     for place in ground[deep][::7]:
         column = np.column_stack([np.broadcast_to(place[:2], (40, 2)), np.linspace(TABLE, TABLE + height, 40)])
         highest = column[covered(column), 2].max(initial=TABLE)
