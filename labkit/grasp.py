@@ -20,7 +20,7 @@ from labkit.validation import check_finite, check_shape
 TIP_CLEARANCE = 0.004  # metres of air between the tips and the table
 FINGER_MARGIN, HAND_MARGIN = 0.0015, 0.004  # metres around fingers and palm that must be free
 SPARE, LEAST = 0.010, 0.002  # metres beside the target: what an open jaw should leave, and the least
-FAN = 12  # yaws tried besides those of the target's axes
+FAN = 10  # yaws tried besides those of the target's axes
 RADIUS = 0.17  # metres around a target in which the scene matters
 MEASURED = 20  # grips of a target that are looked at closely
 RANKED = 10  # grasps of a target that are reported
@@ -195,6 +195,7 @@ def _frames(yaw, xy, z) -> Float[np.ndarray, "n 4 4"]:
 def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[Grasp] | str:
     """Grasps of one target, or why there is none."""
     from labkit import grasp_kernels as kernels  # numba takes its time to import
+    from labkit.grasp_measure import measure
 
     if len(target) == 0:
         return "no target points"
@@ -213,7 +214,7 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     if len(grips) == 0:
         return _why_none(dropped, kernels)
     grips = grips[np.argsort(costs)[:MEASURED]]
-    measures = kernels.measure(grips, target, hidden, centre, hand, SPARE, LEAST)
+    measures = measure(grips, target, hidden, centre, hand, SPARE, LEAST)
     fits = measures[:, 1] > 0.0
     if not fits.any():
         return "no room for the fingers beside the target"
