@@ -5,6 +5,7 @@ epoch e from (seed, e), so that nothing has to be replayed: weights, optimiser a
 that a checkpoint holds, and a resumed run ends where an undisturbed one does.
 """
 
+import copy
 import json
 import math
 import signal
@@ -302,19 +303,20 @@ def train(
             if interrupt.pending:
                 write_checkpoint(checkpoint, trainer.state())
                 raise KeyboardInterrupt
-    if val_data is not None:
+    if val_data is not None and "weights_undone" not in trainer.history[-1]:
         finish_run(trainer, val_data, out)
+        write_checkpoint(checkpoint, trainer.state())
     return trainer.history
 
 
 def finish_run(trainer: Trainer, val_data: ImagesInMemory, out: Path) -> None:
     """Take the class weights back out of a trained network as far as validation likes it, and save it for good."""
-    config = trainer.config
-    share, n = undo_weights(trainer.model, trainer.weights, val_data, config.num_classes, config.batch)
+    config, model = trainer.config, copy.deepcopy(trainer.model)
+    share, n = undo_weights(model, trainer.weights, val_data, config.num_classes, config.batch)
     scores = {"mean_iou": mean_iou(n), "iou": iou(n).tolist(), "weights_undone": share}
     trainer.history[-1] |= scores
     meta = {**trainer.history[-1], "config": asdict(config)}
-    save_model(trainer.model, out / f"{config.model}.pt", **meta)
+    save_model(model, out / f"{config.model}.pt", **meta)
     write_atomically(out / f"{config.model}.history.json", json.dumps(trainer.history, indent=1).encode())
 
 
