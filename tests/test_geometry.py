@@ -431,7 +431,7 @@ clouds = st.one_of(
 )
 
 
-@given(P=clouds, gap=st.sampled_from([0.25, 0.7, 1.0, 1.5, 3.0]), min_points=st.integers(1, 5))
+@given(P=clouds, gap=st.sampled_from([0.25, 0.7, 1.0, 1.5, 1.7, 3.0]), min_points=st.integers(1, 5))
 @settings(max_examples=100, deadline=None)
 def test_clusters_are_those_of_brute_force_single_linkage(P, gap, min_points):
     found = cluster(P, gap=gap, min_points=min_points)
@@ -446,7 +446,7 @@ def test_clusters_are_those_of_brute_force_single_linkage(P, gap, min_points):
     assert {points.tobytes() for points in found} == {points.tobytes() for points in expected}
 
 
-@given(P=clouds, radius=st.sampled_from([0.25, 0.7, 1.0, 1.5, 3.0]), min_neighbours=st.integers(0, 6))
+@given(P=clouds, radius=st.sampled_from([0.25, 0.7, 1.0, 1.5, 1.7, 3.0]), min_neighbours=st.integers(0, 6))
 @settings(max_examples=100, deadline=None)
 def test_outliers_are_those_that_brute_force_finds(P, radius, min_neighbours):
     neighbours = (squared_distances(P) <= radius * radius).sum(axis=1) - 1 if len(P) else np.zeros(0)
@@ -480,6 +480,15 @@ def test_objects_are_told_apart_by_just_more_than_the_gap():
     for distance, count in ((0.0149, 1), (0.0151, 2)):
         both = np.vstack([first, first + np.array([0.0, distance, 0.0])])
         assert len(cluster(both, gap=0.015, min_points=10)) == count
+
+
+def test_reach_is_the_same_along_a_diagonal_as_along_an_axis():
+    for direction in ([1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0]):
+        for distance, together in ((0.0149, True), (0.0151, False)):
+            step = distance * np.array(direction) / np.linalg.norm(direction)
+            pair = np.array([0.3 * step, 1.3 * step])
+            assert len(cluster(pair, gap=0.015, min_points=1)) == (1 if together else 2)
+            assert len(remove_outliers(pair, radius=0.015, min_neighbours=1)) == (2 if together else 0)
 
 
 def test_flying_pixels_between_an_object_and_the_wall_are_removed_and_the_object_stays():

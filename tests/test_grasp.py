@@ -63,11 +63,14 @@ def angle_between(a, b):
 
 
 def hand_contents(grasp, points):
-    """How many points lie within the hulls of palm and fingers; a test that knows nothing of maps and margins."""
+    """How many points lie half a millimetre or more within the hulls of palm and fingers, without maps and margins.
+
+    The planner's map has cells of 4 mm: under the slanted root of a finger a point may graze the hull.
+    """
     T_hand_base = np.linalg.inv(grasp.T_base_grasp)
     P_hand = points @ T_hand_base[:3, :3].T + T_hand_base[:3, 3] + (0.0, 0.0, HAND_TO_GRASP)
     open_by = {"hand": 0.0, "left finger": grasp.width / 2, "right finger": -grasp.width / 2}
-    return sum(hulls()[name].holds(P_hand - (0.0, off, 0.0), 0.0).sum() for name, off in open_by.items())
+    return sum(hulls()[name].holds(P_hand - (0.0, off, 0.0), -0.0005).sum() for name, off in open_by.items())
 
 
 def tips(grasp):

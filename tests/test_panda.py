@@ -407,6 +407,7 @@ def test_closing_on_nothing_and_not_reaching_are_told_apart():
         assert panda.lift(unreachable).reason == "out of reach" and panda.lift([]).reason == "no grasp"
         assert np.allclose(panda.q, Q_HOME, atol=1e-3)
         assert panda.lift([unreachable, grasp(top_down(0.5, -0.1, 0.02))]).reason == "missed"
+        assert panda.lift(grasp(top_down(0.5, 0.2, 0.02))).success  # the jaws open again for another try
 
 
 def test_a_tall_object_stops_the_palm_and_is_lifted_from_there():

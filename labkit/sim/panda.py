@@ -20,7 +20,15 @@ from labkit.sim.kinematics import (
     forward_kinematics,
     inverse_kinematics,
 )
-from labkit.sim.planning import MotionPlan, plan_grasp, plan_transit, straight_line, straight_up, trajectory
+from labkit.sim.planning import (
+    MotionPlan,
+    plan_grasp,
+    plan_transit,
+    points_in_the_way,
+    straight_line,
+    straight_up,
+    trajectory,
+)
 from labkit.sim.world import TIME_STEP, World
 from labkit.validation import check_shape, check_T
 
@@ -124,7 +132,7 @@ class Panda:
         off = np.abs(plan.transit[0][0] - self.q).max()
         if off > 0.05:
             raise ValueError(f"plan: expected one that begins at the arm's joints, got one that is {off:.2f} rad off")
-        self._opening = plan.opening
+        self._opening, self._gripping = plan.opening, False
         if not all(self._follow_or_back_off(leg) for leg in plan.transit):
             return "blocked on the way over"
         arrived = self._follow(plan.descent, LINE_SPEED)
@@ -189,8 +197,9 @@ class Panda:
         down = None if across is None else straight_line(T_above, T, across)
         if down is None:
             return "out of reach"
+        finger, table_z = self.opening / 2, self.world.spec.table.z
         points = np.zeros((0, 3)) if scene is None else check_shape("scene", scene, (None, 3))
-        transit = plan_transit(self.q, across, self.opening / 2, points, self.world.spec.table.z)
+        transit = plan_transit(self.q, across, finger, points_in_the_way(points, self.q, finger, table_z), table_z)
         if isinstance(transit, str):
             return f"no path: {transit}"
         if not all(self._follow_or_back_off(leg, LINE_SPEED) for leg in (*transit, down)):

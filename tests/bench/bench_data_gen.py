@@ -33,7 +33,7 @@ def main() -> str:
         f"| peak memory, generating {FRAMES} frames, MB | {generating:.0f} | 1000 |",
         f"| peak memory, loading {FRAMES} frames, MB | {loading:.0f} | 1000 |",
     ]
-    return "\n".join(["## Data generation, 320x240", "", "| figure | measured | to reach |", "|---|---|---|", *rows])
+    return "\n".join(["| figure at 320x240 | measured | to reach |", "|---|---|---|", *rows])
 
 
 def timed_scenes(folder: str) -> tuple[list[float], float]:

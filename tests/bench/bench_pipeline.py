@@ -28,8 +28,6 @@ def main() -> str:
     rows = [f"| {name} | {np.median(ms):.2f} | {np.quantile(ms, 0.9):.2f} |" for name, ms in stages.items()]
     return "\n".join(
         [
-            "## Pipeline.run without the network, 320x240, three targets",
-            "",
             "| stage | median ms | 90 % of runs within |",
             "|---|---|---|",
             *rows,
