@@ -27,7 +27,7 @@ LAYERS = [
     ["labkit.validation", "labkit.labels", "labkit.files"],
     ["labkit.frame"],
     ["labkit.geometry", "labkit.losses", "labkit.metrics", "labkit.network", "labkit.augment", "labkit.crf"],
-    ["labkit.sim", "labkit.grasp", "labkit.training", "labkit.engines", "labkit.baselines"],
+    ["labkit.sim", "labkit.grasp", "labkit.grasp_measure", "labkit.training", "labkit.engines", "labkit.baselines"],
     ["labkit.pipeline"],
     ["labkit.evaluation", "labkit.demo", "labkit.node", "labkit.doctor"],
     ["labkit.cli"],
