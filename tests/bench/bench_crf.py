@@ -261,9 +261,7 @@ def memory_table() -> str:
         )
         each = float(done.stdout) / pairs
         rows.append(f"{method} | {each:.1f} | {each + model:.1f} | 60")
-    header = (
-        "memory at the peak, bytes a pixel and class, 640x480, C = 5, 4 neighbours | solver | with the model | asked"
-    )
+    header = "peak memory, bytes a pixel and class, 640x480, C = 5 | solver | with the model | asked"
     return table(header, rows)
 
 
