@@ -12,7 +12,7 @@ SHELL := bash
 .DEFAULT_GOAL := demo
 .PHONY: demo test lab train bench clean
 
-EXTRAS := test
+EXTRAS := instructor,stacks,test
 BIN := .venv/bin
 ARGS ?=
 

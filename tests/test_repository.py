@@ -25,11 +25,13 @@ MAX_LINES = 420
 # Who may import whom inside labkit, lowest first: a package or module imports from its own row and the rows above it.
 LAYERS = [
     ["labkit.validation", "labkit.labels", "labkit.files"],
+    ["labkit.plots"],
     ["labkit.frame"],
     ["labkit.geometry", "labkit.losses", "labkit.metrics", "labkit.network", "labkit.augment", "labkit.crf"],
     ["labkit.sim", "labkit.grasp", "labkit.grasp_measure", "labkit.training", "labkit.engines", "labkit.baselines"],
     ["labkit.pipeline"],
-    ["labkit.evaluation", "labkit.demo", "labkit.node", "labkit.doctor"],
+    ["labkit.evaluation", "labkit.demo", "labkit.node", "labkit.doctor", "labkit.questions", "labkit.widgets"],
+    ["labkit.check", "labkit.release", "labkit.grading"],
     ["labkit.cli"],
 ]
 COMMANDS = {"labkit.cli", "labkit.demo", "labkit.evaluation"}  # these may import data_gen, inside a function
@@ -185,7 +187,8 @@ def test_pins_leave_the_build_of_a_package_open():
 def test_every_import_of_the_kit_is_required():
     """An import that works here only because another package brought it along breaks when that one lets go of it."""
     brought_by = {"cv2": "opencv-python-headless", "PIL": "pillow", "pybullet_data": "pybullet"}
-    required = {canonical(Requirement(line).name) for line in PROJECT["dependencies"]}
+    users = chain(*(lines for extra, lines in EXTRAS.items() if extra not in ("test", "bench")))
+    required = {canonical(Requirement(line).name) for line in chain(PROJECT["dependencies"], users)}
     for name, path in modules().items():
         roots = {found.split(".")[0] for found in imports(path, everywhere=True)}
         foreign = roots - sys.stdlib_module_names - {"labkit", "data_gen"}

@@ -1,0 +1,72 @@
+"""The pictures that lessons and labs share: images side by side, the classes' colours, a cloud seen from two sides."""
+
+from collections.abc import Mapping
+
+import matplotlib.pyplot as plt
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from labkit.labels import CLASSES, PALETTE
+
+
+def style() -> None:
+    """Set matplotlib up for a notebook: small files, and a font that is read beside text."""
+    plt.rcParams.update(
+        {
+            "figure.dpi": 80,
+            "savefig.dpi": 80,
+            "figure.constrained_layout.use": True,
+            "font.size": 10,
+            "axes.titlesize": 10,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "image.interpolation": "nearest",
+        }
+    )
+
+
+def panels(images: Mapping[str, np.ndarray], columns: int = 3, width: float = 9.0, **options) -> Figure:
+    """Show images side by side, each under its title; `options` go to imshow (cmap, vmin, vmax ...).
+
+    images: title -> (H, W), or (H, W, 3) RGB uint8. width: of the figure, inches.
+
+    >>> figure = panels({"zeros": np.zeros((3, 4)), "ones": np.ones((3, 4))})
+    >>> [axes.get_title() for axes in figure.axes]
+    ['zeros', 'ones']
+    """
+    columns = min(columns, len(images))
+    rows = -(-len(images) // columns)
+    height, breadth = next(iter(images.values())).shape[:2]
+    size = (width, rows * (width / columns * height / breadth + 0.3))
+    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False)
+    for axis in axes.flat:
+        axis.axis("off")
+    for axis, (title, image) in zip(axes.flat, images.items(), strict=False):
+        axis.imshow(image, **options)
+        axis.set_title(title)
+    return figure
+
+
+def class_legend(axes: Axes, **options) -> None:
+    """Add the four classes and their colours as a legend; `options` go to Axes.legend."""
+    patches = [Patch(color=colour / 255, label=name) for name, colour in zip(CLASSES, PALETTE, strict=True)]
+    axes.legend(handles=patches, **({"loc": "upper right", "fontsize": 8, "framealpha": 0.9} | options))
+
+
+def cloud(figure: Figure, clouds: Mapping[str, Float[np.ndarray, "_ 3"]], sizes: float = 2.0) -> tuple[Axes, Axes]:
+    """Draw named clouds (metres, base frame) from above and from the side, to scale; returns the two axes."""
+    above, side = figure.subplots(1, 2)
+    for name, P in clouds.items():
+        above.scatter(P[:, 0], P[:, 1], s=sizes, label=name, linewidths=0)
+        side.scatter(P[:, 0], P[:, 2], s=sizes, linewidths=0)
+    for axes, vertical in ((above, "y"), (side, "z")):
+        axes.set_aspect("equal")
+        axes.set_xlabel("x (m)")
+        axes.set_ylabel(f"{vertical} (m)")
+    above.set_title("from above")
+    side.set_title("from the side")
+    above.legend(fontsize=8, markerscale=3)
+    return above, side
