@@ -31,7 +31,7 @@ LAYERS = [
     ["labkit.sim", "labkit.grasp", "labkit.grasp_measure", "labkit.training", "labkit.engines", "labkit.baselines"],
     ["labkit.pipeline"],
     ["labkit.evaluation", "labkit.demo", "labkit.node", "labkit.doctor", "labkit.questions", "labkit.widgets"],
-    ["labkit.check", "labkit.release", "labkit.grading"],
+    ["labkit.checking", "labkit.release", "labkit.grading"],
     ["labkit.cli"],
 ]
 COMMANDS = {"labkit.cli", "labkit.demo", "labkit.evaluation"}  # these may import data_gen, inside a function
