@@ -2,6 +2,7 @@
 #   make demo    set up, then one scene from the camera's image to the lifted object
 #   make test    set up, then lint and every test
 #   make lab     JupyterLab
+#   make release generate labs/ from solutions/
 #   make train   make the data again and train the shipped weights again (over an hour on two cores)
 #   make bench   add the peers, measure against them, write BENCHMARKS.md
 #   make clean   remove what can be made again in seconds; .venv and data/ stay
@@ -10,7 +11,7 @@
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab train bench clean
+.PHONY: demo test lab release train bench clean
 
 EXTRAS := instructor,stacks,test
 BIN := .venv/bin
@@ -36,6 +37,9 @@ test: .venv/installed
 
 lab: .venv/installed
 	$(BIN)/jupyter lab $(ARGS)
+
+release: .venv/installed
+	$(BIN)/labkit release $(ARGS)
 
 # Each step goes on where it was stopped, and does nothing if it was finished; the last one replaces the shipped weights.
 train: .venv/installed

@@ -93,6 +93,19 @@ def evaluate(
 
 
 @app.command()
+def export(
+    onnx: Annotated[Path, typer.Option(help="The file to write.")],
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+) -> None:
+    """Write a network as one ONNX file, which OpenCV, onnxruntime and other stacks read."""
+    from labkit import engines
+    from labkit.network import load_model, weights_path
+
+    engines.export(load_model(weights_path(model)), onnx)
+    typer.echo(f"wrote {onnx}")
+
+
+@app.command()
 def demo(
     seed: Annotated[
         int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
@@ -114,6 +127,25 @@ def demo(
     typer.echo(show.report(story))
     for path in show.save(story, out):
         typer.echo(f"wrote {path}")
+
+
+@app.command()
+def release(
+    topics: Annotated[list[str] | None, typer.Argument(help="Topics such as 04_iou; all if none is given.")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; exit status 1 if something would change.")
+    ] = False,
+    course: Annotated[Path, typer.Option(help="Folder that holds lessons, solutions and labs.")] = Path("."),
+) -> None:
+    """Generate labs/ from solutions/ with nbgrader, and tidy the notebooks of solutions/ and lessons/."""
+    from labkit.release import release
+
+    changed = release(course, topics or (), check=check)
+    for path in changed:
+        typer.echo(f"{path}: not what `labkit release` makes of it" if check else f"changed {path}")
+    if not changed:
+        typer.echo("labs, solutions and lessons are as they should be")
+    raise typer.Exit(1 if check and changed else 0)
 
 
 def main() -> None:
