@@ -30,6 +30,18 @@ def scale_rays(depth, rays, t):
     return P
 
 
+@njit(cache=True)
+def points_in_box(points, low, high):
+    """Keep the points (N, 3) that lie inside a box with sides along the axes; NaN lies nowhere."""
+    keep = np.empty(len(points), np.int64)
+    n = 0
+    for i in range(len(points)):
+        x, y, z = points[i]
+        keep[n] = i
+        n += (low[0] < x < high[0]) & (low[1] < y < high[1]) & (low[2] < z < high[2])
+    return points[keep[:n]]
+
+
 def sort_into_cells(P, reach):
     """Sort the points of a cloud (N, 3) into cubes, so that points within `reach` are in the same or in nearby cubes.
 

@@ -7,8 +7,11 @@ far as possible outside the shadows that the camera could not look into. Nothing
 table's height and the gripper's measures goes in.
 """
 
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -117,9 +120,12 @@ def plan_grasps(
         camera_position = check_finite("camera_position", check_shape("camera_position", camera_position, (3,)))
         camera_position = camera_position.astype(np.float64)
 
+    def plan_one(number: int) -> list[Grasp] | str:
+        return _plan_one(number, targets[number], scene, table_z, camera_position, gripper)
+
+    one_by_one = len(targets) < 2
     grasps, reasons = [], []
-    for number, target in enumerate(targets):
-        found = _plan_one(number, target, scene, table_z, camera_position, gripper)
+    for found in map(plan_one, range(len(targets))) if one_by_one else _threads().map(plan_one, range(len(targets))):
         if isinstance(found, str):
             reasons.append(found)
         else:
@@ -127,6 +133,15 @@ def plan_grasps(
     grasps.sort(key=lambda grasp: -grasp.score)
     reason = "" if grasps else "; ".join(dict.fromkeys(reasons)) or "no target points"
     return GraspPlan(tuple(grasps), reason)
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    """For several targets at once: the search is compiled and lets other threads run."""
+    return ThreadPoolExecutor(thread_name_prefix="grasps")
+
+
+os.register_at_fork(after_in_child=_threads.cache_clear)  # a child process has none of its parent's threads
 
 
 def top_down_grasp(

@@ -3,7 +3,8 @@
 Seen from above, a hand that comes straight down is an underside: nothing below the tips under its fingers, a slot
 between them, the palm over it all. It can go down until `height - underside` of what it covers meets the tips, so
 everything here is a map of heights: float32 metres, -inf for an empty cell. A map is turned to a yaw: its columns run
-along a, the direction in which the jaws close, its rows along b, across the pads.
+along a, the direction in which the jaws close, its rows along b, across the pads. Nothing here holds Python's lock, so
+that several targets are searched at once.
 """
 
 from typing import NamedTuple
@@ -55,7 +56,7 @@ class Grip(NamedTuple):
     right_far: float
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def middle_of_area(points):
     """The middle of what points cover, seen from above: every cell counts once, however many points it has."""
     x, y = points[:, 0].min(), points[:, 1].min()
@@ -71,7 +72,7 @@ def middle_of_area(points):
     return np.array([x + (sum_x / count + 0.5) * CELL, y + (sum_y / count + 0.5) * CELL])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def points_near(points, x, y, radius):
     """Keep the points of a square around (x, y)."""
     keep = np.empty(len(points), np.int64)
@@ -83,7 +84,7 @@ def points_near(points, x, y, radius):
     return points[keep[:n]]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def hidden_points(scene, x, y, radius, camera, floor):
     """Bound from above what the camera cannot see: one point (K, 3) a cell without a reading, if higher than `floor`.
 
@@ -120,7 +121,7 @@ def hidden_points(scene, x, y, radius, camera, floor):
     return out[:count]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fill(heights, points, x, y, cos, sin):
     """Make a map, turned by a yaw around (x, y): the highest point of each cell."""
     heights[:] = -np.inf
@@ -131,7 +132,7 @@ def fill(heights, points, x, y, cos, sin):
             heights[int(v), int(u)] = max(heights[int(v), int(u)], points[i, 2])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def profile(heights, row, half, first, last, out):
     """Look at columns first to last of a map from the side: the highest cell within `half` metres of a row's middle."""
     out[:] = -np.inf
@@ -141,7 +142,7 @@ def profile(heights, row, half, first, last, out):
             out[c] = heights[r, c] if heights[r, c] > out[c] else out[c]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def finger_floor(heights, underside, first, last, left, right):
     """How low the tips can go with a pad at the left edge of columns first to last: left finger, right finger."""
     left[:], right[:] = np.inf, np.inf  # beyond these there is no place
@@ -154,7 +155,7 @@ def finger_floor(heights, underside, first, last, left, right):
             right[edge] = z if z > right[edge] else right[edge]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def find_runs(heights, first, last, tip, runs):
     """Find the stretches of columns higher than the tips, as rows of `runs`: first column, one past the last; how many.
 
@@ -175,7 +176,7 @@ def find_runs(heights, first, last, tip, runs):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def free_side(floors, edge, step, tip):
     """Where may a pad start, from an edge of the target outwards (step -1 or 1)? The nearest place and the furthest."""
     for near in range(edge, edge + 3 * step, step):
@@ -187,7 +188,7 @@ def free_side(floors, edge, step, tip):
     return -1, -1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def end_height(heights, first, last):
     """The lower of the two ends of a stretch of columns, each the higher of its two outermost ones."""
     left, right = heights[first], heights[last]
@@ -196,7 +197,7 @@ def end_height(heights, first, last):
     return min(left, right)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def hand_fits(heights, row, middle, tip, hand):
     """Is there room for the palm, and for the wider body behind it, with the tips at a height?"""
     palm_rows, body_rows = int(hand.palm_half / CELL + 0.5), int(hand.body_half / CELL + 0.5)
@@ -211,7 +212,7 @@ def hand_fits(heights, row, middle, tip, hand):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def search(target, scene, hidden, centre, yaws, lowest, hand, weights):
     """Try every yaw, row and tip height, and every pair of edges of the target there; keep the best of each few rows.
 
@@ -243,7 +244,7 @@ def search(target, scene, hidden, centre, yaws, lowest, hand, weights):
     return grips.reshape(-1, 7)[found], costs.ravel()[found], dropped
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def search_row(maps, lines, row, lowest, highest, hand, weights, best, dropped):
     """Find the best grip of one row that costs less than `best`: its cost, and tip, left and right places of a Grip."""
     material, around, shadow, left, right, dark_left, dark_right = lines
@@ -299,13 +300,13 @@ def search_row(maps, lines, row, lowest, highest, hand, weights, best, dropped):
     return best, grip
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def lack(value, enough):
     """How much of `enough` is missing: 0 none, 1 all."""
     return 1.0 - min(max(value, 0.0) / enough, 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def place(column):
     """Where the left edge of a column lies along the jaws, metres."""
     return (column - COLUMNS / 2) * CELL

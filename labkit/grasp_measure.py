@@ -8,7 +8,7 @@ from labkit.grasp_kernels import CELL, Grip
 SKIN = 0.004  # metres: what lies this close behind the outermost point is touched by the pad too
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def measure(grips, target, hidden, centre, hand, spare, least):
     """Measure grips on the points themselves; a row each: a of the hand, opening, and what `labkit.grasp` scores.
 
@@ -45,7 +45,7 @@ def measure(grips, target, hidden, centre, hand, spare, least):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def turn(points, x, y, yaw, b, out):
     """Coordinates of points along and across the jaws, relative to (x, y) and to b."""
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -54,7 +54,7 @@ def turn(points, x, y, yaw, b, out):
         out[i, 0], out[i, 1], out[i, 2] = dx * cos + dy * sin, dy * cos - dx * sin - b, points[i, 2]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def jaws(P, grip, hand, spare, least):
     """Where to open the jaws around what stands between them: left and right pad, left and right edge of the target.
 
@@ -72,7 +72,7 @@ def jaws(P, grip, hand, spare, least):
     return min(grip.left_near, start - off), max(grip.right_near, end + off), start, end
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def contact(P, tip, half, edge, side):
     """What a pad meets at an edge of the target (side -1 left, 1 right).
 
@@ -92,7 +92,7 @@ def contact(P, tip, half, edge, side):
     return high - low, (low + high) / 2, top - tip, top - max(inner, tip)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shadow_height(P, height, half, low, high):
     """How far unseen things might stand above a height, between two places along the jaws."""
     z = 0.0

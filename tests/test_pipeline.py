@@ -196,3 +196,22 @@ def test_a_dataset_feeds_the_pipeline(tmp_path):
     frame = data_gen.load(tmp_path / "d")[0]
     p = Pipeline(np.asarray, data_gen.sample_scene(3, "test").table.z).run(frame, labels=frame.labels)
     assert p.points.shape == (60, 80, 3)
+
+
+def test_the_surer_target_is_grasped_first(scene):
+    """The same masks; the network's opinion of the object that had the best grasp is turned down to 0.6."""
+    frame, _ = scene
+
+    def opinion(doubted=None):
+        p = one_hot(frame.labels).astype(np.float64)
+        return lambda rgb: p if doubted is None else np.where(doubted[..., None], 0.6 * p + 0.1, p)
+
+    sure = Pipeline(opinion()).run(frame)
+    first = sure.plan.grasps[0].target
+    assert len(sure.clouds) > 1 and sure.certainty == pytest.approx([1.0] * len(sure.clouds))
+    P = sure.points
+    near = np.linalg.norm(P - np.median(sure.clouds[first], axis=0), axis=-1) < 0.06
+    doubting = Pipeline(opinion(near & (frame.labels == TARGET))).run(frame)
+    assert doubting.plan.grasps[0].target != first
+    assert doubting.certainty[first] == pytest.approx(0.7, abs=0.05)
+    assert sorted(-grasp.score for grasp in doubting.plan.grasps) == [-grasp.score for grasp in doubting.plan.grasps]

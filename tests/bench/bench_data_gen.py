@@ -1,8 +1,6 @@
 """Scenes a second, the share of it spent inside PyBullet, two workers against one, and memory."""
 
-import cProfile
 import multiprocessing
-import pstats
 import subprocess
 import sys
 import tempfile
@@ -14,6 +12,7 @@ import numpy as np
 
 import data_gen
 from data_gen.dataset import write_frame
+from labkit.sim.client import Client
 
 SCENES = 40
 FRAMES = 1000  # for the memory
@@ -37,20 +36,33 @@ def main() -> str:
 
 
 def timed_scenes(folder: str) -> tuple[list[float], float]:
-    """Seconds of each scene, and the share of PyBullet's own functions in a profile of as many others."""
-    seconds = []
-    for seed in range(1, SCENES + 1):
-        start = time.perf_counter()
-        write_frame(folder, seed, seed, "test", (320, 240), None)
-        seconds.append(time.perf_counter() - start)
-    profile = cProfile.Profile()
-    profile.enable()
-    for seed in range(SCENES, 2 * SCENES):
-        write_frame(folder, seed, seed, "test", (320, 240), None)
-    profile.disable()
-    stats = pstats.Stats(profile).stats
-    inside = sum(row[2] for (_, _, name), row in stats.items() if "pybullet" in name)
-    return seconds, inside / sum(row[2] for row in stats.values())
+    """Seconds of each scene, and the share of them spent in calls of PyBullet's functions."""
+    seconds, inside = [], []
+    plain = Client.__getattr__
+
+    def timed(client: Client, name: str):
+        function = plain(client, name)
+
+        def call(*arguments, **named):
+            start = time.perf_counter()
+            try:
+                return function(*arguments, **named)
+            finally:
+                inside.append(time.perf_counter() - start)
+
+        if callable(function):
+            setattr(client, name, call)
+        return getattr(client, name, function)
+
+    Client.__getattr__ = timed
+    try:
+        for seed in range(1, SCENES + 1):
+            start = time.perf_counter()
+            write_frame(folder, seed, seed, "test", (320, 240), None)
+            seconds.append(time.perf_counter() - start)
+    finally:
+        Client.__getattr__ = plain
+    return seconds, sum(inside) / sum(seconds)
 
 
 def one_worker_against_two(folder: str) -> float:
