@@ -109,7 +109,11 @@ class UNet(nn.Module):
     def forward(self, x: Float[torch.Tensor, "N 3 H W"]) -> Float[torch.Tensor, "N C H W"]:
         """Map images in [0, 1] to logits of the same height and width."""
         height, width = x.shape[-2:]
-        x = pad_to_multiple(x - 0.5, self.stride)
+        return self.on_grid(pad_to_multiple(x, self.stride))[..., :height, :width]
+
+    def on_grid(self, x: Float[torch.Tensor, "N 3 H W"]) -> Float[torch.Tensor, "N C H W"]:
+        """Do the same for a height and width divisible by `stride`: nothing to pad or crop, so an export is plain."""
+        x = x - 0.5
         skips = []
         for stage in self.encoder:
             x = stage(x)
@@ -117,7 +121,7 @@ class UNet(nn.Module):
         for i in reversed(range(len(self.decoder))):
             x = F.interpolate(self.narrow[i](x), scale_factor=2, mode="bilinear")
             x = self.decoder[i](x + skips[i])
-        return self.logits(x)[..., :height, :width]
+        return self.logits(x)
 
 
 WEIGHTS = Path(__file__).parent / "weights"  # shipped with the kit; MODEL_CARD.md beside them says what they can do

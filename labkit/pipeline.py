@@ -4,14 +4,22 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
+from labkit.engines import Engine, open_engine
 from labkit.frame import RGBDFrame
-from labkit.geometry import back_project_to_base, cluster, remove_outliers
+from labkit.geometry import (
+    back_project_to_base,
+    cluster,
+    invert_transform,
+    project,
+    remove_outliers,
+    transform_points,
+)
 from labkit.grasp import GraspPlan, plan_grasps
 from labkit.labels import CLASSES, TARGET, one_hot
 from labkit.validation import check_labels, check_rgb, check_same_size, check_shape
@@ -25,8 +33,9 @@ class Perception:
     """What a robot knows after one frame.
 
     probabilities: (H, W, C) in 0..1. labels: uint8 (H, W). points: every pixel in the base frame, (H, W, 3), metres,
-    NaN without depth. clouds: one (N, 3) a target, largest first. scene: all points of the workspace, (M, 3). plan: the
-    ranked grasps, or the reason why there is none. seconds: time spent by stage.
+    NaN without depth. clouds: one (N, 3) a target, largest first. certainty: for each cloud the mean probability of the
+    target class where it was seen. scene: all points of the workspace, (M, 3). plan: the grasps ranked by their score
+    times that certainty, or the reason why there is none. seconds: time spent by stage.
     """
 
     probabilities: Float[np.ndarray, "H W C"]
@@ -35,6 +44,7 @@ class Perception:
     clouds: list[np.ndarray]
     scene: Float[np.ndarray, "M 3"]
     plan: GraspPlan
+    certainty: tuple[float, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
 
 
@@ -44,6 +54,8 @@ class Pipeline:
     model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
     (H, W, C). table_z: height of the calibrated table plane in the base frame, metres. target_class: what to grasp.
     mirror: let a network look at the image and at its mirror image, and average: better, at twice the time.
+    engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.engines): equal numbers, other speeds; the
+    model may then be an ONNX file of `labkit export`.
     crf: True refines the labels with the kit's CRF; or a function (probabilities, frame) -> labels (H, W).
     back_project: function (depth, K, T_base_cam) -> (H, W, 3); split: function of the target's points to a list of
     clouds; grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan. The defaults are the kit's; each
@@ -65,11 +77,14 @@ class Pipeline:
         target_class: int = TARGET,
         *,
         mirror: bool = True,
+        engine: str | None = None,
         crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] = False,
         back_project: Callable = back_project_to_base,
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
         grasp: Callable[..., GraspPlan] = plan_grasps,
     ):
+        if engine is not None:
+            model = open_engine(engine, model)
         if not callable(model):
             raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
         if not np.isfinite(table_z):
@@ -107,16 +122,15 @@ class Pipeline:
             clouds = list(self.split(points[seen & (labels == self.target_class)]))
             scene = self._in_workspace(points)
         with _timed(seconds, "grasps"):
-            plan = self.grasp(clouds, scene, self.table_z, frame.T_base_cam[:3, 3])
-        return Perception(probabilities, labels, points, clouds, scene, plan, seconds)
+            certainty = tuple(mean_under(cloud, probabilities[..., self.target_class], frame) for cloud in clouds)
+            plan = rank(self.grasp(clouds, scene, self.table_z, frame.T_base_cam[:3, 3]), certainty)
+        return Perception(probabilities, labels, points, clouds, scene, plan, certainty, seconds)
 
     def _in_workspace(self, points: Float[np.ndarray, "H W 3"]) -> Float[np.ndarray, "M 3"]:
-        flat = points.reshape(-1, 3)
-        offset = (0.0, 0.0, self.table_z)
-        inside = np.ones(len(flat), bool)
-        for axis, (low, high) in enumerate(WORKSPACE):  # NaN compares false, and so falls out here
-            inside &= (flat[:, axis] > low + offset[axis]) & (flat[:, axis] < high + offset[axis])
-        return flat[inside]
+        from labkit.geometry_kernels import points_in_box  # numba takes its time to import
+
+        low, high = np.array(WORKSPACE).T + np.outer([1.0, 1.0], [0.0, 0.0, self.table_z])
+        return points_in_box(np.ascontiguousarray(points).reshape(-1, 3), low, high)
 
 
 @contextmanager
@@ -127,7 +141,7 @@ def _timed(seconds: dict[str, float], stage: str):
 
 
 def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = False) -> Float[np.ndarray, "H W C"]:
-    """Class probabilities of an RGB image from a network or from a function; checks that they are some.
+    """Class probabilities of an RGB image from a network, an engine or a function; checks that they are some.
 
     mirror: as in `labkit.network.predict_probabilities`; a function decides for itself. Raises ValueError
     if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
@@ -137,6 +151,8 @@ def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = F
         from labkit.network import predict_probabilities
 
         p = predict_probabilities(model, rgb, mirror)
+    elif isinstance(model, Engine):
+        p = model(rgb, mirror)
     else:
         p = np.asarray(model(check_rgb("rgb", rgb)))
     p = check_shape("probabilities", p, (*rgb.shape[:2], None))
@@ -171,6 +187,26 @@ def refine_labels(probabilities: Float[np.ndarray, "H W C"], frame: RGBDFrame) -
 def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Float[np.ndarray, "_ 3"]]:
     """Clean the points of the target class and split them: two targets are two clouds."""
     return cluster(remove_outliers(P))
+
+
+def mean_under(P: Float[np.ndarray, "N 3"], image: Float[np.ndarray, "H W"], frame: RGBDFrame) -> float:
+    """Mean of an image over the pixels in which a frame's camera sees points (base frame); 0 if it sees none.
+
+    >>> rgb, depth = np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32)
+    >>> frame = RGBDFrame(rgb, depth, K=np.eye(3), T_base_cam=np.eye(4))
+    >>> mean_under(np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]]), np.array([[0.1, 0.2], [0.3, 0.6]]), frame)
+    0.4
+    """
+    P_cam = transform_points(invert_transform(frame.T_base_cam), np.asarray(P, np.float64))
+    u, v = (np.rint(np.nan_to_num(x, nan=-1.0)).astype(int) for x in project(P_cam, frame.K))
+    inside = (u >= 0) & (u < image.shape[1]) & (v >= 0) & (v < image.shape[0])
+    return float(image[v[inside], u[inside]].mean(dtype=np.float64)) if inside.any() else 0.0
+
+
+def rank(plan: GraspPlan, certainty: Sequence[float]) -> GraspPlan:
+    """Weigh the grasps with how certain their targets are, and sort: a fine grip on an obstacle is worth little."""
+    weighed = [replace(grasp, score=grasp.score * certainty[grasp.target]) for grasp in plan.grasps]
+    return replace(plan, grasps=tuple(sorted(weighed, key=lambda grasp: -grasp.score)))
 
 
 def segment_rgb_image(model, image: UInt8[np.ndarray, "H W 3"], order: str = "rgb") -> UInt8[np.ndarray, "H W"]:
