@@ -263,9 +263,10 @@ def not_finite(expected, got) -> Problem | None:
 def wrong_values(question: Question, args: tuple, expected: object, got: object) -> Problem | None:
     """Compare values; of a wrong output the first property that it violates says more than a count of values."""
     try:
-        wrong = differences(question, question.canonical(expected), question.canonical(got))
-    except Exception:  # `canonical` may rely on what only right outputs have
-        wrong = [np.ones(part.shape, bool) for part in parts(got)]
+        canonical = question.canonical(got)
+    except Exception:  # it may rely on what only right outputs have
+        canonical = got
+    wrong = differences(question, question.canonical(expected), canonical)
     count, size = sum(int(np.count_nonzero(w)) for w in wrong), sum(w.size for w in wrong)
     if not count:
         return None
@@ -288,7 +289,8 @@ def differences(question: Question, expected: object, got: object) -> list[np.nd
     """For each part, where two outputs differ; a part of another shape differs in one place."""
     if len(parts(expected)) != len(parts(got)):
         return [np.ones(1, bool)]
-    return [different(question, np.asarray(e), np.asarray(g)) for e, g in zip(parts(expected), parts(got), strict=True)]
+    pairs = zip(parts(expected), parts(got), strict=True)
+    return [different(question, np.atleast_1d(e), np.atleast_1d(g)) for e, g in pairs]
 
 
 def different(question: Question, expected: np.ndarray, got: np.ndarray) -> np.ndarray:
