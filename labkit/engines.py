@@ -53,7 +53,7 @@ def _softmax(z: Float[np.ndarray, "C H W"]) -> Float[np.ndarray, "C H W"]:
 
 
 class TorchEngine(Engine):
-    """A network of labkit.network in PyTorch itself."""
+    """A network in PyTorch itself."""
 
     def __init__(self, model):
         super().__init__(_grid(model))
@@ -100,9 +100,9 @@ ENGINES = {"torch": TorchEngine, "opencv": OpenCVEngine, "onnxruntime": OnnxRunt
 def open_engine(name: str, model) -> Engine:
     """Make an engine by its name: "torch", "opencv" or "onnxruntime".
 
-    model: a network of labkit.network, or the path of a file that `export` wrote (the two others only). Raises
-    ValueError for an unknown name, another kind of model or a file that is no such export, FileNotFoundError for
-    none. Section 7 of the text.
+    model: a network of labkit.network (or another module that states its `divisor` and `num_classes`), or, for the last
+    two, the path of a file that `export` wrote. Raises ValueError for an unknown name, another kind of model or a file
+    that is no such export, FileNotFoundError for none. Section 7 of the text.
 
     >>> from labkit.network import SmallSegNet
     >>> open_engine("torch", SmallSegNet()).logits(np.zeros((5, 7, 3), np.uint8)).shape
@@ -123,7 +123,7 @@ def export(model, path) -> None:
 
     Its input `image` is (1, 3, H, W) RGB in 0..1 and its output `logits` (1, C, H, W), float32, for any H and W that
     are multiples of the divisor that the file's metadata states. OpenCV 4.6 and 5 and onnxruntime read it. Raises
-    ValueError if the model is not one of labkit.network, OSError naming `path` if it cannot be written. Section 7.
+    ValueError if the model is no such network, OSError naming `path` if it cannot be written. Section 7.
     """
     write_atomically(path, to_onnx(model))
 
@@ -132,8 +132,6 @@ def to_onnx(model) -> bytes:
     """The bytes of the file that `export` writes."""
     import onnx
     import torch
-
-    from labkit.network import architecture_of
 
     class OnGrid(torch.nn.Module):
         """The network without padding and cropping, which would make the graph's shapes depend on the input."""
@@ -161,7 +159,7 @@ def to_onnx(model) -> bytes:
             dynamic_axes={"image": axes, "logits": axes},
         )
     proto = onnx.load_model_from_string(buffer.getvalue())
-    facts = {"architecture": architecture_of(model), "classes": str(model.num_classes), "divisor": str(divisor)}
+    facts = {"architecture": type(model).__name__, "classes": str(model.num_classes), "divisor": str(divisor)}
     onnx.helper.set_model_props(proto, facts)
     onnx.checker.check_model(proto)
     return proto.SerializeToString()
@@ -169,10 +167,12 @@ def to_onnx(model) -> bytes:
 
 def _grid(model) -> int:
     """What height and width of a network's input must be multiples of; raises ValueError for anything else."""
-    from labkit.network import architecture_of
+    import torch
 
-    architecture_of(model)
-    return getattr(model, "stride", model.divisor)
+    divisor = getattr(model, "stride", getattr(model, "divisor", None))
+    if not (isinstance(model, torch.nn.Module) and isinstance(divisor, int)):
+        raise ValueError(f"model: expected a network such as labkit.network's, got {type(model).__name__}")
+    return divisor
 
 
 def _divisor(onnx_file: bytes) -> int:
