@@ -74,11 +74,8 @@ def evaluate(
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
 ) -> None:
     """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
-    from dataclasses import asdict
-    from json import dumps
-
     from data_gen import sample_scene
-    from labkit.evaluation import run_trials, summarise, table
+    from labkit.evaluation import as_json, run_trials, summarise, table
     from labkit.files import write_atomically
     from labkit.network import load_model, weights_path
 
@@ -89,7 +86,7 @@ def evaluate(
     report = summarise(run_trials(specs, weights, crf=crf, workers=workers))
     typer.echo(table(report))
     if json is not None:
-        write_atomically(json, (dumps(asdict(report), indent=1) + "\n").encode())
+        write_atomically(json, as_json(report).encode())
 
 
 @app.command()

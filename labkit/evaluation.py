@@ -1,12 +1,13 @@
 """How good is the whole chain? Scores of the masks, and lifts by the simulated arm, over many scenes."""
 
+import json
 import multiprocessing
 import time
 from collections import Counter
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -174,6 +175,19 @@ def _one_thread() -> None:
     import torch
 
     torch.set_num_threads(1)
+
+
+def as_json(report: Report) -> str:
+    """The report as JSON; null is the IoU of a class that no scene has, which JSON's numbers cannot say.
+
+    >>> n = np.diag([3, 4, 5, 0])
+    >>> report = summarise([Trial(1, n, (n.diagonal(), n.diagonal()), True, "", "mug")])
+    >>> json.loads(as_json(report))["iou"]
+    {'background': 1.0, 'surface': 1.0, 'target': 1.0, 'obstacle': None}
+    """
+    fields = asdict(report)
+    fields["iou"] = {name: None if np.isnan(value) else value for name, value in report.iou.items()}
+    return json.dumps(fields, indent=1, allow_nan=False) + "\n"
 
 
 def table(report: Report) -> str:
