@@ -1,0 +1,11 @@
+"""Grading: a student's answers run in a sandbox that holds nothing worth stealing, and are judged outside it.
+
+reading    a released lab and the submissions of it, read as data of strangers
+sandbox    what a worker sees and may use: bubblewrap, `seccomp`, limits
+worker     the program in the sandbox: takes cells and arguments, sends numbers back
+channel    the other end: sends, waits until a deadline, and takes nothing but numbers
+grade      one submission: every question, whatever happens in the others
+batch      a folder of submissions: what changed is graded, here or on a Dask cluster
+outputs    grades.csv, results.json, and `feedback` a page a student
+gradebook  nbgrader's database and the copies that formgrader shows
+"""

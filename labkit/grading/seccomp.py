@@ -1,0 +1,78 @@
+"""The system calls that a worker is refused, as the filter program that the kernel takes (seccomp, classic BPF).
+
+Namespaces and limits leave three ways to use up a machine: more processes, memory that belongs to no process (shared
+memory segments, file systems of a new user namespace), and the kernel's less trodden corners. Answers need none of
+these, so they fail here with EPERM. Threads stay allowed.
+"""
+
+import errno
+import platform
+import struct
+
+# audit number of the architecture; numbers of its system calls, x86-64 and arm64
+ARCHITECTURES = {"x86_64": (0xC000003E, 0), "aarch64": (0xC00000B7, 1)}
+REFUSED = {
+    "fork": (57, None),
+    "vfork": (58, None),
+    "unshare": (272, 97),
+    "setns": (308, 268),
+    "mount": (165, 40),
+    "umount2": (166, 39),
+    "pivot_root": (155, 41),
+    "chroot": (161, 51),
+    "open_tree": (428, 428),
+    "move_mount": (429, 429),
+    "fsopen": (430, 430),
+    "fsmount": (432, 432),
+    "shmget": (29, 194),
+    "semget": (64, 190),
+    "msgget": (68, 186),
+    "mq_open": (240, 180),
+    "memfd_create": (319, 279),
+    "memfd_secret": (447, 447),
+    "ptrace": (101, 117),
+    "process_vm_readv": (310, 270),
+    "process_vm_writev": (311, 271),
+    "keyctl": (250, 219),
+    "add_key": (248, 217),
+    "request_key": (249, 218),
+    "bpf": (321, 280),
+    "perf_event_open": (298, 241),
+    "io_uring_setup": (425, 425),
+    "userfaultfd": (323, 282),
+}
+CLONE, CLONE3 = (56, 220), (435, 435)
+CLONE_THREAD = 0x00010000
+X32_CALLS = 0x40000000  # the x32 calls of an x86-64 kernel: other numbers for the same things
+
+LOAD, JUMP_IF_EQUAL, JUMP_IF_GREATER_EQUAL, JUMP_IF_SET, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
+NUMBER, ARCHITECTURE, FIRST_ARGUMENT = 0, 4, 16  # where they stand in struct seccomp_data
+ALLOW, KILL = 0x7FFF0000, 0x80000000
+
+
+def refuse(code: int) -> int:
+    """The filter's answer that lets a call fail with an errno."""
+    return 0x00050000 | code
+
+
+def program(machine: str | None = None) -> bytes:
+    """Assemble the filter for a machine, this one by default; raises ValueError for one whose calls it does not know.
+
+    >>> len(program("x86_64")) % 8
+    0
+    """
+    machine = platform.machine() if machine is None else machine
+    if machine not in ARCHITECTURES:
+        raise ValueError(f"machine: expected {' or '.join(ARCHITECTURES)} for the sandbox, got {machine}")
+    audit, column = ARCHITECTURES[machine]
+    lines = [(LOAD, 0, 0, ARCHITECTURE), (JUMP_IF_EQUAL, 1, 0, audit), (RETURN, 0, 0, KILL), (LOAD, 0, 0, NUMBER)]
+    if machine == "x86_64":
+        lines += [(JUMP_IF_GREATER_EQUAL, 0, 1, X32_CALLS), (RETURN, 0, 0, KILL)]
+    for numbers in REFUSED.values():
+        if numbers[column] is not None:
+            lines += [(JUMP_IF_EQUAL, 0, 1, numbers[column]), (RETURN, 0, 0, refuse(errno.EPERM))]
+    # The flags of clone3 are in memory, where a filter cannot look; told that there is no such call, libc uses clone.
+    lines += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, refuse(errno.ENOSYS))]
+    lines += [(JUMP_IF_EQUAL, 1, 0, CLONE[column]), (RETURN, 0, 0, ALLOW), (LOAD, 0, 0, FIRST_ARGUMENT)]
+    lines += [(JUMP_IF_SET, 0, 1, CLONE_THREAD), (RETURN, 0, 0, ALLOW), (RETURN, 0, 0, refuse(errno.EPERM))]
+    return b"".join(struct.pack("=HBBI", *line) for line in lines)

@@ -1,0 +1,178 @@
+"""The program in the sandbox: it runs the cells of one submission, calls its functions and sends numbers back.
+
+It has the standard library and the packages that an answer may use, nothing of labkit. From the first cell on
+everything here is in the student's hands: the other end, `channel`, believes none of it. Requests come on stdin and
+replies go out on stdout, each with its length before it; a request is a pickle (it comes from the grader), a reply is:
+
+    V count dtype ndim shape ... data    an output: one value, or a tuple of `count`
+    O                                    a cell that ran
+    U                                    a blank: NotImplementedError raised in the student's own lines
+    A                                    there is no function of that name
+    E line name                          an exception
+    M name                               a module that is not there
+    K name, D kind, L, B                 a value that is no number, of a dtype that is none, too many, too big
+"""
+
+import importlib
+import io
+import json
+import os
+import pickle
+import re
+import struct
+import sys
+
+DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
+MOST_BYTES = 32 << 20
+MOST_PARTS = 16
+MOST_AXES = 8
+ONE = 255  # the count of an output that is no tuple
+
+
+class Refused(Exception):
+    """A value that cannot be sent; carries the reply that says why."""
+
+
+def encode(value: object) -> bytes:
+    """Write an output as a reply: arrays, numbers and tensors, or a tuple or list of these.
+
+    >>> encode(True)
+    b'V\\xff\\x00\\x00\\x01'
+    """
+    several = issubclass(type(value), tuple | list)
+    if several and len(value) > MOST_PARTS:
+        return b"L"
+    arrays = [as_array(part) for part in (value if several else (value,))]
+    head = bytes([ord("V"), len(arrays) if several else ONE])
+    for array in arrays:
+        if array.ndim > MOST_AXES or array.nbytes > MOST_BYTES:
+            return b"B"
+        code = DTYPES.index(array.dtype.str[1:].replace("b1", "?"))
+        head += struct.pack(f"<BB{array.ndim}q", code, array.ndim, *array.shape)
+    reply = head + b"".join(array.tobytes() for array in arrays)
+    return reply if len(reply) <= MOST_BYTES else b"B"
+
+
+def as_array(value: object):
+    """Give a number, an array or a tensor as a plain little-endian array; raises Refused for anything else."""
+    import numpy as np
+
+    cls, torch = type(value), sys.modules.get("torch")
+    if torch is not None and issubclass(cls, torch.Tensor):
+        value = value.detach().cpu().resolve_neg().numpy()
+    elif not issubclass(cls, bool | int | float | complex | np.generic | np.ndarray):
+        raise Refused(b"K" + cls.__name__.encode()[:60])
+    array = np.array(value, subok=False)
+    if array.dtype.kind not in "biuf":
+        raise Refused(b"D" + array.dtype.kind.encode())
+    if array.dtype.itemsize > 8:  # longdouble
+        array = array.astype(np.float64)
+    return array.astype(array.dtype.newbyteorder("<"))
+
+
+def compiled(source: str, name: str):
+    """Compile a cell; if it is no Python, once more with IPython's magics and shell lines taken out."""
+    try:
+        return compile(source, name, "exec", dont_inherit=True)
+    except SyntaxError:
+        return compile(re.sub(r"(?m)^([ \t]*)[%!].*$", r"\1pass", source), name, "exec", dont_inherit=True)
+
+
+def answer(namespace: dict, request: tuple) -> bytes:
+    """Do what a request asks for, ("cell", name, source) or ("call", name, arguments), and write the reply."""
+    kind, name, content = request
+    try:
+        if kind == "cell":
+            exec(compiled(content, f"<{name}>"), namespace)
+            return b"O"
+        if not callable(namespace.get(name)):
+            return b"A"
+        return encode(namespace[name](*content))
+    except Refused as refusal:
+        return refusal.args[0]
+    except ModuleNotFoundError as error:
+        return b"M" + str(error.name).encode()[:60]
+    except BaseException as error:  # SystemExit and KeyboardInterrupt as well
+        line, last = own_line(error.__traceback__, f"<{name}>")
+        if isinstance(error, NotImplementedError) and last:
+            return b"U"
+        return b"E" + struct.pack("<I", line) + type(error).__name__.encode()[:60]
+
+
+def own_line(trace, cell: str) -> tuple[int, bool]:
+    """The last line of a cell in a traceback, 0 if there is none, and whether the exception was raised right there."""
+    line, last = 0, False
+    while trace is not None:
+        last = trace.tb_frame.f_code.co_filename == cell
+        line, trace = (trace.tb_lineno if last else line), trace.tb_next
+    return line, last
+
+
+class Only:
+    """Without a sandbox: a finder that knows no packages but some. A student's code can take it away."""
+
+    def __init__(self, packages: list[str]):
+        self.packages = {*packages, *sys.stdlib_module_names}
+
+    def find_spec(self, name, path=None, target=None):
+        """Say that there is no such module, or leave it to the other finders."""
+        if name.partition(".")[0] not in self.packages:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+def become(uid: int) -> None:
+    """Leave root for good."""
+    os.setgroups([])
+    os.setgid(uid)
+    os.setuid(uid)
+
+
+def limit(options: dict) -> None:
+    """Set the limits of this process, where the system has them."""
+    try:
+        import resource
+    except ImportError:
+        return
+    wanted = {
+        "AS": options["memory"],
+        "FSIZE": options["file_size"],
+        "NPROC": options["threads"],
+        "CPU": options["cpu_s"],
+        "NOFILE": 64,
+        "CORE": 0,
+    }
+    for name, value in wanted.items():
+        if value is not None:
+            resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (value, value))
+
+
+def main(options: dict) -> None:
+    """Serve requests until there are no more. The first reply, O, says that the packages are loaded."""
+    requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
+    null = os.open(os.devnull, os.O_RDWR)
+    for standard in (0, 1, 2):
+        os.dup2(null, standard)
+    sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w")
+    sys.path += options["path"]
+    if options["uid"] is not None:
+        become(options["uid"])
+    for package in options["load"]:
+        importlib.import_module(package)
+    if options["only"] is not None:
+        sys.meta_path.insert(0, Only(options["only"]))
+    limit(options)
+    send(replies, b"O")
+    namespace = {"__name__": "__main__"}
+    while len(head := requests.read(4)) == 4:
+        send(replies, answer(namespace, pickle.loads(requests.read(*struct.unpack("<I", head)))))
+
+
+def send(stream: io.RawIOBase, reply: bytes) -> None:
+    """Write a reply with its length before it."""
+    data = memoryview(struct.pack("<I", len(reply)) + reply)
+    while data:
+        data = data[stream.write(data) :]
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))

@@ -1,0 +1,184 @@
+"""A small course for the grading tests: released labs made of the kit's questions, and submissions made of functions.
+
+`as_cell` turns any function of the kit (a reference, a misconception, an alternative, a lambda) into the source that a
+student would have handed in, with everything that it calls.
+"""
+
+import ast
+import inspect
+import json
+import types
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from labkit.questions.question import Question, of_topic
+
+
+def code_cell(source: str, grade_id: str | None = None, **mark) -> dict:
+    """A code cell as JSON has it, with nbgrader's mark if it has a grade id."""
+    full = {"grade": False, "solution": False, "locked": False, "task": False, "schema_version": 3} | mark
+    metadata = {} if grade_id is None else {"nbgrader": full | {"grade_id": grade_id}}
+    return {
+        "cell_type": "code",
+        "id": (grade_id or "cell").replace("_", "-"),
+        "metadata": metadata,
+        "source": source,
+        "outputs": [],
+        "execution_count": None,
+    }
+
+
+def written_cell(source: str) -> dict:
+    """The answer in words, which a person grades."""
+    mark = {"grade": True, "solution": True, "locked": False, "task": False, "schema_version": 3, "points": 3}
+    return {
+        "cell_type": "markdown",
+        "id": "explain",
+        "metadata": {"nbgrader": mark | {"grade_id": "explain"}},
+        "source": source,
+    }
+
+
+def notebook(cells: list[dict]) -> dict:
+    """A notebook of format 4.5."""
+    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
+    return {"cells": cells, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}
+
+
+def blank(question: Question) -> str:
+    """What a released lab has in the place of an answer."""
+    return f"def {question.function}{inspect.signature(question.reference)}:\n    raise NotImplementedError\n"
+
+
+def lab_notebook(topic: str, answers: dict[str, str] | None = None, setup: str = "import numpy as np") -> dict:
+    """A lab, with answers in the place of its blanks where they are given."""
+    cells = [code_cell(setup, "setup", locked=True)]
+    for name, question in of_topic(topic).items():
+        source = (answers or {}).get(name, blank(question))
+        cells.append(code_cell(source, name, solution=True))
+        cells.append(code_cell("assert True", f"check_{name}", grade=True, locked=True, points=question.points))
+    cells.append(written_cell("*Your answer.*" if answers is None else "Because of the union."))
+    return notebook(cells)
+
+
+def write_lab(course: Path, topic: str, **how) -> None:
+    """Write course/labs/TOPIC/TOPIC.ipynb."""
+    write(course / "labs" / topic / f"{topic}.ipynb", lab_notebook(topic, **how))
+
+
+def submit(course: Path, student: str, topic: str, answers: dict[str, str] | dict) -> Path:
+    """Write a student's notebook: from answers, or a whole notebook; returns its path."""
+    path = course / "submitted" / student / topic / f"{topic}.ipynb"
+    write(path, answers if "cells" in answers else lab_notebook(topic, answers))
+    return path
+
+
+def write(path: Path, content: dict) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content))
+
+
+def right_answers(topic: str) -> dict[str, str]:
+    """The reference of each question, as a student would write it."""
+    return {name: as_cell(question.reference, name) for name, question in of_topic(topic).items()}
+
+
+# ------------------------------------------------------------------------------------- functions as source
+
+
+def as_cell(function: Callable, name: str) -> str:
+    """The source of a cell that defines a function under a name, with all that it needs of its own module."""
+    done: dict[int, tuple[str, str]] = {}
+    define(function, name, name, done)
+    return "\n\n".join(dict.fromkeys(source for _, source in done.values())) + "\n"
+
+
+def define(function: Callable, name: str, cell: str, done: dict[int, tuple[str, str]]) -> str:
+    """Add the source of a function under a name, after what it uses, and give the name.
+
+    Whatever it uses of the kit gets a name of this cell's own, so that no two cells of a notebook disturb each other.
+    """
+    if id(function) in done:
+        return done[id(function)][0]
+    done[id(function)] = (name, "")  # it may call itself
+    renamed, lines = {}, []
+    for used, value in values_of(function):
+        if isinstance(value, types.FunctionType) and value.__module__.startswith("labkit"):
+            renamed[used] = define(value, f"{cell}_{used}".replace(".", "_"), cell, done)
+        elif not (isinstance(value, types.ModuleType) and value.__name__.startswith("labkit")):
+            lines.append(assignment(used, value))
+    node = Renamed(renamed).visit(node_of(function))
+    if isinstance(node, ast.Lambda):
+        source = f"{name} = {ast.unparse(node)}"
+    else:
+        node.name = name
+        source = ast.unparse(node)
+    del done[id(function)]
+    done[id(function)] = (name, "\n".join([*lines, source]))
+    return name
+
+
+class Renamed(ast.NodeTransformer):
+    """Gives names, and attributes of modules such as answers.iou_of, other names."""
+
+    def __init__(self, names: dict[str, str]):
+        self.names = names
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return ast.Name(self.names.get(node.id, node.id), node.ctx)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        dotted = ast.unparse(node)
+        return ast.Name(self.names[dotted], node.ctx) if dotted in self.names else self.generic_visit(node)
+
+
+def values_of(function: Callable) -> Iterable[tuple[str, object]]:
+    """The names that a function uses and does not define, with their values; of the kit's modules, what is used."""
+    names = dict.fromkeys(n.id for n in ast.walk(node_of(function)) if isinstance(n, ast.Name))
+    free = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    values = function.__globals__ | {name: cell.cell_contents for name, cell in free}
+    for name in names:
+        if name not in values:
+            continue
+        yield name, values[name]
+        if isinstance(values[name], types.ModuleType) and values[name].__name__.startswith("labkit"):
+            for node in ast.walk(node_of(function)):
+                if isinstance(node, ast.Attribute) and ast.unparse(node.value) == name:
+                    yield f"{name}.{node.attr}", getattr(values[name], node.attr)
+
+
+def assignment(name: str, value: object) -> str:
+    """A line that gives a name its value."""
+    if isinstance(value, types.ModuleType):
+        return f"import {value.__name__} as {name}"
+    if isinstance(value, np.ndarray):
+        return f"{name} = np.array({value.tolist()!r}, np.{value.dtype.name})"
+    if callable(value):
+        return f"from {value.__module__} import {value.__qualname__} as {name}"
+    return f"{name} = {value!r}"
+
+
+def node_of(function: Callable) -> ast.FunctionDef | ast.Lambda:
+    """A function's own piece of its module's source."""
+    nodes = list(ast.walk(ast.parse(inspect.getsource(inspect.getmodule(function)))))
+    code = function.__code__
+    for node in nodes:
+        if isinstance(node, ast.FunctionDef) and node.name == code.co_name and first_line(node) == code.co_firstlineno:
+            return node
+    here = [node for node in nodes if isinstance(node, ast.Lambda) and node.lineno == code.co_firstlineno]
+    fitting = [node for node in here if len(here) == 1 or [a.arg for a in node.args.args] == arguments(code)]
+    if len(fitting) != 1:
+        raise LookupError(f"no source of {function} in line {code.co_firstlineno}")
+    return fitting[0]
+
+
+def arguments(code: types.CodeType) -> list[str]:
+    """Names of a function's arguments."""
+    return list(code.co_varnames[: code.co_argcount])
+
+
+def first_line(node: ast.FunctionDef) -> int:
+    """The line where a definition begins, with its decorators."""
+    return min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
