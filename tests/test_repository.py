@@ -27,14 +27,35 @@ LAYERS = [
     ["labkit.validation", "labkit.labels", "labkit.files"],
     ["labkit.plots"],
     ["labkit.frame"],
-    ["labkit.geometry", "labkit.losses", "labkit.metrics", "labkit.network", "labkit.augment", "labkit.crf"],
+    [
+        "labkit.geometry",
+        "labkit.losses",
+        "labkit.metrics",
+        "labkit.network",
+        "labkit.augment",
+        "labkit.crf",
+        "labkit.degrade",
+    ],
     ["labkit.sim", "labkit.grasp", "labkit.grasp_measure", "labkit.training", "labkit.engines", "labkit.baselines"],
     ["labkit.pipeline"],
-    ["labkit.evaluation", "labkit.demo", "labkit.node", "labkit.doctor", "labkit.questions", "labkit.widgets"],
+    [
+        "labkit.evaluation",
+        "labkit.mask_study",
+        "labkit.demo",
+        "labkit.node",
+        "labkit.doctor",
+        "labkit.questions",
+        "labkit.widgets",
+    ],
     ["labkit.checking", "labkit.release", "labkit.grading"],
     ["labkit.cli"],
 ]
-COMMANDS = {"labkit.cli", "labkit.demo", "labkit.evaluation"}  # these may import data_gen, inside a function
+COMMANDS = {
+    "labkit.cli",
+    "labkit.demo",
+    "labkit.evaluation",
+    "labkit.mask_study",
+}  # these may import data_gen, inside a function
 
 
 def tracked(*patterns: str) -> list[Path]:
