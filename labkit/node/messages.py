@@ -1,0 +1,143 @@
+"""What travels between nodes: plain dataclasses with the fields of ROS's messages of the same names.
+
+A stamp is a whole number of nanoseconds, because a float cannot hold today's time to the nanosecond. Nothing here knows
+ROS: `labkit.node.ros` and `labkit.node.bags` translate at their edges.
+"""
+
+from dataclasses import dataclass, field
+
+Buffer = bytes | bytearray | memoryview
+NANOSECONDS = 1_000_000_000  # in a second
+
+
+@dataclass(frozen=True)
+class Header:
+    """When and where: stamp in nanoseconds, frame_id the name of the coordinate frame that the numbers refer to."""
+
+    stamp: int = 0
+    frame_id: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An image as bytes: row r begins at byte r * step; what is behind its last pixel is padding.
+
+    encoding says what a pixel is ("rgb8", "16UC1", ...); is_bigendian how numbers of more than one byte are laid out.
+    """
+
+    header: Header
+    height: int
+    width: int
+    encoding: str
+    is_bigendian: int
+    step: int
+    data: Buffer
+
+
+@dataclass(frozen=True)
+class CameraInfo:
+    """Calibration of a camera: K row by row, D the distortion (empty or zeros for a rectified image)."""
+
+    header: Header
+    height: int
+    width: int
+    K: tuple[float, ...]
+    D: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class PointField:
+    """Where in a point's bytes a number stands; datatype 7 is float32, 8 is float64."""
+
+    name: str
+    offset: int
+    datatype: int = 7
+    count: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud2:
+    """Points as bytes: point_step for each, in which `fields` say what is where; height is 1 if they have no order."""
+
+    header: Header
+    height: int
+    width: int
+    fields: tuple[PointField, ...]
+    is_bigendian: bool
+    point_step: int
+    row_step: int
+    data: Buffer
+    is_dense: bool = True
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A pose in the header's frame: position in metres, orientation as a quaternion (x, y, z, w). ROS: PoseStamped."""
+
+    header: Header
+    position: tuple[float, ...]
+    orientation: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Where the frame child_frame_id stands in the header's frame: it maps the child's coordinates to the parent's.
+
+    translation in metres, rotation as a quaternion (x, y, z, w). ROS: TransformStamped.
+    """
+
+    header: Header
+    child_frame_id: str
+    translation: tuple[float, ...]
+    rotation: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Transforms:
+    """Several transforms at once, as the topics /tf and /tf_static carry them. ROS: TFMessage."""
+
+    transforms: tuple[Transform, ...]
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Joints by name and where they are, or are to be: radians, or metres for a sliding one."""
+
+    header: Header
+    name: tuple[str, ...]
+    position: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """How a node is: level 0 is fine, 1 a warning, 2 an error; values by name, in words. ROS: DiagnosticArray."""
+
+    header: Header
+    name: str
+    level: int
+    message: str
+    values: dict[str, str] = field(default_factory=dict)
+
+
+Message = Image | CameraInfo | PointCloud2 | Pose | Transforms | JointState | Diagnostics
+
+
+@dataclass(frozen=True)
+class Topics:
+    """The names under which messages travel; each can be changed."""
+
+    rgb: str = "/camera/rgb/image_raw"
+    depth: str = "/camera/depth/image_raw"
+    info: str = "/camera/camera_info"
+    tf: str = "/tf"
+    tf_static: str = "/tf_static"
+    mask: str = "/segmentation/mask"
+    probabilities: str = "/segmentation/probabilities"
+    cloud: str = "/segmentation/target_cloud"
+    grasp: str = "/segmentation/grasp"
+    gripper: str = "/segmentation/gripper"
+    scene: str = "/segmentation/scene_cloud"
+    diagnostics: str = "/diagnostics"
+
+
+DEFAULT_TOPICS = Topics()

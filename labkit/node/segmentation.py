@@ -1,0 +1,241 @@
+"""The segmentation node: the data flow of the text's section 5 around a Pipeline, over any transport."""
+
+import logging
+import threading
+import time
+from collections import Counter
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from jaxtyping import Float
+
+from labkit.node import convert
+from labkit.node.messages import (
+    DEFAULT_TOPICS,
+    NANOSECONDS,
+    CameraInfo,
+    Diagnostics,
+    Header,
+    Image,
+    JointState,
+    Message,
+    Topics,
+    Transforms,
+)
+from labkit.node.sync import Synchronizer
+from labkit.node.transforms import TransformTree
+from labkit.pipeline import Perception, Pipeline
+from labkit.validation import check_T
+
+logger = logging.getLogger(__name__)
+HEARTBEAT = 1.0  # seconds between diagnostics where nothing else happens
+
+
+@dataclass
+class Counts:
+    """What became of the messages and frames.
+
+    answered: frames with results published. dropped: frames that a newer one superseded before anybody looked at them.
+    failed: frames that could not be used, skipped: messages that were malformed; `reasons` says why, and how often.
+    """
+
+    answered: int = 0
+    dropped: int = 0
+    failed: int = 0
+    skipped: int = 0
+    reasons: Counter = field(default_factory=Counter)
+
+
+class SegmentationNode:
+    """Colour, depth, calibration and the camera's pose in; mask, target cloud and grasp out.
+
+    pipeline: what perceives. transport: a Bus, or an edge to ROS or to a bag. T_base_cam: where the camera stands; None
+    takes it from the transforms on /tf and /tf_static at the image's stamp, waiting up to `patience` seconds for them.
+    base_frame: the base's name in messages. slop: how far the stamps of one frame may lie apart, seconds. depth_scale:
+    metres a unit of 16UC1. Raises ValueError for an argument that does not fit.
+
+    Messages may come from any thread and are only looked over there; frames are perceived by whoever calls `spin` or
+    `spin_once`. One frame waits: a newer one takes its place, and the old one is counted as dropped. Whatever is
+    malformed or does not fit together is logged with the reason and skipped. Every result carries the colour image's
+    stamp. Probabilities, the planner's scene and the gripper's opening are published if anybody wants them.
+
+    >>> from labkit.node.bus import Bus
+    >>> node = SegmentationNode(Pipeline(lambda rgb: rgb / 255.0), Bus(), T_base_cam=np.eye(4))
+    >>> node.spin_once(timeout=0.0)
+    False
+    """
+
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        transport,
+        T_base_cam: Float[np.ndarray, "4 4"] | None = None,
+        *,
+        base_frame: str = "base_link",
+        topics: Topics = DEFAULT_TOPICS,
+        slop: float = 0.02,
+        depth_scale: float = 0.001,
+        patience: float = 0.2,
+        tree: TransformTree | None = None,
+    ):
+        if not (np.isfinite(slop) and slop >= 0.0):
+            raise ValueError(f"slop: expected seconds of 0 or more, got {slop}")
+        if not (np.isfinite(depth_scale) and depth_scale > 0.0):
+            raise ValueError(f"depth_scale: expected metres a unit, above 0, got {depth_scale}")
+        self.pipeline, self.transport, self.topics = pipeline, transport, topics
+        self.T_base_cam = None if T_base_cam is None else check_T("T_base_cam", T_base_cam)
+        self.base_frame, self.depth_scale, self.patience = base_frame, depth_scale, patience
+        self.counts = Counts()
+        self.tree = tree or TransformTree()
+        self._sync = Synchronizer(("rgb", "depth", "info"), round(slop * NANOSECONDS))
+        self._pending: tuple[dict, float] | None = None
+        self._news = threading.Condition()
+        self._distortion_said = False
+        checks = {
+            "rgb": (Image, lambda message: convert.check_image(message, ("rgb8", *convert.COLOUR))),
+            "depth": (Image, lambda message: convert.check_image(message, convert.DEPTH)),
+            "info": (CameraInfo, self._check_info),
+        }
+        for stream, (kind, check) in checks.items():
+            transport.subscribe(getattr(topics, stream), kind, self._receiver(stream, check))
+        if self.T_base_cam is None:
+            transport.subscribe(topics.tf, Transforms, lambda message: self._take_transforms(message, False))
+            transport.subscribe(topics.tf_static, Transforms, lambda message: self._take_transforms(message, True))
+
+    # ------------------------------------------------------------------------- what comes in, in any thread
+
+    def _receiver(self, stream: str, check):
+        topic = getattr(self.topics, stream)
+
+        def receive(message: Message) -> None:
+            try:
+                check(message)
+                stamp = message.header.stamp
+            except ValueError as error:
+                self._skip(topic, error)
+                return
+            with self._news:
+                together = self._sync.add(stream, stamp, message)
+                if together is None:
+                    return
+                self.counts.dropped += self._pending is not None
+                self._pending = (together, time.monotonic())
+                self._news.notify_all()
+
+        return receive
+
+    def _check_info(self, message: CameraInfo) -> None:
+        convert.camera_matrix(message)
+        if any(message.D) and not self._distortion_said:
+            self._distortion_said = True
+            logger.warning("%s: distortion is not undone; publish rectified images", self.topics.info)
+
+    def _take_transforms(self, message: Transforms, static: bool) -> None:
+        for transform in message.transforms:
+            try:
+                self.tree.add(transform, static)
+            except ValueError as error:
+                self._skip(self.topics.tf_static if static else self.topics.tf, error)
+        with self._news:
+            self._news.notify_all()
+
+    def _skip(self, topic: str, error: ValueError) -> None:
+        logger.warning("%s: message skipped: %s", topic, error)
+        with self._news:
+            self.counts.skipped += 1
+            self.counts.reasons[f"{topic}: {str(error).partition(':')[0]}"] += 1
+
+    # --------------------------------------------------------------------------- what goes out, in one thread
+
+    def spin(self, stop: threading.Event) -> None:
+        """Answer frames until `stop` is set; tell how it goes with each, and once a second while there is none."""
+        said = time.monotonic()
+        while not stop.is_set():
+            if self.spin_once(timeout=0.1):
+                said = time.monotonic()
+            elif time.monotonic() - said > HEARTBEAT:
+                said = time.monotonic()
+                self._report(Header(time.time_ns()), "waiting for frames", {})
+
+    def spin_once(self, timeout: float = 0.0) -> bool:
+        """Answer the frame that waits, or the next one within `timeout` seconds; False if there was none to use."""
+        with self._news:
+            self._news.wait_for(lambda: self._pending is not None, timeout)
+            if self._pending is None:
+                return False
+            together, arrived = self._pending
+            self._pending = None
+        header = together["rgb"].header
+        try:
+            T_base_cam = self._base_transform(header, arrived)
+            perception = self.pipeline.run(
+                convert.to_frame(**together, T_base_cam=T_base_cam, depth_scale=self.depth_scale)
+            )
+            self._publish(header, perception)
+        except (ValueError, LookupError) as error:
+            self._fail(header, error)
+            return False
+        except Exception as error:  # a mistake in somebody's stage must not end the node either, but it is shown whole
+            logger.exception("frame of stamp %d failed", header.stamp)
+            self._fail(header, error)
+            return False
+        self.counts.answered += 1
+        plan = perception.plan
+        self._report(
+            header,
+            "answered",
+            {
+                "milliseconds": f"{1000.0 * (time.monotonic() - arrived):.1f}",
+                "grasp": f"best of {len(plan.grasps)}" if plan.grasps else f"none: {plan.reason}",
+            },
+        )
+        return True
+
+    def _base_transform(self, header: Header, arrived: float) -> Float[np.ndarray, "4 4"]:
+        """Where the camera stood at an image's stamp; its transform may arrive a little later than the image."""
+        if self.T_base_cam is not None:
+            return self.T_base_cam
+        while True:
+            with self._news:
+                try:
+                    return self.tree.lookup(self.base_frame, header.frame_id, header.stamp)
+                except LookupError:
+                    left = arrived + self.patience - time.monotonic()
+                    if left <= 0.0:
+                        raise
+                    self._news.wait(left)
+
+    def _fail(self, header: Header, error: Exception) -> None:
+        text = str(error) if not isinstance(error, KeyError) else repr(error)
+        logger.warning("frame of stamp %d skipped: %s", header.stamp, text)
+        with self._news:
+            self.counts.failed += 1
+            self.counts.reasons[f"frame: {text.partition(':')[0]}"] += 1
+        self._report(header, f"frame skipped: {text}", {}, level=1)
+
+    def _publish(self, header: Header, perception: Perception) -> None:
+        topics, base = self.topics, Header(header.stamp, self.base_frame)
+        publish, wanted = self.transport.publish, self.transport.wanted
+        publish(topics.mask, convert.encode_image(perception.labels, "mono8", header))
+        if wanted(topics.probabilities):
+            p = perception.probabilities.astype(np.float32, copy=False)
+            publish(topics.probabilities, convert.encode_image(p, f"32FC{p.shape[-1]}", header))
+        cloud = np.concatenate([np.zeros((0, 3), np.float32), *perception.clouds])
+        publish(topics.cloud, convert.encode_cloud(cloud, base))
+        if wanted(topics.scene):
+            publish(topics.scene, convert.encode_cloud(perception.scene, base))
+        if perception.plan.grasps:
+            grasp = perception.plan.grasps[0]
+            if wanted(topics.gripper):
+                finger = grasp.width / 2.0
+                names = ("panda_finger_joint1", "panda_finger_joint2")
+                publish(topics.gripper, JointState(base, names, (finger, finger)))
+            publish(topics.grasp, convert.encode_pose(grasp.T_base_grasp, base))
+
+    def _report(self, header: Header, message: str, values: dict[str, str], level: int = 0) -> None:
+        with self._news:
+            counted = {f.name: getattr(self.counts, f.name) for f in fields(Counts) if f.name != "reasons"}
+            counted["unmatched"] = self._sync.unmatched
+            values = values | {name: str(n) for name, n in counted.items()}
+            values |= {reason: str(n) for reason, n in self.counts.reasons.most_common(5)}
+        self.transport.publish(self.topics.diagnostics, Diagnostics(header, "segmentation", level, message, values))

@@ -1,0 +1,106 @@
+"""Where frames stood when: a tree of stamped transforms, as the topics /tf and /tf_static describe it.
+
+An image is of the past by the time it is used. The transform to use is the one of the image's stamp, not the latest.
+"""
+
+import bisect
+import threading
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation, Slerp
+
+from labkit.geometry import invert_transform
+from labkit.node.convert import rigid
+from labkit.node.messages import NANOSECONDS, Transform
+
+
+class TransformTree:
+    """Transforms by child frame, each with its parent; moving ones are kept for `seconds` and interpolated in between.
+
+    May be filled by one thread and asked by another.
+
+    >>> tree = TransformTree()
+    >>> from labkit.node.messages import Header
+    >>> for stamp, x in ((0, 1.0), (100, 2.0)):
+    ...     tree.add(Transform(Header(stamp, "base"), "camera", (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    >>> tree.lookup("base", "camera", 25)[:3, 3].tolist()
+    [1.25, 0.0, 0.0]
+    """
+
+    def __init__(self, seconds: float = 10.0):
+        self._span = seconds * NANOSECONDS
+        self._parents: dict[str, str] = {}
+        self._static: dict[str, np.ndarray] = {}
+        self._moving: dict[str, list[tuple[int, np.ndarray]]] = {}
+        self._lock = threading.Lock()
+
+    def add(self, transform: Transform, static: bool = False) -> None:
+        """Take a transform in; raises ValueError if its rotation is none or a frame's name is missing.
+
+        A moving one that is more than the kept time older than the newest begins a new history: the clock was set back.
+        """
+        parent, child, stamp = transform.header.frame_id, transform.child_frame_id, transform.header.stamp
+        if not parent or not child or parent == child:
+            raise ValueError(f"transform: expected the names of two frames, got {parent!r} and {child!r}")
+        T_parent_child = rigid(transform.translation, transform.rotation)
+        with self._lock:
+            if self._parents.setdefault(child, parent) != parent:
+                self._parents[child] = parent
+                self._moving.pop(child, None)
+            if static:
+                self._static[child] = T_parent_child
+                return
+            history = self._moving.setdefault(child, [])
+            if history and stamp < history[-1][0] - self._span:
+                history.clear()
+            bisect.insort(history, (stamp, T_parent_child), key=lambda item: item[0])
+            while history[-1][0] - history[0][0] > self._span:
+                history.pop(0)
+
+    def lookup(self, target: str, source: str, stamp: int) -> Float[np.ndarray, "4 4"]:
+        """Give T_target_source at a time: it maps the source frame's coordinates to the target's.
+
+        Raises LookupError, with the reason, if the frames are not connected or the time lies outside what is known.
+        """
+        with self._lock:
+            up_target, up_source = self._ancestors(target), self._ancestors(source)
+            common = next((frame for frame in up_source if frame in up_target), None)
+            if common is None:
+                raise LookupError(f"no transform between {target!r} and {source!r}")
+            T_common_target = self._chain(up_target[: up_target.index(common)], stamp)
+            T_common_source = self._chain(up_source[: up_source.index(common)], stamp)
+        return invert_transform(T_common_target) @ T_common_source
+
+    def _ancestors(self, frame: str) -> list[str]:
+        """A frame, its parent, and so on up to the root, or until a loop closes."""
+        found = [frame]
+        while (parent := self._parents.get(found[-1])) is not None and parent not in found:
+            found.append(parent)
+        return found
+
+    def _chain(self, frames: list[str], stamp: int) -> np.ndarray:
+        T = np.eye(4)
+        for frame in frames:
+            T = self._at(frame, stamp) @ T
+        return T
+
+    def _at(self, child: str, stamp: int) -> np.ndarray:
+        """T_parent_child at a time: straight between the neighbours' places, and on the shortest turn."""
+        if child in self._static:
+            return self._static[child]
+        history = self._moving[child]
+        first, last = history[0][0], history[-1][0]
+        if not first <= stamp <= last:
+            side, by = ("before the first", first - stamp) if stamp < first else ("after the last", stamp - last)
+            raise LookupError(f"{child!r}: the image is {by / NANOSECONDS:.3f} s {side} known transform")
+        after = bisect.bisect_left(history, stamp, key=lambda item: item[0])
+        if history[after][0] == stamp:
+            return history[after][1]
+        (t0, T0), (t1, T1) = history[after - 1 : after + 1]
+        share = (stamp - t0) / (t1 - t0)
+        turns = Slerp([0.0, 1.0], Rotation.from_matrix([T0[:3, :3], T1[:3, :3]]))
+        T = np.eye(4)
+        T[:3, :3] = turns(share).as_matrix()
+        T[:3, 3] = (1.0 - share) * T0[:3, 3] + share * T1[:3, 3]
+        return T

@@ -1,0 +1,345 @@
+"""The node over the in-process bus: what comes out of what goes in, what is dropped, skipped, and said about it."""
+
+import dataclasses
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from labkit.frame import RGBDFrame
+from labkit.labels import SURFACE, TARGET, one_hot
+from labkit.node import convert
+from labkit.node.actors import Arm, Camera
+from labkit.node.bus import Bus
+from labkit.node.messages import CameraInfo, Header, Image, Topics
+from labkit.node.rehearsal import camera_to_lift
+from labkit.node.segmentation import SegmentationNode
+from labkit.pipeline import Pipeline
+from labkit.sim.spec import Camera as CameraSpec
+from labkit.sim.spec import ObjectSpec, Part, SceneSpec
+from labkit.sim.world import World
+
+TOPICS = Topics()
+MS = 1_000_000
+
+
+def block_scene():
+    block = ObjectSpec("block", "block", TARGET, (0.5, 0.05, 0.022), parts=(Part("box", (0.04, 0.06, 0.04)),))
+    return SceneSpec(objects=(block,), camera=CameraSpec.looking_at((0.5, 0.0, 0.0), 0.7, 0.3, 0.8), seed=5)
+
+
+@pytest.fixture(scope="module")
+def frame():
+    with World(block_scene()) as world:
+        return world.render((160, 120))
+
+
+class Truth:
+    """A "network" that knows the labels of a frame, and counts how often it was asked."""
+
+    def __init__(self, labels):
+        self.answer, self.asked = one_hot(labels).astype(np.float32), 0
+
+    def __call__(self, rgb):
+        self.asked += 1
+        return self.answer
+
+
+class Listener:
+    """Everything that was published, by topic."""
+
+    def __init__(self, bus, *fields):
+        self.heard = {field: [] for field in fields}
+        for field in fields:
+            bus.subscribe(getattr(TOPICS, field), object, self.heard[field].append)
+
+    def __getattr__(self, name):
+        return self.heard[name]
+
+
+def system(frame, *listen, **options):
+    """A bus with a node that sees the truth, a camera, and somebody who listens."""
+    bus = Bus()
+    listener = Listener(bus, "mask", "cloud", "grasp", "diagnostics", *listen)
+    node = SegmentationNode(Pipeline(Truth(frame.labels)), bus, **options)
+    return node, Camera(bus), listener, bus
+
+
+def messages(frame, stamp=0, frame_id="camera_optical_frame"):
+    """The three messages of a frame, by stream."""
+    bus, caught = Bus(), {}
+    for field in ("rgb", "depth", "info"):
+        bus.subscribe(getattr(TOPICS, field), object, lambda message, field=field: caught.update({field: message}))
+    Camera(bus, frame_id=frame_id).publish(frame, stamp)
+    return caught
+
+
+def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
+    node, camera, out, _ = system(frame, "probabilities", "scene", "gripper", base_frame="base_link")
+    camera.publish(frame, stamp=123456789)
+    assert node.spin_once()
+    p = node.pipeline.run(frame)
+    (mask,), (cloud,), (grasp,) = out.mask, out.cloud, out.grasp
+    assert mask.encoding == "mono8" and np.array_equal(convert.decode_image(mask), p.labels)
+    assert mask.header == Header(123456789, "camera_optical_frame")
+    assert cloud.header == grasp.header == Header(123456789, "base_link")
+    assert np.allclose(convert.decode_cloud(cloud), np.concatenate(p.clouds), atol=1e-6)
+    assert np.allclose(convert.decode_pose(grasp), p.plan.grasps[0].T_base_grasp, atol=1e-6)
+    assert np.allclose(convert.decode_image(out.probabilities[0]), p.probabilities)
+    assert np.allclose(convert.decode_cloud(out.scene[0]), p.scene, atol=1e-6)
+    assert sum(out.gripper[0].position) == pytest.approx(p.plan.grasps[0].width)
+
+
+def test_what_nobody_wants_is_not_made(frame):
+    node, camera, _, bus = system(frame)
+    sent = []
+    publish, bus.publish = bus.publish, lambda topic, message: (sent.append(topic), publish(topic, message))
+    camera.publish(frame)
+    node.spin_once()
+    assert TOPICS.mask in sent and not {TOPICS.probabilities, TOPICS.scene, TOPICS.gripper} & set(sent)
+
+
+def test_millimetres_of_16_bit_are_metres_inside(frame):
+    node, _, out, bus = system(frame)
+    Camera(bus, depth="16UC1").publish(frame)
+    node.spin_once()
+    exact = np.concatenate(node.pipeline.run(frame).clouds)
+    found = convert.decode_cloud(out.cloud[0])
+    assert abs(len(found) - len(exact)) < 0.02 * len(exact)
+    assert np.allclose(found.mean(axis=0), exact.mean(axis=0), atol=5e-4)
+
+
+def test_the_newest_frame_wins_and_drops_are_counted_and_told(frame):
+    node, camera, out, _ = system(frame)
+    for stamp in range(5):
+        camera.publish(frame, stamp * 100 * MS)
+    assert node.spin_once() and not node.spin_once()
+    assert [mask.header.stamp for mask in out.mask] == [400 * MS]
+    assert out.diagnostics[-1].values["dropped"] == "4" and out.diagnostics[-1].values["answered"] == "1"
+
+
+def test_a_slow_node_answers_the_newest_of_a_fast_camera(frame):
+    bus = Bus()
+    entered, go_on = threading.Event(), threading.Event()
+
+    def slow(rgb):
+        entered.set()
+        assert go_on.wait(10)
+        return one_hot(frame.labels).astype(np.float32)
+
+    out = Listener(bus, "mask")
+    node = SegmentationNode(Pipeline(slow), bus)
+    stop = threading.Event()
+    thread = threading.Thread(target=node.spin, args=(stop,))
+    thread.start()
+    camera = Camera(bus)
+    camera.publish(frame, 0)
+    assert entered.wait(10)
+    for stamp in (1, 2, 3):  # while the first is worked on
+        camera.publish(frame, stamp * 100 * MS)
+    go_on.set()
+    deadline = time.monotonic() + 10
+    while len(out.mask) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    stop.set()
+    thread.join()
+    assert [mask.header.stamp for mask in out.mask] == [0, 300 * MS]
+    assert node.counts.dropped == 2 and node.counts.answered == 2
+
+
+def test_stamps_need_not_be_equal_and_order_does_not_matter(frame):
+    node, _, out, bus = system(frame, T_base_cam=frame.T_base_cam)
+    late = messages(frame, 1000 * MS)
+    parts = [
+        ("info", 1003 * MS),
+        ("rgb", 1000 * MS),
+        ("depth", 1012 * MS),
+    ]
+    for stream, stamp in parts:
+        message = dataclasses.replace(late[stream], header=Header(stamp, "camera_optical_frame"))
+        bus.publish(getattr(TOPICS, stream), message)
+    assert node.spin_once() and out.mask[0].header.stamp == 1000 * MS
+    for stream, stamp in (("info", 2000 * MS), ("rgb", 2000 * MS), ("depth", 2050 * MS)):
+        message = dataclasses.replace(late[stream], header=Header(stamp, "camera_optical_frame"))
+        bus.publish(getattr(TOPICS, stream), message)
+    assert not node.spin_once(), "50 ms apart is not one moment"
+
+
+def spoil(rng, good):
+    """One malformed message: its stream and itself."""
+    header = Header(int(rng.integers(0, 10**10)), "camera_optical_frame")
+    image, info = good["rgb"], good["info"]
+    ways = [
+        ("rgb", dataclasses.replace(image, header=header, data=image.data[: int(rng.integers(0, len(image.data)))])),
+        ("rgb", dataclasses.replace(image, header=header, encoding=str(rng.choice(["yuv422", "", "rgb16"])))),
+        ("rgb", dataclasses.replace(image, header=header, step=int(rng.integers(0, image.step)))),
+        ("rgb", dataclasses.replace(image, header=header, height=0)),
+        ("rgb", dataclasses.replace(image, header=header, width=image.width + int(rng.integers(1, 99)))),
+        ("depth", dataclasses.replace(good["depth"], header=header, encoding="mono8")),
+        ("depth", dataclasses.replace(good["depth"], header=header, data=b"")),
+        ("depth", info),
+        ("info", dataclasses.replace(info, header=header, K=(0.0,) * 9)),
+        ("info", dataclasses.replace(info, header=header, K=tuple(np.transpose(np.reshape(info.K, (3, 3))).ravel()))),
+        ("info", dataclasses.replace(info, header=header, K=(float("nan"),) * 9)),
+        ("info", dataclasses.replace(info, header=header, K=info.K[:5])),
+    ]
+    return ways[rng.integers(len(ways))]
+
+
+@pytest.mark.bad_input
+def test_among_as_many_malformed_messages_every_good_frame_is_answered(frame, caplog):
+    """1,000 good frames, 1,000 malformed messages in between: the node answers 1,000 frames and says 1,000 reasons."""
+    small = RGBDFrame(frame.rgb[:12, :16], frame.depth[:12, :16], frame.K, frame.T_base_cam)
+    bus = Bus()
+    out = Listener(bus, "mask", "diagnostics")
+    labels = np.full((12, 16), SURFACE)
+    node = SegmentationNode(Pipeline(Truth(labels)), bus, T_base_cam=small.T_base_cam)
+    rng = np.random.default_rng(0)
+    for number in range(1000):
+        good = messages(small, number * 33 * MS)
+        parts = list(good.items())
+        rng.shuffle(parts)
+        parts.insert(int(rng.integers(4)), spoil(rng, good))
+        for stream, message in parts:
+            bus.publish(getattr(TOPICS, stream), message)
+        assert node.spin_once(), f"frame {number}"
+    assert [mask.header.stamp for mask in out.mask] == [number * 33 * MS for number in range(1000)]
+    assert node.counts.skipped == 1000 and node.counts.failed == node.counts.dropped == 0
+    assert sum(node.counts.reasons.values()) == 1000
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == 1000 and all("expected" in line and "got" in line for line in said)
+
+
+def test_messages_that_do_not_fit_together_are_named_and_the_next_frame_is_answered(frame, caplog):
+    node, camera, out, bus = system(frame, T_base_cam=frame.T_base_cam)
+    good = messages(frame)
+    header = Header(0, "camera_depth_frame")
+    millimetres = convert.encode_image(1000.0 * frame.depth, "32FC1", good["depth"].header)
+    for wrong, reason in (
+        ({"info": dataclasses.replace(good["info"], height=99)}, "info: expected the size of rgb"),
+        ({"depth": dataclasses.replace(good["depth"], header=header)}, "registered"),
+        ({"depth": millimetres}, "looks like millimetres"),
+    ):
+        for stream, message in (good | wrong).items():
+            bus.publish(getattr(TOPICS, stream), message)
+        assert not node.spin_once()
+        assert reason in caplog.records[-1].getMessage() and out.diagnostics[-1].level == 1
+    camera.publish(frame)
+    assert node.spin_once() and node.counts.failed == 3
+
+
+def test_a_broken_stage_ends_a_frame_and_not_the_node(frame, caplog):
+    bus = Bus()
+    answers = iter([RuntimeError("out of memory"), one_hot(frame.labels).astype(np.float32)])
+
+    def model(rgb):
+        answer = next(answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    node = SegmentationNode(Pipeline(model), bus)
+    Camera(bus).publish(frame)
+    assert not node.spin_once()
+    assert any(record.exc_info for record in caplog.records), "the traceback of a mistake is shown"
+    Camera(bus).publish(frame)
+    assert node.spin_once() and node.counts.failed == 1
+
+
+def test_a_frame_waits_for_its_transform_and_without_one_it_is_skipped(frame, caplog):
+    node, camera, _, bus = system(frame, patience=5.0)
+    for stream, message in messages(frame, 50 * MS).items():
+        bus.publish(getattr(TOPICS, stream), message)
+    late = threading.Timer(0.1, camera.publish, (frame, 50 * MS))  # brings the transform, and another frame
+    late.start()
+    assert node.spin_once(), "the transform came after the images"
+    late.join()
+    node.patience = 0.0
+    for stream, message in messages(frame, 900 * MS).items():
+        bus.publish(getattr(TOPICS, stream), message)
+    assert not node.spin_once() and "0.850 s after the last" in caplog.records[-1].getMessage()
+
+
+def test_without_a_target_there_is_a_mask_and_no_grasp(frame):
+    bus = Bus()
+    out = Listener(bus, "mask", "cloud", "grasp", "diagnostics")
+    node = SegmentationNode(Pipeline(Truth(np.full(frame.labels.shape, SURFACE))), bus)
+    Camera(bus).publish(frame)
+    assert node.spin_once() and len(out.mask) == 1
+    assert convert.decode_cloud(out.cloud[0]).shape == (0, 3) and not out.grasp
+    assert out.diagnostics[0].values["grasp"] == "none: no target points"
+
+
+def test_a_node_without_frames_still_says_that_it_lives(frame, monkeypatch):
+    monkeypatch.setattr("labkit.node.segmentation.HEARTBEAT", 0.0)
+    node, _, out, _ = system(frame)
+    stop = threading.Event()
+    thread = threading.Thread(target=node.spin, args=(stop,))
+    thread.start()
+    time.sleep(0.3)
+    stop.set()
+    thread.join()
+    assert out.diagnostics and out.diagnostics[0].message == "waiting for frames"
+
+
+def test_distortion_is_told_once(frame, caplog):
+    _, _, _, bus = system(frame, T_base_cam=frame.T_base_cam)
+    info = messages(frame)["info"]
+    for _ in range(3):
+        bus.publish(TOPICS.info, CameraInfo(info.header, info.height, info.width, info.K, D=(0.1, 0.0)))
+    assert sum("rectified" in record.getMessage() for record in caplog.records) == 1
+
+
+def test_a_camera_publishes_any_iterable_at_its_rate_until_it_is_stopped(frame):
+    bus = Bus()
+    out = Listener(bus, "rgb")
+    start = time.monotonic()
+    assert Camera(bus).run((frame for _ in range(5)), rate=50.0) == 5
+    assert len(out.rgb) == 5 and time.monotonic() - start > 0.08
+    stop = threading.Event()
+    bus.subscribe(TOPICS.rgb, Image, lambda message: stop.set())
+    assert Camera(bus).run(iter(lambda: frame, None), stop=stop) == 1
+
+
+def test_the_arm_lifts_what_the_node_found():
+    """Section 5's diagram, in process: nothing but messages goes from the camera to the arm."""
+    spec = block_scene()
+    with World(spec) as world:
+        bus = Bus()
+        frame = world.render()
+        arm = Arm(bus, world)
+        node = SegmentationNode(Pipeline(Truth(frame.labels)), bus)
+        Camera(bus).publish(frame)
+        assert node.spin_once()
+        before = world.pose("block")[2, 3]
+        result = arm.act(timeout=0.0)
+        assert result.success and result.name == "block"
+        assert world.pose("block")[2, 3] - before > 0.1
+        assert arm.act(timeout=0.0).reason == "no grasp"
+
+
+def test_the_rehearsal_says_in_one_line_what_happened():
+    spec = block_scene()
+    with World(spec) as world:
+        labels = world.render().labels
+    line = camera_to_lift(spec, Pipeline(Truth(labels)))
+    assert line.startswith("scene 5: frame answered") and line.endswith("lifted block") and "\n" not in line
+    nothing = camera_to_lift(spec, Pipeline(Truth(np.full(labels.shape, SURFACE))))
+    assert nothing.endswith("0 target points, grasp: none: no target points")
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda p, b: SegmentationNode(p, b, slop=-1.0), "slop"),
+        (lambda p, b: SegmentationNode(p, b, depth_scale=0.0), "depth_scale"),
+        (lambda p, b: SegmentationNode(p, b, np.ones((4, 4))), "T_base_cam"),
+        (lambda p, b: Camera(b, depth="mono8"), "depth"),
+        (lambda p, b: Camera(b).run([], rate=0.0), "rate"),
+    ],
+)
+def test_wrong_arguments_are_named(make, name):
+    with pytest.raises(ValueError, match=f"^{name}:"):
+        make(Pipeline(np.asarray), Bus())
