@@ -225,7 +225,7 @@ TRANSFORM_POINTS = Question(
         Misconception(
             "rows taken for columns",
             answers.row_major,
-            "The last row of T is 0 0 0 1, and the translation stands in the last column: which of the two did you read?",
+            "The last row of T is 0 0 0 1, and the translation stands in the last column: which did you read?",
         ),
         Misconception(
             "translation subtracted", answers.translation_subtracted, "Check the sign: (0, 0, 0) must land on t."
