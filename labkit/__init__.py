@@ -17,7 +17,7 @@ if sys.version_info[:2] != (3, 11):
 __version__ = "0.1.0"
 
 
-def check(name: str, answer: Callable) -> Callable:
+def check(name: str, answer: object) -> Callable:
     """Check a student's answer, show the result, and return the function to go on with: see `labkit.checking`."""
     from labkit.checking import check
 

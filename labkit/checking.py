@@ -43,7 +43,7 @@ class Shown:
         )
 
 
-def check(name: str, answer: Callable) -> Callable:
+def check(name: str, answer: object) -> Callable:
     """Check a student's answer, show the result, and return the function to go on with.
 
     name: of the question, "04_iou.iou". answer: the student's function. Returns the answer if it passes every case,
