@@ -81,6 +81,12 @@ def test_the_pixels_of_the_chosen_cell_light_up():
         assert matrix.patches[0].get_xy() == (j - 0.5, i - 0.5)
 
 
+def test_the_cells_start_at_the_most_frequent_mistake():
+    y_true, y_pred = np.array([[1, 1, 3, 3, 3]]), np.array([[1, 2, 0, 0, 3]])
+    explorer = widgets.confusion_cells(np.zeros((1, 5, 3), np.uint8), y_true, y_pred)
+    assert explorer.values == {"true": "obstacle", "predicted": "background"}
+
+
 def test_the_matrix_shows_every_count():
     n = confusion_matrix(labels(4), labels(5), 4)
     axes = Figure().subplots()

@@ -116,8 +116,13 @@ def sliding_mask() -> Explorer:
 def confusion_cells(
     rgb: UInt8[np.ndarray, "H W 3"], y_true: Integer[np.ndarray, "H W"], y_pred: Integer[np.ndarray, "H W"]
 ) -> Explorer:
-    """Pick a cell of the confusion matrix, and its pixels light up in the image. Controls: true and predicted class."""
+    """Pick a cell of the confusion matrix, and its pixels light up in the image. Controls: true and predicted class.
+
+    It starts at the most frequent mistake.
+    """
     n = confusion_matrix(y_true, y_pred, len(CLASSES))
+    mistakes = n - np.diag(np.diagonal(n))
+    first_true, first_predicted = np.unravel_index(mistakes.argmax(), n.shape)
     dark = (rgb * 0.4).astype(np.uint8)
 
     def draw(figure: Figure, true: str, predicted: str) -> None:
@@ -130,7 +135,7 @@ def confusion_cells(
         picture.axis("off")
 
     controls = {
-        "true": ipywidgets.Dropdown(options=CLASSES, value="target", description="true"),
-        "predicted": ipywidgets.Dropdown(options=CLASSES, value="obstacle", description="predicted"),
+        "true": ipywidgets.Dropdown(options=CLASSES, value=CLASSES[first_true], description="true"),
+        "predicted": ipywidgets.Dropdown(options=CLASSES, value=CLASSES[first_predicted], description="predicted"),
     }
     return Explorer(draw, controls, size=(8.5, 3.3))
