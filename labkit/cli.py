@@ -103,6 +103,17 @@ def export(
 
 
 @app.command()
+def compare(
+    out: Annotated[Path, typer.Option(help="The table to write, a CSV file.")] = Path("lessons/09_other_stacks.csv"),
+    scenes: Annotated[int, typer.Option(help="How many scenes.", min=1)] = 40,
+) -> None:
+    """Compare the stacks on the same scenes, masks, times and lifts: the table that lesson 09 reads (some minutes)."""
+    from labkit import stack_study
+
+    typer.echo(stack_study.table(stack_study.run(out, scenes=scenes)))
+
+
+@app.command()
 def demo(
     seed: Annotated[
         int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
@@ -143,6 +154,40 @@ def release(
     if not changed:
         typer.echo("labs, solutions and lessons are as they should be")
     raise typer.Exit(1 if check and changed else 0)
+
+
+@app.command()
+def grade(
+    topic: Annotated[str, typer.Argument(help="Which lab, such as 04_iou.")],
+    submissions: Annotated[
+        Path | None, typer.Option(help="Folder of STUDENT/TOPIC/TOPIC.ipynb; COURSE/submitted if not given.")
+    ] = None,
+    seed: Annotated[str | None, typer.Option(help="Secret seed of the cases; drawn once, and kept in OUT.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Submissions at a time; one a core if not given.", min=1)] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
+    course: Annotated[Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.")] = Path("."),
+    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to grade on.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-no-sandbox", help="Without bubblewrap: submissions may do anything here.")
+    ] = False,
+) -> None:
+    """Grade submissions of a lab in a sandbox; exit status 1 if something needs a look, 2 if it could not be done."""
+    import os
+
+    from labkit.grading.outputs import terminal_table
+    from labkit.grading.run import grade_course
+    from labkit.grading.sandbox import NO_SANDBOX
+
+    workers = workers or os.cpu_count() or 1
+    how = {"workers": workers, "dask": dask, "force": force, "unsafe": unsafe}
+    graded = grade_course(topic, course, submissions, out, seed, **how)
+    typer.echo(terminal_table(graded.lab, graded.records))
+    folder = out or course / "grades" / topic
+    typer.echo(f"{len(graded.records)} students, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
+    if unsafe:
+        typer.echo(f"Warning: {NO_SANDBOX}.", err=True)
+    raise typer.Exit(1 if graded.needs_a_look else 0)
 
 
 def main() -> None:

@@ -41,6 +41,7 @@ LAYERS = [
     [
         "labkit.evaluation",
         "labkit.mask_study",
+        "labkit.stack_study",
         "labkit.demo",
         "labkit.node",
         "labkit.doctor",
@@ -55,6 +56,7 @@ COMMANDS = {
     "labkit.demo",
     "labkit.evaluation",
     "labkit.mask_study",
+    "labkit.stack_study",
 }  # these may import data_gen, inside a function
 
 
