@@ -59,7 +59,7 @@ def release(course: Path, topics: Sequence[str] = (), check: bool = False) -> li
 def read(path: Path) -> NotebookNode:
     """Read a notebook; raises ValueError with its name if it is none."""
     try:
-        return nbformat.read(path, as_version=4)
+        return nbformat.from_dict(nbformat.read(path, as_version=4))
     except Exception as error:  # nbformat raises many kinds
         raise ValueError(f"{path}: expected a notebook, but it cannot be read: {error}") from error
 
