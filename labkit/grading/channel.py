@@ -52,7 +52,7 @@ class Worker:
         self.exchange(b"", limit_s)
 
     def exchange(self, data: bytes, limit_s: float) -> object:
-        """Write, then read one reply. The deadline holds for both, for the pipe of a worker that does not read fills."""
+        """Write, then read one reply. The deadline holds for both: a pipe that nobody reads gets full."""
         alarm = threading.Timer(limit_s, self.stop_late)
         alarm.start()
         try:

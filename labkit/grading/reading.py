@@ -98,7 +98,7 @@ def imported_roots(source: str) -> tuple[str, ...]:
 
 
 def find_submissions(folder: Path, topic: str) -> Iterator[tuple[str, Path | Unreadable]]:
-    """Go through a folder of students' folders, in the order of their names: the notebook of each, or why there is none.
+    """Go through a folder of students' folders by their names, and give the notebook of each, or why there is none.
 
     What begins with a dot is passed over, and so is a student who handed in nothing of this topic. Raises ValueError
     if there is no such folder.

@@ -91,8 +91,8 @@ def probe(packages: Sequence[str], limits: Limits) -> None:
     """Start a worker to see whether the sandbox works here; raises ValueError that says what is missing."""
     if shutil.which("bwrap") is None:
         raise ValueError(
-            "sandbox: bubblewrap (`bwrap`) is not installed; on Debian and Ubuntu it is the package `bubblewrap`, on macOS "
-            "and Windows there is none. --unsafe-no-sandbox grades without it: anything that a submission does is done"
+            "sandbox: bubblewrap (`bwrap`) is not installed; on Debian and Ubuntu it is the package `bubblewrap`, on "
+            "macOS and Windows there is none. --unsafe-no-sandbox grades without it: submissions may then do anything"
         )
     reading, writing = os.pipe()
     os.write(writing, seccomp.program())

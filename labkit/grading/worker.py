@@ -152,7 +152,6 @@ def main(options: dict) -> None:
     null = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1, 2):
         os.dup2(null, standard)
-    sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w")
     sys.path += options["path"]
     if options["uid"] is not None:
         become(options["uid"])
