@@ -87,6 +87,8 @@ def keyhole(
             whole.add_patch(Rectangle(np.subtract(corner, 0.5), *patch.shape[1::-1], fill=False, color="white"))
             label = y[v, u]
             whole.set_title(f"true class: {CLASSES[label] if label < len(CLASSES) else 'ignore'}")
+        else:
+            whole.text(0.5, 0.5, "surface, target,\nobstacle, background?", ha="center", va="center", fontsize=13)
         for axes in (through, whole):
             axes.axis("off")
 
