@@ -84,7 +84,7 @@ def draw_energies(axes: Axes, terms: dict[str, tuple[float, float]], limit: floa
     axes.invert_yaxis()
     axes.set_xlim(0.0, limit or 1.2 * (unary + pairwise).max())
     axes.set_xlabel("energy")
-    axes.legend(fontsize=8, loc="lower right")
+    axes.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
 
 
