@@ -4,6 +4,7 @@
 #   make lab     JupyterLab
 #   make release generate labs/ from solutions/
 #   make train   make the data again and train the shipped weights again (over an hour on two cores)
+#   make stacks  build the same in C++, Java and Octave where they are installed, and compare
 #   make bench   add the peers, measure against them, write BENCHMARKS.md
 #   make clean   remove what can be made again in seconds; .venv and data/ stay
 # make PYTHON=/path/to/python3.11 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
@@ -11,7 +12,7 @@
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train bench clean
+.PHONY: demo test lab release train stacks bench clean
 
 EXTRAS := instructor,stacks,test
 BIN := .venv/bin
@@ -29,11 +30,15 @@ demo: .venv/installed
 	$(BIN)/labkit demo $(ARGS)
 
 # Two processes with one thread each: with two each, they only wait for one another. ARGS="-n 8" takes more cores.
+# Notebooks: outputs of lessons and solutions are compared with the committed ones, labs run as students get them.
+NBVAL := -q --nbval-current-env --nbval-cell-timeout 120 -n 2 --dist loadfile
 test: export OMP_NUM_THREADS := 1
 test: .venv/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest $(NBVAL) --nbval lessons solutions
+	$(BIN)/python -m pytest $(NBVAL) --nbval-lax labs
 
 lab: .venv/installed
 	$(BIN)/jupyter lab $(ARGS)
@@ -49,6 +54,9 @@ train: .venv/installed
 	$(BIN)/labkit train data/train --val data/val --model unet $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	mkdir -p labkit/weights
 	cp data/runs/smallsegnet.pt data/runs/unet.pt labkit/weights/
+
+stacks: .venv/installed
+	$(BIN)/python -m tests.stacks.run $(ARGS)
 
 bench: .venv/installed-bench
 	$(BIN)/python -m tests.bench.run $(ARGS)
