@@ -265,6 +265,9 @@ def test_arguments_are_copies_and_altering_them_is_said():
 
     found = judge(QUESTION, alters, seed=3)
     assert found.passed and "alters its argument n" in found.notes[0]
+    for untouched in (3, 0.5, np.float32(2), np.nan, "text", None, (np.ones(2), [1, 2]), np.array([np.nan, 1])):
+        assert run(lambda x: 1, [(untouched,)]) == ([1], frozenset())
+    assert run(lambda x: x[1].append(3), [((np.ones(2), [1, 2]),)])[1] == {0}
     assert QUESTION.by_hand[0][0].tolist() == [[3, 1], [2, 5]]
 
 

@@ -135,7 +135,7 @@ def same_argument(a: object, b: object) -> bool:
         return a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
     if isinstance(a, tuple | list):
         return len(a) == len(b) and all(map(same_argument, a, b))
-    return a == b or (a != a and b != b)
+    return bool(a == b or (a != a and b != b))
 
 
 # ---------------------------------------------------------------------- exceptions, and the student's own line
