@@ -138,6 +138,47 @@ def demo(
 
 
 @app.command()
+def node(
+    sim: Annotated[bool, typer.Option("--sim", help="Rehearse in this process: camera, node, and an arm.")] = False,
+    ros: Annotated[bool, typer.Option("--ros", help="Run on ROS 1 until SIGINT.")] = False,
+    bag: Annotated[
+        Path | None, typer.Option(help="Answer the frames of a bag: NAME.bag, or a folder of ROS 2.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="The bag to write, of either kind.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the scene of --sim.", min=0)] = 0,
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch",
+    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")] = False,
+    target: Annotated[int, typer.Option(help="The class to grasp.")] = 2,
+    table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
+    camera_pose: Annotated[
+        str | None, typer.Option(help='Where the camera stands in the base frame, "x y z qx qy qz qw"; else /tf says.')
+    ] = None,
+    base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link",
+    topic: Annotated[list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image, mask=/my/mask ...")] = None,
+    probabilities: Annotated[
+        bool, typer.Option("--probabilities", help="Write class probabilities to OUT, too.")
+    ] = False,
+) -> None:
+    """Run the segmentation node: on a simulated scene, on a bag, or on ROS."""
+    from labkit.node import command
+
+    if (sim, ros, bag is not None).count(True) != 1:
+        raise ValueError("node: expected one of --sim, --ros and --bag")
+    if (bag is None) != (out is None):
+        raise ValueError("out: expected --out with --bag, and only with it")
+    settings = command.Settings(model, engine, crf, target, table_z, camera_pose, base_frame, tuple(topic or ()))
+    if sim:
+        from data_gen import sample_scene
+
+        typer.echo(command.rehearse(settings, sample_scene(seed, "test")))
+    elif ros:
+        command.run_on_ros(settings)
+    else:
+        typer.echo(command.answer_bag(settings, bag, out, probabilities))
+
+
+@app.command()
 def release(
     topics: Annotated[list[str] | None, typer.Argument(help="Topics such as 04_iou; all if none is given.")] = None,
     check: Annotated[

@@ -13,6 +13,7 @@ from labkit.node.messages import (
     DEFAULT_TOPICS,
     CameraInfo,
     Header,
+    Image,
     JointState,
     PointCloud2,
     Pose,
@@ -50,6 +51,13 @@ class Camera:
             raise ValueError(f"depth: expected one of {', '.join(convert.DEPTH)}, got {depth!r}")
         self.transport, self.topics, self.depth = transport, topics, depth
         self.frame_id, self.base_frame = frame_id, base_frame
+        for topic, kind in (
+            (topics.tf, Transforms),
+            (topics.info, CameraInfo),
+            (topics.depth, Image),
+            (topics.rgb, Image),
+        ):
+            transport.advertise(topic, kind)
 
     def publish(self, frame: RGBDFrame, stamp: int | None = None) -> None:
         """Publish one frame; stamp in nanoseconds, default now."""

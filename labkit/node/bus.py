@@ -4,13 +4,11 @@ import threading
 from collections import defaultdict
 from collections.abc import Callable
 
-from labkit.node.messages import Message
-
 
 class Bus:
-    """What a node needs of a transport: `subscribe`, `publish`, and `wanted`.
+    """What a node needs of a transport: `advertise`, `publish`, `subscribe`, and `wanted`.
 
-    The edges to ROS and to bags have the same three methods, so that nodes do not know which one they use.
+    The edges to ROS and to bags have the same four methods, so that nodes do not know which one they use.
 
     >>> bus, seen = Bus(), []
     >>> bus.subscribe("/mask", object, seen.append)
@@ -23,12 +21,15 @@ class Bus:
         self._subscribers = defaultdict(list)
         self._lock = threading.Lock()
 
-    def subscribe(self, topic: str, kind: type, callback: Callable[[Message], None]) -> None:
+    def advertise(self, topic: str, kind: type) -> None:
+        """Say that messages of the class `kind` are going to be published on a topic; here nobody needs to know."""
+
+    def subscribe(self, topic: str, kind: type, callback: Callable[[object], None]) -> None:
         """Call `callback` with every message of a topic from now on; `kind` is the class that is expected."""
         with self._lock:
             self._subscribers[topic].append(callback)
 
-    def publish(self, topic: str, message: Message) -> None:
+    def publish(self, topic: str, message: object) -> None:
         """Deliver a message to all who have subscribed."""
         with self._lock:
             callbacks = tuple(self._subscribers.get(topic, ()))

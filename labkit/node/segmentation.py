@@ -19,6 +19,8 @@ from labkit.node.messages import (
     Image,
     JointState,
     Message,
+    PointCloud2,
+    Pose,
     Topics,
     Transforms,
 )
@@ -28,6 +30,15 @@ from labkit.pipeline import Perception, Pipeline
 from labkit.validation import check_T
 
 logger = logging.getLogger(__name__)
+OUTPUTS = {
+    "mask": Image,
+    "probabilities": Image,
+    "cloud": PointCloud2,
+    "scene": PointCloud2,
+    "gripper": JointState,
+    "grasp": Pose,
+    "diagnostics": Diagnostics,
+}
 HEARTBEAT = 1.0  # seconds between diagnostics where nothing else happens
 
 
@@ -96,6 +107,8 @@ class SegmentationNode:
             "depth": (Image, lambda message: convert.check_image(message, convert.DEPTH)),
             "info": (CameraInfo, self._check_info),
         }
+        for output, kind in OUTPUTS.items():
+            transport.advertise(getattr(topics, output), kind)
         for stream, (kind, check) in checks.items():
             transport.subscribe(getattr(topics, stream), kind, self._receiver(stream, check))
         if self.T_base_cam is None:
@@ -112,7 +125,7 @@ class SegmentationNode:
                 check(message)
                 stamp = message.header.stamp
             except ValueError as error:
-                self._skip(topic, error)
+                self.skip(topic, error)
                 return
             with self._news:
                 together = self._sync.add(stream, stamp, message)
@@ -131,15 +144,20 @@ class SegmentationNode:
             logger.warning("%s: distortion is not undone; publish rectified images", self.topics.info)
 
     def _take_transforms(self, message: Transforms, static: bool) -> None:
+        topic = self.topics.tf_static if static else self.topics.tf
+        if not isinstance(message, Transforms):
+            self.skip(topic, ValueError(f"message: expected Transforms, got {type(message).__name__}"))
+            return
         for transform in message.transforms:
             try:
                 self.tree.add(transform, static)
             except ValueError as error:
-                self._skip(self.topics.tf_static if static else self.topics.tf, error)
+                self.skip(topic, error)
         with self._news:
             self._news.notify_all()
 
-    def _skip(self, topic: str, error: ValueError) -> None:
+    def skip(self, topic: str, error: ValueError) -> None:
+        """Log a message that cannot be used, and count it; edges call it for what they cannot even read."""
         logger.warning("%s: message skipped: %s", topic, error)
         with self._news:
             self.counts.skipped += 1
