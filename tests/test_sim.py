@@ -198,3 +198,9 @@ def test_wrong_requests_to_a_world_are_named():
         with pytest.raises(ValueError, match=r"^name:"):
             world.pose("nobody")
     world.close()
+
+
+def test_importing_the_simulator_says_nothing():
+    """PyBullet's greeting would stand in every notebook."""
+    done = subprocess.run([sys.executable, "-c", "import labkit.sim.panda"], capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")

@@ -1,9 +1,26 @@
 """One PyBullet simulation as an object, so that several in one process never mix."""
 
+import contextlib
 import functools
 import inspect
+import os
 
-import pybullet
+
+@contextlib.contextmanager
+def silent_stderr():
+    """Send what C code writes to stderr nowhere: PyBullet greets every process with the time it was built."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+with silent_stderr():
+    import pybullet
 
 
 class Client:

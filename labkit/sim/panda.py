@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pybullet
 from jaxtyping import Float
 
 from labkit.labels import CLASSES, TARGET
+from labkit.sim.client import pybullet
 from labkit.sim.kinematics import (
     FINGER_MAX,
     FINGER_MAX_EFFORT,

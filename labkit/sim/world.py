@@ -4,13 +4,12 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-import pybullet
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.labels import BACKGROUND, SURFACE
-from labkit.sim.client import Client
+from labkit.sim.client import Client, pybullet
 from labkit.sim.kinematics import HOME, PANDA_URDF
 from labkit.sim.shapes import data_path, file_for, object_mesh, part_mesh, parts_file
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
