@@ -42,7 +42,7 @@ class Limits:
     """What one worker may use. Seconds are of the clock; MB of memory are address space, with torch or without it."""
 
     start_s: float = 120.0
-    case_s: float = 5.0
+    case_s: float = 10.0
     submission_s: float = 60.0
     memory_mb: int = 1024
     torch_memory_mb: int = 3072

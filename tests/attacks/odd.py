@@ -1,0 +1,185 @@
+"""Submissions that are odd as files or as notebooks, with what should become of them.
+
+Each is a function that writes into a student's folder of 04_iou, and what is expected: a reason for which the whole
+submission is not graded, or the points of the question iou, the others being right.
+"""
+
+import copy
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+TOPIC = "04_iou"
+WRONG = "def iou(n):\n    return np.zeros(len(n))\n"
+
+
+@dataclass(frozen=True)
+class Odd:
+    """One odd submission: writes itself into course/submitted, given the notebook of right answers."""
+
+    name: str
+    write: Callable[[Path, dict], None]
+    reason: str = ""
+    points: float = 0.0
+    says: str = ""
+
+
+def as_bytes(content: bytes) -> Callable[[Path, dict], None]:
+    """Write a file of these bytes in the place of the notebook."""
+    return lambda folder, right: put(folder, content)
+
+
+def put(folder: Path, content: bytes) -> None:
+    folder.mkdir(parents=True)
+    (folder / f"{TOPIC}.ipynb").write_bytes(content)
+
+
+def as_notebook(change: Callable[[list], object]) -> Callable[[Path, dict], None]:
+    """Write the right answers after a change to the list of cells (a new list, or the old one altered)."""
+
+    def write(folder: Path, right: dict) -> None:
+        notebook = copy.deepcopy(right)
+        changed = change(notebook["cells"])
+        put(folder, json.dumps(notebook | ({"cells": changed} if isinstance(changed, list) else {})).encode())
+
+    return write
+
+
+def cell(cells: list, name: str) -> dict:
+    """The cell of a grade id."""
+    return next(c for c in cells if c["metadata"].get("nbgrader", {}).get("grade_id") == name)
+
+
+def with_iou(**fields) -> Callable[[Path, dict], None]:
+    """Write the right answers with other fields in the cell iou."""
+    return as_notebook(lambda cells: cell(cells, "iou").update(fields))
+
+
+def doubled(source: str | None) -> Callable[[list], list]:
+    """The cell iou twice, the second one with another source if there is one."""
+
+    def change(cells: list) -> list:
+        second = copy.deepcopy(cell(cells, "iou"))
+        second["source"] = second["source"] if source is None else source
+        return [*cells, second]
+
+    return change
+
+
+def better_marks(cells: list) -> None:
+    """A wrong answer whose tests, points and marks the student has improved."""
+    cell(cells, "iou")["source"] = WRONG
+    cell(cells, "iou")["metadata"]["tags"] = ["skip-execution", "raises-exception"]
+    tests = cell(cells, "check_iou")
+    tests["source"] = "assert True"
+    tests["metadata"]["nbgrader"].update(points=1000, grade=True, locked=False, checksum="0")
+    tests["outputs"] = [{"output_type": "execute_result", "data": {"text/plain": "1000"}, "metadata": {}}]
+    cell(cells, "setup")["source"] = "raise SystemExit"
+
+
+def linked_file(folder: Path, right: dict) -> None:
+    folder.mkdir(parents=True)
+    (folder / f"{TOPIC}.ipynb").symlink_to(folder.parent.parent / "honest" / TOPIC / f"{TOPIC}.ipynb")
+
+
+def linked_folder(folder: Path, right: dict) -> None:
+    folder.parent.mkdir(parents=True)
+    folder.symlink_to(folder.parent.parent / "honest" / TOPIC)
+
+
+def linked_student(folder: Path, right: dict) -> None:
+    folder.parent.symlink_to(folder.parent.parent / "honest")
+
+
+def pipe(folder: Path, right: dict) -> None:
+    folder.mkdir(parents=True)
+    os.mkfifo(folder / f"{TOPIC}.ipynb")
+
+
+def sparse(folder: Path, right: dict) -> None:
+    put(folder, b"{")
+    os.truncate(folder / f"{TOPIC}.ipynb", 200 << 20)
+
+
+def loose(folder: Path, right: dict) -> None:
+    folder.parent.write_text(json.dumps(right))
+
+
+def other_name(folder: Path, right: dict) -> None:
+    folder.mkdir(parents=True)
+    (folder / "iou (1).ipynb").write_text(json.dumps(right))
+
+
+def plain(folder: Path, right: dict) -> None:
+    put(folder, json.dumps(right).encode())
+
+
+ODD = (
+    Odd("linked_file", linked_file, "04_iou.ipynb is a symbolic link"),
+    Odd("linked_folder", linked_folder, "the folder 04_iou is a symbolic link"),
+    Odd("linked_student", linked_student, "the student's folder is a symbolic link"),
+    Odd("pipe", pipe, "04_iou.ipynb is no file"),
+    Odd("two_hundred_megabytes", sparse, "it is larger than 20 MB"),
+    Odd("loose.ipynb", loose, "not in a student's folder; expected STUDENT/04_iou/04_iou.ipynb"),
+    Odd("other_name", other_name, "the folder 04_iou holds no 04_iou.ipynb"),
+    Odd("line\nbreak", plain, "the student's folder has a name that is too long, not UTF-8 or not printable"),
+    Odd("long" * 50, plain, "the student's folder has a name that is too long, not UTF-8 or not printable"),
+    Odd("no_utf8_\udcff", plain, "the student's folder has a name that is too long, not UTF-8 or not printable"),
+    Odd("nothing", as_bytes(b""), "it is not JSON, so not a notebook"),
+    Odd("half", as_bytes(b'{"cells": [{"cell_type": "code", "sou'), "it is not JSON, so not a notebook"),
+    Odd("nested", as_bytes(b"[" * 200_000), "it is not JSON, so not a notebook"),
+    Odd("long_number", as_bytes(b"1" * 1_000_000), "it is not JSON, so not a notebook"),
+    Odd("utf16", lambda folder, right: put(folder, json.dumps(right).encode("utf-16")), "it is not UTF-8 text"),
+    Odd("list", as_bytes(b"[]"), "it is not a notebook of format 4: there is no list of cells"),
+    Odd(
+        "format_3",
+        as_bytes(b'{"nbformat": 3, "worksheets": [{"cells": []}]}'),
+        "it is not a notebook of format 4: there is no list of cells",
+    ),
+    Odd("other_lab", as_notebook(lambda cells: []), "it is not this lab: no cell has a grade id of 04_iou"),
+    Odd(
+        "no_cells", as_notebook(lambda cells: [1, None, {}, []]), "it is not this lab: no cell has a grade id of 04_iou"
+    ),
+    Odd("=HYPERLINK(1)", plain, points=2.0),
+    Odd("<script>alert(1)<script>", plain, points=2.0),
+    Odd("Zoë Ångström", plain, points=2.0),
+    Odd("byte_order_mark", lambda folder, right: put(folder, json.dumps(right).encode("utf-8-sig")), points=2.0),
+    Odd("other_order", as_notebook(lambda cells: cells[::-1]), points=2.0),
+    Odd(
+        "list_of_lines",
+        as_notebook(
+            lambda cells: cell(cells, "iou").update(source=cell(cells, "iou")["source"].splitlines(keepends=True))
+        ),
+        points=2.0,
+    ),
+    Odd(
+        "magics",
+        as_notebook(
+            lambda cells: cell(cells, "iou").update(source="%matplotlib inline\n" + cell(cells, "iou")["source"])
+        ),
+        points=2.0,
+    ),
+    Odd(
+        "check_in_the_cell",
+        as_notebook(
+            lambda cells: cell(cells, "iou").update(
+                source=cell(cells, "iou")["source"] + '\niou = check("04_iou.iou", iou)\n'
+            )
+        ),
+        points=2.0,
+    ),
+    Odd("same_cell_twice", as_notebook(doubled(None)), points=2.0),
+    Odd("two_answers", as_notebook(doubled(WRONG)), says="2 different cells have its grade id"),
+    Odd("cell_removed", as_notebook(lambda cells: cells.remove(cell(cells, "iou"))), says="its cell is missing"),
+    Odd("raw_cell", with_iou(cell_type="raw"), says="its cell is not a code cell with source"),
+    Odd("number_as_source", with_iou(source=7), says="its cell is not a code cell with source"),
+    Odd("endless_source", with_iou(source="x = 1\n" * 100_000), says="its cell is longer than 200000 characters"),
+    Odd("half_a_character", with_iou(source=WRONG + "x = '\ud800'"), says="2 of 2 values are not right"),
+    Odd("null_byte", with_iou(source="x = 0\0"), says="it raises"),
+    Odd("no_python", with_iou(source="def iou(n)\n  return {"), says="it raises SyntaxError"),
+    Odd("deep_source", with_iou(source="x = " + "(" * 90_000), says="it raises"),
+    Odd("better_marks", as_notebook(better_marks), says="2 of 2 values are not right"),
+    Odd("blank", with_iou(source="def iou(n):\n    raise NotImplementedError\n"), says="not answered yet"),
+)
