@@ -148,7 +148,8 @@ def tester(port, tmp_path_factory):
             tester.master = started
             yield tester
     finally:
-        sys.path.remove(ros.DIST_PACKAGES)
+        if ros.DIST_PACKAGES in sys.path:
+            sys.path.remove(ros.DIST_PACKAGES)
         for name, value in before.items():
             os.environ.pop(name, None) if value is None else os.environ.__setitem__(name, value)
 
