@@ -244,8 +244,12 @@ def resize_labels(y, height, width):
 
 
 def _labels_and_size(rng):
-    """Draw labels, and a size that is larger in one direction and smaller in the other, or larger in both."""
+    """Draw labels, and a size that is larger in one direction and smaller in the other, or larger in both.
+
+    The old sides are odd: then no new centre falls between two old pixels, where rounding would decide.
+    """
     y = _labels(rng, 4)
+    y = y[: y.shape[0] // 2 * 2 - 1, : y.shape[1] // 2 * 2 - 1]
     H, W = y.shape
     height, width = (int(rng.integers(3, H)), int(rng.integers(W + 3, 2 * W)))
     return (y, height, width) if rng.random() < 0.5 else (y, int(rng.integers(H + 2, 3 * H)), width)
@@ -257,8 +261,8 @@ RESIZE_LABELS = Question(
     inputs=_labels_and_size,
     by_hand=(
         (np.array([[1, 3]], np.uint8), 1, 4),
-        (np.array([[0, 1, 2, 3], [3, 255, 1, 0], [0, 0, 2, 1], [1, 2, 3, 0]], np.uint8), 2, 2),
-        (np.array([[0, 1, 2], [3, 2, 1]], np.uint8), 5, 2),
+        (np.array([[0, 1, 2, 3, 1], [3, 255, 1, 0, 2], [0, 0, 2, 1, 3]], np.uint8), 2, 3),
+        (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
     ),
     rtol=0.0,
     atol=0.0,
