@@ -22,6 +22,7 @@ class Settings:
     camera_pose: str | None = None
     base_frame: str = "base_link"
     renamed: tuple[str, ...] = ()
+    mirror: bool = True
 
     def pipeline(self, table_z: float | None = None) -> Pipeline:
         """The pipeline that is asked for; table_z: the height of the table, if it is known better."""
@@ -30,7 +31,7 @@ class Settings:
         path = weights_path(self.model)
         model = path if path.suffix == ".onnx" else load_model(path)
         height = self.table_z if table_z is None else table_z
-        return Pipeline(model, height, self.target, engine=self.engine, crf=self.crf)
+        return Pipeline(model, height, self.target, mirror=self.mirror, engine=self.engine, crf=self.crf)
 
     def node(self) -> dict:
         """The options of SegmentationNode."""
