@@ -44,7 +44,7 @@ class Record:
     @property
     def points(self) -> float:
         """The points of all questions together."""
-        return sum(result.points for result in self.results)
+        return sum((result.points for result in self.results), 0.0)
 
     @property
     def needs_a_look(self) -> bool:
