@@ -72,17 +72,19 @@ def name_that_bug(frame: RGBDFrame) -> Explorer:
     Controls: a box for each of BUGS, and `mystery`, 0 for none or 1 to 5: then tick the box whose cloud covers it.
     """
     true, camera = bent_cloud(frame), frame.T_base_cam[:3, 3]
-    colours = PALETTE[_drawn_pixels(frame)[2]] / 255.0
+    labels = _drawn_pixels(frame)[2]
 
     def draw(figure: Figure, mystery: int, **ticked: bool) -> None:
         bugs = [bug for bug, on in ticked.items() if on]
         bent = bent_cloud(frame, bugs)
         for axes, vertical in zip(figure.subplots(1, 2), (1, 2), strict=True):
-            axes.scatter(true[:, 0], true[:, vertical], s=1.0, color="0.7", linewidths=0)
+            axes.plot(true[:, 0], true[:, vertical], ".", markersize=1.0, color="0.7")
             if mystery:
                 P = bent_cloud(frame, [MYSTERIES[mystery]])
-                axes.scatter(P[:, 0], P[:, vertical], s=4.0, color="tab:red", linewidths=0)
-            axes.scatter(bent[:, 0], bent[:, vertical], s=1.5, c=colours, linewidths=0)
+                axes.plot(P[:, 0], P[:, vertical], ".", markersize=3.0, color="tab:red")
+            for c in np.unique(labels):
+                P = bent[labels == c]
+                axes.plot(P[:, 0], P[:, vertical], ".", markersize=1.5, color=PALETTE[c] / 255.0)
             axes.plot(camera[0], camera[vertical], "k^", markersize=7)
             axes.set_aspect("equal", adjustable="datalim")
             axes.set_xlabel("x (m)")
