@@ -128,7 +128,7 @@ def rgb_image(message: Image) -> UInt8[np.ndarray, "H W 3"]:
     """
     check_image(message, ("rgb8", *COLOUR))
     pixels = decode_image(message)
-    return pixels if message.encoding == "rgb8" else cv2.cvtColor(pixels, COLOUR[message.encoding])
+    return pixels.copy() if message.encoding == "rgb8" else cv2.cvtColor(pixels, COLOUR[message.encoding])
 
 
 def depth_image(message: Image, scale: float = 0.001) -> Float32[np.ndarray, "H W"]:
