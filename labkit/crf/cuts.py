@@ -15,18 +15,22 @@ from jaxtyping import Integer
 from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.exact import grid_steps
 from labkit.crf.integers import quantise
+from labkit.crf.messages import trws
+
+START_SWEEPS = 4
 
 
 def expansion(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> MapResult:
-    """Minimise by expansion moves, from the unary solution or from `labels`, until no class can expand.
+    """Minimise by expansion moves, from `labels` if they are given, until no class can expand.
 
-    iterations counts the moves tried. Section 2 of the text.
+    Without them it starts from what a few sweeps of TRW-S find: that takes less time than the moves that it saves, and
+    ends lower than a start from the unary solution. iterations counts the moves tried. Section 2 of the text.
 
     >>> psi = np.array([[[0.0, 2.0, 2.0], [1.0, 2.0, 0.8], [0.0, 2.0, 2.0]]])
     >>> expansion(PottsCRF(psi, np.array([[[0.5, 0.5, 0.0]], [[0.0, 0.0, 0.0]]]))).labels
     array([[0, 0, 0]], dtype=uint8)
     """
-    moves = MoveGraph(crf, labels)
+    moves = MoveGraph(crf, trws(crf, START_SWEEPS).labels if labels is None else labels)
     return try_in_turn(crf, moves, [partial(moves.expand, alpha) for alpha in range(crf.shape[2])])
 
 

@@ -3,7 +3,7 @@
 Times are CPU seconds of one thread, medians over seeds, the ways in turn on each seed. Instances: smooth random label
 fields, logits = 2 snr onehot + 0.75 white + 0.45 correlated noise, RGB in 0..1, sigma_I = 0.12, sigma_p = 1; easy: snr
 0.55 (two classes: 0.45), lam 1.2; hard: snr 0.22 (0.15), lam 3 (4). Cuts start from the same integers and end with
-labels; expansion starts from the model and the cheapest classes. PyMaxflow's expansion builds its graph with one
+labels; expansion starts from the model alone, PyMaxflow's from the cheapest classes; that one builds its graph with one
 add_edges for each direction. Energies are labkit's over the peer's.
 """
 
