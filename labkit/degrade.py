@@ -43,11 +43,11 @@ def shift(mask: Bool[np.ndarray, "H W"], right: int, down: int) -> Bool[np.ndarr
     array([[0, 0, 0], [0, 1, 0]])
     """
     mask = _check_mask(mask)
-    H, W = mask.shape
     moved = np.zeros_like(mask)
-    moved[max(down, 0) : H + min(down, 0), max(right, 0) : W + min(right, 0)] = mask[
-        max(-down, 0) : H + min(-down, 0), max(-right, 0) : W + min(-right, 0)
-    ]
+    v, u = np.nonzero(mask)
+    v, u = v + down, u + right
+    inside = (v >= 0) & (v < mask.shape[0]) & (u >= 0) & (u < mask.shape[1])
+    moved[v[inside], u[inside]] = True
     return moved
 
 

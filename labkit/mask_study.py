@@ -29,8 +29,8 @@ FIRST_SEED, SCENES, SIZE = 600_000, 60, (320, 240)
 # How a mask is spoilt: the strengths tried, weakest first, and a function of mask, strength and generator.
 KINDS: dict[str, tuple[tuple[float, ...], Callable]] = {
     "true": ((0,), lambda mask, strength, rng: mask),
-    "eroded": ((1, 2, 3, 5), lambda mask, pixels, rng: degrade.erode(mask, pixels)),
-    "dilated": ((1, 2, 4, 8), lambda mask, pixels, rng: degrade.dilate(mask, pixels)),
+    "eroded": ((1, 2, 3, 5), lambda mask, pixels, rng: degrade.erode(mask, round(pixels))),
+    "dilated": ((1, 2, 4, 8), lambda mask, pixels, rng: degrade.dilate(mask, round(pixels))),
     "shifted": ((2, 4, 8, 14), lambda mask, pixels, rng: _shifted(mask, pixels, rng.uniform(0, 2 * np.pi))),
     "holed": ((0.2, 0.4, 0.6, 0.8), degrade.holes),
     "part missing": (

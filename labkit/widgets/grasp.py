@@ -1,4 +1,7 @@
-"""Explorers of topic 07: the jaws at any yaw, and the visible centroid from any height of the camera."""
+"""Explorers of topic 07: the jaws at any yaw, and the visible centroid from any height of the camera.
+
+Besides the explorers: jaws seen from above, and a lift as a row of pictures.
+"""
 
 from functools import lru_cache
 
@@ -35,6 +38,29 @@ def draw_jaws(axes: Axes, T_base_grasp: Float[np.ndarray, "4 4"], width: float, 
         corners = np.array([[-half, inner], [half, inner], [half, outer], [-half, outer]])
         corners = corners @ T_base_grasp[:2, :2].T + T_base_grasp[:2, 3]
         axes.add_patch(Polygon(corners, **({"facecolor": "tab:blue", "alpha": 0.85} | style)))
+
+
+def film(world, camera: Camera, seconds: float = 0.4, size: tuple[int, int] = (240, 180)) -> list[np.ndarray]:
+    """Take a picture of a World every so many simulated seconds from now on; the list that they go to, RGB.
+
+    >>> from labkit.sim.world import World
+    >>> camera = Camera.looking_at((0.5, 0.0, 0.0), 1.0, 0.3, 0.8)
+    >>> with World(SceneSpec((), camera, robot=False)) as world:
+    ...     pictures = film(world, camera, seconds=0.1, size=(8, 6))
+    ...     world.step(50)
+    >>> len(pictures), pictures[0].shape
+    (2, (6, 8, 3))
+    """
+    pictures, due = [], [round(240 * seconds)]
+
+    def look(world) -> None:
+        due[0] -= 1
+        if due[0] == 0:
+            pictures.append(world.render(size, camera).rgb)
+            due[0] = round(240 * seconds)
+
+    world.observers.append(look)
+    return pictures
 
 
 def widths(P: Float[np.ndarray, "N 3"], yaws: Float[np.ndarray, "Y"]) -> Float[np.ndarray, "Y"]:
