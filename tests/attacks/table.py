@@ -509,7 +509,7 @@ def iou(n):
         """
 import os, sys
 def iou(n):
-    for _ in range(2000):
+    for _ in range(500):
         print("x" * 100000)
         os.write(2, b"y" * 100000)
     return np.zeros(len(n))
