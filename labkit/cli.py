@@ -104,7 +104,7 @@ def export(
 
 @app.command()
 def compare(
-    out: Annotated[Path, typer.Option(help="The table to write, a CSV file.")] = Path("lessons/data/stacks.csv"),
+    out: Annotated[Path, typer.Option(help="The table to write, a CSV file.")] = Path("lessons/09_other_stacks.csv"),
     scenes: Annotated[int, typer.Option(help="How many scenes.", min=1)] = 40,
 ) -> None:
     """Compare the stacks on the same scenes, masks, times and lifts: the table that lesson 09 reads (some minutes)."""
