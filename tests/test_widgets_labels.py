@@ -26,10 +26,10 @@ def test_nearest_invents_nothing(size):
 def test_bilinear_dreams_targets_round_an_obstacle():
     y = scene()
     y[y == 2] = 1
-    resized = widgets.resize_bilinear(y, 72, 96)
+    resized = widgets.resize_bilinear(y, 96, 128)
     ghost = widgets.ghosts(y, resized)
     assert np.count_nonzero(resized == 2) > 50 and ghost[resized == 2].all()
-    v, u = np.argwhere(ghost).T / 1.5
+    v, u = np.argwhere(ghost).T / 2.0
     assert (v > 22).all() and (v < 37).all() and (u > 8).all() and (u < 25).all()  # only at the obstacle's rim
 
 
