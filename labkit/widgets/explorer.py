@@ -33,7 +33,8 @@ class Explorer:
         dpi: int = 80,
     ):
         self.draw, self.controls, self.size, self.dpi = draw, dict(controls), size, dpi
-        self.picture = ipywidgets.Image(format="png")
+        # As large as it is drawn, not stretched over the page; narrower where there is less room.
+        self.picture = ipywidgets.Image(format="png", layout={"max_width": "100%", "align_self": "flex-start"})
         self.widget = ipywidgets.VBox([*self.controls.values(), self.picture])
         for control in self.controls.values():
             if control.has_trait("value"):
