@@ -5,6 +5,8 @@ student would have handed in, with everything that it calls.
 """
 
 import ast
+import copy
+import functools
 import inspect
 import json
 import types
@@ -162,17 +164,24 @@ def assignment(name: str, value: object) -> str:
 
 
 def node_of(function: Callable) -> ast.FunctionDef | ast.Lambda:
-    """A function's own piece of its module's source."""
-    nodes = list(ast.walk(ast.parse(inspect.getsource(inspect.getmodule(function)))))
+    """A function's own piece of its module's source, a copy."""
+    nodes = functions_of(inspect.getmodule(function))
     code = function.__code__
     for node in nodes:
         if isinstance(node, ast.FunctionDef) and node.name == code.co_name and first_line(node) == code.co_firstlineno:
-            return node
+            return copy.deepcopy(node)
     here = [node for node in nodes if isinstance(node, ast.Lambda) and node.lineno == code.co_firstlineno]
     fitting = [node for node in here if len(here) == 1 or [a.arg for a in node.args.args] == arguments(code)]
     if len(fitting) != 1:
         raise LookupError(f"no source of {function} in line {code.co_firstlineno}")
-    return fitting[0]
+    return copy.deepcopy(fitting[0])
+
+
+@functools.cache
+def functions_of(module: types.ModuleType) -> list[ast.FunctionDef | ast.Lambda]:
+    """All functions in a module's source."""
+    nodes = ast.walk(ast.parse(inspect.getsource(module)))
+    return [node for node in nodes if isinstance(node, ast.FunctionDef | ast.Lambda)]
 
 
 def arguments(code: types.CodeType) -> list[str]:
