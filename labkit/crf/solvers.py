@@ -61,10 +61,10 @@ def refine(
     image: Num[np.ndarray, "H W *channels"],
     depth: Float[np.ndarray, "H W"] | None = None,
     *,
-    lam: float = 2.0,
-    sigma_I: float = 15.0,
+    lam: float = 8.0,
+    sigma_I: float = 30.0,
     sigma_p: float = 1.0,
-    sigma_depth: float = 0.02,
+    sigma_depth: float = 0.03,
     connectivity: int = 8,
     floor: float = 1e-4,
     method: str = "trws+expansion",
@@ -72,7 +72,8 @@ def refine(
     """Refine a network's class probabilities with the image: labels that are smooth except across edges.
 
     image: RGB, uint8; sigma_I in its units. depth: metres, 0 or NaN where there is no reading; with it the labels may
-    also break at jumps of about sigma_depth metres, where objects end. Probabilities are clipped at `floor`. Raises
+    also break at jumps of about sigma_depth metres, where objects end. Probabilities are clipped at `floor`. The
+    defaults are the best for the shipped UNet on scenes that no evaluation uses (BENCHMARKS.md). Raises
     ValueError naming the argument that does not fit. Section 2 of the text.
 
     >>> p = np.full((3, 3, 2), (0.9, 0.1))

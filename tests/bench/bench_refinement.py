@@ -23,7 +23,7 @@ from labkit.pipeline import most_probable
 TUNING, SCENES = range(500_000, 500_040), range(900_000, 900_200)
 SETTINGS = [
     {"lam": lam, "sigma_I": sigma_I, "sigma_depth": sigma_depth}
-    for lam, sigma_I, sigma_depth in product((0.5, 1.0, 2.0, 4.0), (8.0, 15.0, 30.0), (0.01, 0.03))
+    for lam, sigma_I, sigma_depth in product((0.5, 2.0, 4.0, 8.0, 16.0), (15.0, 30.0, 60.0), (0.01, 0.03))
 ]
 
 
