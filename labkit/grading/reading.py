@@ -67,6 +67,8 @@ def read_lab(course: Path, topic: str) -> tuple[Lab, dict[str, Question]]:
         raise ValueError(f"topic: expected a released lab at {path}; `labkit release {topic}` makes it")
     data = path.read_bytes()
     notebook = json.loads(data)
+    for cell in notebook["cells"]:
+        cell["source"] = source_of(cell)
     cells = {grade_id(cell): cell for cell in notebook["cells"] if grade_id(cell)}
     marks = {name: cell["metadata"]["nbgrader"] for name, cell in cells.items()}
     answers = {name: source_of(cells[name]) for name in marks if name in questions and marks[name].get("solution")}

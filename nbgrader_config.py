@@ -1,0 +1,8 @@
+"""nbgrader's configuration: this checkout is the course. What is graded goes to folders that git ignores."""
+
+c = get_config()  # nbgrader defines it
+
+c.CourseDirectory.course_id = "labkit"
+c.CourseDirectory.source_directory = "solutions"
+c.CourseDirectory.release_directory = "labs"
+c.CourseDirectory.ignore = [".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"]
