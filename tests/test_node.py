@@ -179,6 +179,8 @@ def spoil(rng, good):
         ("depth", dataclasses.replace(good["depth"], header=header, encoding="mono8")),
         ("depth", dataclasses.replace(good["depth"], header=header, data=b"")),
         ("depth", info),
+        ("depth", dataclasses.replace(good["depth"], header=None)),
+        ("info", dataclasses.replace(info, header=Header(None))),
         ("info", dataclasses.replace(info, header=header, K=(0.0,) * 9)),
         ("info", dataclasses.replace(info, header=header, K=tuple(np.transpose(np.reshape(info.K, (3, 3))).ravel()))),
         ("info", dataclasses.replace(info, header=header, K=(float("nan"),) * 9)),

@@ -123,7 +123,7 @@ class SegmentationNode:
         def receive(message: Message) -> None:
             try:
                 check(message)
-                stamp = message.header.stamp
+                stamp = _stamp(message)
             except ValueError as error:
                 self.skip(topic, error)
                 return
@@ -258,3 +258,11 @@ class SegmentationNode:
             values = values | {name: str(n) for name, n in counted.items()}
             values |= {reason: str(n) for reason, n in self.counts.reasons.most_common(5)}
         self.transport.publish(self.topics.diagnostics, Diagnostics(header, "segmentation", level, message, values))
+
+
+def _stamp(message: Message) -> int:
+    """When a message's content was true; raises ValueError if it does not say so."""
+    header = message.header
+    if not (isinstance(header, Header) and isinstance(header.stamp, int)):
+        raise ValueError(f"header: expected a stamp in whole nanoseconds, got {header!r}")
+    return header.stamp

@@ -130,7 +130,7 @@ def talk(transport, frame) -> str:
 
 def memory() -> str:
     """Resident memory over many frames of several scenes, by tenths."""
-    frames = [render(sample_scene(seed, "test"), (160, 120)) for seed in range(700_000, 700_010)]
+    frames = [render(sample_scene(seed, "test"), (80, 60)) for seed in range(700_000, 700_010)]
     bus = Bus()
     node, camera = SegmentationNode(Pipeline(load_model(weights_path("smallsegnet")), mirror=False), bus), Camera(bus)
     resident = []
@@ -143,7 +143,7 @@ def memory() -> str:
     tenth = len(resident) // 10
     second, last = np.mean(resident[tenth : 2 * tenth]), np.mean(resident[-tenth:])
     head = (
-        f"| {FRAMES:,} frames of 160x120 in process | second tenth, MB | last tenth, MB | change |\n|---|---|---|---|\n"
+        f"| {FRAMES:,} frames of 80x60 in process | second tenth, MB | last tenth, MB | change |\n|---|---|---|---|\n"
     )
     return f"{head}| resident memory | {second:.1f} | {last:.1f} | {100.0 * (last / second - 1.0):+.2f} % |"
 
