@@ -60,7 +60,7 @@ def draw_scores(axes: Axes, exponents: np.ndarray, curves, chosen: float) -> Non
         axes.plot(exponents, values, label=name, color=colour)
     axes.axvline(chosen, color=CHOSEN)
     axes.set(ylim=(0.0, 1.02), xlabel="log2 of the weight")
-    axes.legend(fontsize=8, loc="lower left")
+    axes.legend(fontsize=8, loc="center left")
 
 
 def said(scores: Sequence[float]) -> str:
