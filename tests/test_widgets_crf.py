@@ -72,7 +72,8 @@ def test_lam_moves_cost_from_the_pairs_to_the_pixels(titles):
     rng = np.random.default_rng(0)
     p, image = rng.dirichlet(np.ones(4), (12, 16)), rng.integers(0, 256, (12, 16, 3)).astype(np.uint8)
     y_true = np.full((12, 16), 2, np.uint8)
-    explorer = widgets.lam_slider(p, image, y_true, sigma_I=200.0)
+    explorer = widgets.lam_slider(p, image, y_true)
+    explorer.controls["sigma_I"].value = 200.0
     assert "changed pixels 0.0%" in titles[2]
     before = explorer.png
     explorer.controls["lam"].value = 32.0

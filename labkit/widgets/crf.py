@@ -19,8 +19,9 @@ from labkit.widgets.explorer import Explorer
 TABLE, THING = (tuple(PALETTE[c] / 255) for c in (SURFACE, TARGET))
 UNARY_COLOUR, PAIRWISE_COLOUR = "0.55", "0.15"
 LAMS = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+SIGMAS = (5.0, 15.0, 50.0, 200.0)
 
-# "You are the solver": a bright thing on a dark table. The network misses two pixels of it and sees two where none are.
+# "You are the solver": a bright thing on a dark table. The network misses a pixel of it and sees three where none are.
 TOY_IMAGE = np.array(
     [[60, 64, 58, 61, 63], [59, 170, 178, 66, 60], [62, 175, 172, 181, 64], [61, 63, 59, 174, 58]], np.uint8
 )
@@ -158,25 +159,22 @@ def you_are_the_solver() -> Explorer:
 
 
 def lam_slider(
-    probabilities: Float[np.ndarray, "H W 4"],
-    image: UInt8[np.ndarray, "H W 3"],
-    y_true: Integer[np.ndarray, "H W"],
-    sigma_I: float = 15.0,
+    probabilities: Float[np.ndarray, "H W 4"], image: UInt8[np.ndarray, "H W 3"], y_true: Integer[np.ndarray, "H W"]
 ) -> Explorer:
-    """Refine a network's prediction under a lam to choose: labels, both parts of the energy, and the target's IoU.
+    """Refine a network's prediction under a lam and a sigma_I to choose: labels, the energy's parts, the target's IoU.
 
-    Labels come from expansion moves, and are computed once for each lam.
+    Labels come from expansion moves on 8 neighbours, and are computed once for each choice.
     """
     psi = unary_from_probabilities(probabilities, floor=1e-4)
 
     @lru_cache
-    def refined(lam: float) -> tuple[np.ndarray, tuple[float, float]]:
+    def refined(lam: float, sigma_I: float) -> tuple[np.ndarray, tuple[float, float]]:
         crf = PottsCRF.from_image(psi, image, lam, sigma_I, connectivity=8)
         labels = solve(crf, "expansion").labels
         return labels, energy_terms(crf, labels)
 
-    def draw(figure: Figure, lam: float) -> None:
-        labels, terms = refined(lam)
+    def draw(figure: Figure, lam: float, sigma_I: float) -> None:
+        labels, terms = refined(lam, sigma_I)
         seen, painted, bars = figure.subplots(1, 3)
         seen.imshow(overlay(image, labels, 0.4))
         painted.imshow(colorize(labels))
@@ -187,10 +185,14 @@ def lam_slider(
         bars.set_ylabel("energy")
         bars.spines[["top", "right"]].set_visible(False)
         score = iou(confusion_matrix(y_true, labels, 4))[TARGET]
-        bars.set_title(f"target IoU {score:.3f}, changed pixels {np.mean(labels != psi.argmin(axis=2)):.1%}")
+        changed = np.mean(labels != psi.argmin(axis=2))
+        bars.set_title(f"target IoU {score:.3f}\nchanged pixels {changed:.1%}")
 
     lam = ipywidgets.SelectionSlider(options=[(f"{value:g}", value) for value in LAMS], value=0.0, description="lam")
-    return Explorer(draw, {"lam": lam}, size=(9.0, 2.7))
+    sigma = ipywidgets.SelectionSlider(
+        options=[(f"{value:g}", value) for value in SIGMAS], value=15.0, description="sigma_I"
+    )
+    return Explorer(draw, {"lam": lam, "sigma_I": sigma}, size=(9.0, 2.7))
 
 
 # -------------------------------------------------------------------------------------------------------- a cut
