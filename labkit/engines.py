@@ -88,7 +88,10 @@ class OnnxRuntimeEngine(Engine):
         import onnxruntime
 
         super().__init__(_divisor(onnx))
-        self.session = onnxruntime.InferenceSession(onnx, providers=["CPUExecutionProvider"])
+        options = onnxruntime.SessionOptions()
+        # Asked for by number, its threads are not tied to cores, which costs much where others work on the same cores.
+        options.intra_op_num_threads = cv2.getNumThreads()
+        self.session = onnxruntime.InferenceSession(onnx, options, providers=["CPUExecutionProvider"])
 
     def forward(self, blob: Float[np.ndarray, "N 3 H W"]) -> Float[np.ndarray, "N C H W"]:
         return self.session.run(None, {"image": blob})[0]
