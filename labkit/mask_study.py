@@ -63,7 +63,7 @@ def target_mask(spec, frame: RGBDFrame) -> tuple[str, Bool[np.ndarray, "H W"]]:
     return spec.objects[number - 1].name, frame.instances == number
 
 
-def spoil(mask: Bool[np.ndarray, "H W"], kind: str, strength: float, seed: int) -> Bool[np.ndarray, "H W"]:
+def spoil(mask: Bool[np.ndarray, "H W"], kind: str, strength: int | float, seed: int) -> Bool[np.ndarray, "H W"]:
     """Spoil a mask; the same scene is always spoilt in the same direction and places, so that more is really more.
 
     Raises ValueError for an unknown kind.
@@ -89,7 +89,7 @@ def see(spec, frame: RGBDFrame, mask: Bool[np.ndarray, "H W"]) -> Perception:
     return Pipeline(lambda rgb: rgb, spec.table.z).run(frame, labels=labels)
 
 
-def trials_of_scene(seed: int, kinds: Iterable[tuple[str, float]] | None = None) -> list[Row]:
+def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None = None) -> list[Row]:
     """Render a scene once, and try to lift its best visible target by each spoilt mask, each time in a fresh world.
 
     kinds: pairs (kind, strength), default all. A lift is a success if it is this very target that comes up.
@@ -196,5 +196,5 @@ def by_iou(rows: Iterable[Row], edges: Sequence[float]) -> list[list[Row]]:
     return bins
 
 
-def _shifted(mask: Bool[np.ndarray, "H W"], pixels: float, direction: float) -> Bool[np.ndarray, "H W"]:
+def _shifted(mask: Bool[np.ndarray, "H W"], pixels: int | float, direction: float) -> Bool[np.ndarray, "H W"]:
     return degrade.shift(mask, round(pixels * np.cos(direction)), round(pixels * np.sin(direction)))
