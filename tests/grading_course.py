@@ -192,3 +192,35 @@ def arguments(code: types.CodeType) -> list[str]:
 def first_line(node: ast.FunctionDef) -> int:
     """The line where a definition begins, with its decorators."""
     return min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+
+
+# ------------------------------------------------------------------------------------------ synthetic classes
+
+
+def synthetic_class(topic: str) -> dict[str, tuple[dict[str, str], dict[str, bool]]]:
+    """Students of a topic: the cells that each hands in, and which of the answers are right.
+
+    Every misconception and every alternative is handed in by somebody; then there are a blank lab, answers that do not
+    compile, raise, or end their process, and a student of each mixture.
+    """
+    questions = of_topic(topic)
+    right = right_answers(topic)
+    wrong = {name: [as_cell(m.answer, name) for m in q.misconceptions] for name, q in questions.items()}
+    other = {name: [as_cell(a, name) for a in q.alternatives] for name, q in questions.items()}
+    for cells in other.values():
+        cells.sort(key=lambda cell: "torch" not in cell)  # torch takes a second to load: all of it in one submission
+    students = {"reference": (right, dict.fromkeys(right, True))}
+    for kind, answers, is_right in (("misconception", wrong, False), ("alternative", other, True)):
+        for i in range(max(map(len, answers.values()))):
+            cells = {name: given[i] if i < len(given) else right[name] for name, given in answers.items()}
+            students[f"{kind}_{i}"] = (cells, {n: is_right or i >= len(given) for n, given in answers.items()})
+    spoilt = {
+        "blank": lambda name: blank(questions[name]),
+        "broken": lambda name: f"def {name}(:\n    return 0\n",
+        "raising": lambda name: f"def {name}(*arguments):\n    raise KeyError\n",
+        "ending": lambda name: f"import os\ndef {name}(*arguments):\n    os._exit(0)\n",
+    }
+    for i, (kind, make) in enumerate(spoilt.items()):
+        cells = {name: make(name) if (j + i) % 2 else right[name] for j, name in enumerate(right)}
+        students[kind] = (cells, {name: not (j + i) % 2 for j, name in enumerate(right)})
+    return students

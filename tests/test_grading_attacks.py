@@ -99,6 +99,20 @@ def test_an_odd_submission_is_graded_or_has_its_reason(hostile_class, odd):
     assert said.startswith(odd.says or "right in all")
 
 
+def test_no_attack_and_no_odd_submission_is_accepted_or_rejected_falsely(hostile_class, capsys):
+    records = hostile_class[2]
+    accepted = [attack.name for attack in ATTACKS if points(records[attack.name])["iou"] > 0.0]
+    graded = {odd.name: points(records[shown_name(odd.name)]).get("iou", 0.0) for odd in ODD}
+    accepted += [odd.name for odd in ODD if graded[odd.name] > odd.points]
+    rejected = [odd.name for odd in ODD if graded[odd.name] < odd.points]
+    with capsys.disabled():
+        right = sum(odd.points > 0.0 for odd in ODD)
+        wrong = len(ATTACKS) + len(ODD) - right
+        print(f"\n{len(ATTACKS)} attacks, {len(ODD)} odd submissions: ", end="")
+        print(f"false accepts {len(accepted)} of {wrong}, false rejects {len(rejected)} of {right}")
+    assert not accepted and not rejected
+
+
 def test_there_are_attacks_enough():
     assert len(ATTACKS) >= 30 and sum(attack.blind for attack in ATTACKS) >= 10
     assert len({attack.name for attack in ATTACKS}) == len(ATTACKS)

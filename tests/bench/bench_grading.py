@@ -1,0 +1,147 @@
+"""Grading lab 04: `labkit grade` beside `nbgrader autograde` on the same submissions, and what a big class costs.
+
+Both take one submission at a time on this machine, in turns; nbgrader's check cells run with LABKIT_STRICT=1, so that
+a wrong answer stops them. The verdicts are compared on honest work. Memory is what the grader's own process holds.
+"""
+
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+
+import grading_course as kit  # noqa: E402
+
+from labkit.grading import grade, reading, sandbox  # noqa: E402
+from labkit.grading.run import grade_course  # noqa: E402
+from labkit.questions.question import TOPICS  # noqa: E402
+
+TOPIC = "04_iou"
+ROUNDS = 5
+CLASS = 100
+MANY = 1000
+HONEST = ("ada", "ben")
+ENVIRONMENT = os.environ | {
+    "LABKIT_STRICT": "1",
+    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+}
+
+
+def main() -> str:
+    """Measure all of it (some minutes)."""
+    with tempfile.TemporaryDirectory() as folder:
+        return "\n\n".join(
+            [beside_nbgrader(Path(folder) / "course"), classes(Path(folder)), many(Path(folder) / "many")]
+        )
+
+
+def new_course(course: Path) -> Path:
+    """A course with lab 04 as it is released, and the two honest sample submissions."""
+    for name in (f"solutions/{TOPIC}", f"labs/{TOPIC}"):
+        shutil.copytree(ROOT / name, course / name)
+    for student in HONEST:
+        shutil.copytree(ROOT / "tests/data/submitted" / student, course / "submitted" / student)
+    shutil.copy(ROOT / "nbgrader_config.py", course)
+    return course
+
+
+def nbgrader(course: Path, *arguments: str) -> float:
+    """Run nbgrader; returns seconds."""
+    start = time.perf_counter()
+    command = [sys.executable, "-m", "nbgrader", *arguments]
+    subprocess.run(command, cwd=course, env=ENVIRONMENT, check=True, capture_output=True)
+    return time.perf_counter() - start
+
+
+def beside_nbgrader(course: Path) -> str:
+    """Both graders on the same two submissions, again and again, in turns; start-up of the command included in both."""
+    from labkit.grading.gradebook import opened
+
+    new_course(course)
+    ours, theirs = course / "ours", course / "theirs"
+    for copy in (ours, theirs):
+        new_course(copy)
+    nbgrader(theirs, "generate_assignment", TOPIC, "--force")
+    command = [sys.executable, "-m", "labkit.cli", "grade", TOPIC, "--workers", "1", "--force", "--seed", "s"]
+    times = {"nbgrader autograde": [], "labkit grade": [], "labkit grade, without starting the command": []}
+    for _ in range(ROUNDS):
+        times["nbgrader autograde"].append(nbgrader(theirs, "autograde", TOPIC, "--force") / len(HONEST))
+        start = time.perf_counter()
+        subprocess.run(command, cwd=ours, capture_output=True)
+        times["labkit grade"].append((time.perf_counter() - start) / len(HONEST))
+        start = time.perf_counter()
+        grade_course(TOPIC, ours, seed="s", force=True, progress=False)
+        times["labkit grade, without starting the command"].append((time.perf_counter() - start) / len(HONEST))
+    scores = []
+    for copy in (ours, theirs):
+        with opened(copy) as book:
+            names = [
+                cell.name for cell in book.find_notebook(TOPIC, TOPIC).grade_cells if cell.name.startswith("check_")
+            ]
+            scores.append([book.find_grade(name, TOPIC, TOPIC, s).auto_score for s in HONEST for name in sorted(names)])
+    agree = sum(a == b for a, b in zip(*scores, strict=True))
+    base = statistics.median(times["nbgrader autograde"])
+    rows = [
+        f"| {name} | {statistics.median(t):.2f} | {60 / statistics.median(t):.0f} | {base / statistics.median(t):.1f} |"
+        for name, t in times.items()
+    ]
+    head = "| grader, one submission at a time | median s a submission | submissions a minute | times nbgrader's |"
+    return "\n".join(
+        [head, "|---|---|---|---|", *rows, "", f"Same verdicts on honest work: {agree} of {len(scores[0])}."]
+    )
+
+
+def classes(folder: Path) -> str:
+    """A class of 100 a lab, as tests/test_grading_class.py builds them, one worker: seconds and wrong verdicts."""
+    rows = []
+    for topic in TOPICS:
+        course = folder / topic
+        kit.write_lab(course, topic)
+        lab, _ = reading.read_lab(course, topic)
+        students = list(kit.synthetic_class(topic).values())
+        seconds, wrong, torch = [], 0, 0
+        for i in range(CLASS):
+            cells, right = students[i % len(students)]
+            torch += any("torch" in cell for cell in cells.values())
+            start = time.perf_counter()
+            submission = reading.Submission(f"s{i}", cells, {}, "", str(i))
+            results = grade.grade_submission(lab, submission, f"secret {i // len(students)}")
+            seconds.append(time.perf_counter() - start)
+            wrong += sum((r.points == r.max_points) != right[r.question] for r in results)
+        rows.append(f"| {topic} | {statistics.median(seconds):.2f} | {sum(seconds):.0f} | {torch} | {wrong} |")
+    head = "| lab, 100 students | median s | all, s | of them with torch | grades not as constructed |"
+    return "\n".join([head, "|---|---|---|---|---|", *rows])
+
+
+def many(course: Path) -> str:
+    """The memory of the grader over 1,000 submissions of lab 04."""
+    new_course(course)
+    shutil.rmtree(course / "submitted" / "ben")
+    lab, _ = reading.read_lab(course, TOPIC)
+    place = course / "submitted/ada" / TOPIC / f"{TOPIC}.ipynb"
+    sandbox.probe(("numpy",), sandbox.Limits())
+    sizes, seconds = {}, []
+    for i in range(1, MANY + 1):
+        start = time.perf_counter()
+        grade.grade_submission(lab, reading.read_submission("ada", place, lab), "secret")
+        seconds.append(time.perf_counter() - start)
+        if i in (100, MANY // 2, MANY):
+            sizes[i] = resident_mb()
+    cells = " | ".join(f"{size:.1f}" for size in sizes.values())
+    head = "| lab 04 | median s a submission | " + " | ".join(f"MB after {i}" for i in sizes) + " |"
+    return f"{head}\n|---|---|{'---|' * len(sizes)}\n| one worker | {statistics.median(seconds):.3f} | {cells} |"
+
+
+def resident_mb() -> float:
+    """Memory that this process holds."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+if __name__ == "__main__":
+    print(main())
