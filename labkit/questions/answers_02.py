@@ -73,6 +73,11 @@ def wrapped_bytes(image, lam, sigma_I, sigma_p):
     return gaussian((np.diff(image, axis=1) ** 2).sum(axis=2, dtype=float), lam, sigma_I, sigma_p)
 
 
+def converted_late(image, lam, sigma_I, sigma_p):
+    """Subtract bytes, and square floats."""
+    return gaussian((np.diff(image, axis=1).astype(float) ** 2).sum(axis=2), lam, sigma_I, sigma_p)
+
+
 def pairs_below(image, lam, sigma_I, sigma_p):
     """The pairs of the other direction."""
     return gaussian(squares_right(image, axis=0), lam, sigma_I, sigma_p)

@@ -111,6 +111,11 @@ WEIGHTS = Question(
             "Try np.uint8(5) - np.uint8(10): bytes have no negative numbers, so turn the image into floats first.",
         ),
         Misconception(
+            "converted after the subtraction",
+            answers.converted_late,
+            "np.uint8(5) - np.uint8(10) is 251 already: turn the image into floats before you subtract.",
+        ),
+        Misconception(
             "the pairs below",
             answers.pairs_below,
             "A grid H by W has H (W - 1) pairs that go to the right: which axis counts columns?",
@@ -205,11 +210,6 @@ ENERGY = Question(
             "labels subtracted as if they were numbers",
             answers.label_steps,
             "Classes have names, not sizes: a pair (0, 2) disagrees no more than a pair (0, 1).",
-        ),
-        Misconception(
-            "no unary term",
-            lambda y, psi, w_right, w_down: answers.pair_part(y, w_right, w_down),
-            "What does it cost each pixel to have its label, before neighbours are asked?",
         ),
         Misconception(
             "pairs to the right only",
