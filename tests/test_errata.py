@@ -145,7 +145,7 @@ def test_loading_weights_runs_no_code(tmp_path):
 
     path = tmp_path / "weights.pt"
     torch.save({"state_dict": Mischief()}, path)
-    with pytest.raises(ValueError, match="weights|path"):
+    with pytest.raises(ValueError, match="weights"):
         load_model(path)
     assert not (tmp_path / "ran").exists()
     torch.load(path, weights_only=False)  # what the listing did with every PyTorch before 2.6
