@@ -154,7 +154,7 @@ def test_no_worker_outlives_the_batch(hostile_class):
 def test_no_argument_reaches_what_students_read(hostile_class):
     """The attacks tell_by_... raise and return what holds "ARGUMENTS" and these; only their own line is shown."""
     records = hostile_class[2]
-    for name in ("tell_by_message", "tell_by_name", "tell_by_class", "tell_by_module"):
+    for name in ("tell_by_message", "tell_by_name", "tell_by_class", "tell_by_module", "tell_by_shape"):
         said = next(result.says for result in records[name].results if result.question == "iou")
         shown = said.partition(" in line ")[0]
         assert "ARGUMENTS" not in shown and "[" not in shown and "6" not in shown, said

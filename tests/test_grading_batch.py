@@ -286,8 +286,23 @@ def test_only_what_a_question_allows_is_there(course):
     with_torch = Submission("s", {"iou": "import torch"}, {}, "", "")
     assert packages_for(questions["iou"], lab, plain) == ("numpy",)
     assert packages_for(questions["iou"], lab, with_torch) == ("numpy", "torch")
+    with_scipy = Submission("s", {"iou": "x = 1", "mean_iou": "import scipy"}, {}, "", "")
+    assert packages_for(questions["iou"], lab, with_scipy) == ("numpy", "scipy")
+    assert packages_for(questions["boundary_band"], lab, with_scipy) == ("numpy",)  # which forbids it
     strict = replace(questions["iou"], forbidden=("torch.nn.functional",))
     assert packages_for(strict, lab, with_torch) == ("numpy",)
+
+
+def test_a_comparison_that_fails_is_a_wrong_answer_and_not_the_end(course, monkeypatch):
+    from labkit.grading import grade as grading
+
+    def broken(question, cases, outputs):
+        raise OverflowError("as if an output were too odd to compare")
+
+    monkeypatch.setattr(grading, "verdict", broken)
+    graded = grade(course)
+    assert [record.points for record in graded.records] == [0.0, 0.0, 0.0]
+    assert "OverflowError" in graded.records[0].results[0].flag
 
 
 @pytest.mark.bad_input

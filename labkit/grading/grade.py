@@ -15,10 +15,12 @@ from labkit.grading import sandbox
 from labkit.grading.channel import Worker, WorkerLost
 from labkit.grading.reading import Lab, Submission, imported_roots
 from labkit.grading.sandbox import Limits
-from labkit.questions.judge import Case, Problem, expected_cases, verdict
+from labkit.questions.judge import Case, Problem, Verdict, expected_cases, verdict
 from labkit.questions.question import Question, of_topic
 
-LOOK_AT = ("ended", "channel", "unreadable")  # kinds of problems that an instructor should look at
+ON_DEMAND = ("scipy", "torch")  # they take long to load, so only where an answer names them
+LONGEST_SHAPE = 24  # characters
+LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at
 
 
 @dataclass(frozen=True)
@@ -61,13 +63,12 @@ def grade_submission(
 
 
 def packages_for(question: Question, lab: Lab, submission: Submission) -> tuple[str, ...]:
-    """The packages that there are for a question: NumPy, what the lab's setup imports, and torch if an answer names it.
+    """The packages that there are for a question: NumPy, what the lab's setup imports, and of ON_DEMAND what is named.
 
     What the question forbids is left out, whole. Everything else is absent in any case.
     """
-    wanted = set(imported_roots(lab.setup))
-    if any("torch" in submission.cells.get(name, "") for name in lab.answers):
-        wanted.add("torch")
+    answers = " ".join(submission.cells.get(name, "") for name in lab.answers)
+    wanted = {*imported_roots(lab.setup), *(package for package in ON_DEMAND if package in answers)}
     forbidden = {name.partition(".")[0] for name in question.forbidden}
     if not forbidden.isdisjoint(imported_roots(lab.setup)):
         raise ValueError(f"{question.name}: forbids what its lab's setup cell imports, {', '.join(sorted(forbidden))}")
@@ -171,16 +172,33 @@ def run_setup(worker: Worker, lab: Lab, limits: Limits) -> None:
 def result(lab: Lab, submission: Submission, question: Question, cases: Sequence[Case], outputs: list) -> Result:
     """Judge a question's outputs and put the verdict into words and points."""
     name, source = question.function, submission.cells[question.function]
-    judged = verdict(question, cases, outputs)
+    judged = judged_safely(question, cases, outputs)
     flags = [f"names {word}" for word in named_modules(source, question) if not named(word, lab.answers[name])]
     if judged.problem is None:
         says = f"right in all {len(cases)} cases"
         return Result(name, lab.points[name], lab.points[name], says, flag="; ".join(flags))
-    problem = with_line(judged.problem, source)
+    problem = with_short_shape(with_line(judged.problem, source))
     says = problem.says if problem.kind in ("unanswered", "missing") else f"{problem.says} ({judged.where})"
     if problem.kind in LOOK_AT:
         flags.append(problem.says)
     return Result(name, 0.0, lab.points[name], says, judged.hint or "", "; ".join(flags))
+
+
+def judged_safely(question: Question, cases: Sequence[Case], outputs: list) -> Verdict:
+    """The verdict; outputs that the comparison cannot even digest are wrong, and do not stop the batch."""
+    try:
+        return verdict(question, cases, outputs)
+    except Exception as error:
+        problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
+        return Verdict(problem, 0, "some case", None, ())
+
+
+def with_short_shape(problem: Problem) -> Problem:
+    """Leave out a shape that is too long to be an honest one: many digits could tell the secret arguments."""
+    kept, got, shape = problem.says.rpartition("got ")
+    if problem.kind != "shape" or len(shape) <= LONGEST_SHAPE:
+        return problem
+    return replace(problem, says=f"{kept}{got}quite another shape")
 
 
 def not_graded(lab: Lab, name: str, problem: str) -> Result:

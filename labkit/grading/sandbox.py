@@ -1,4 +1,4 @@
-"""What a worker sees and may use: bubblewrap around it, limits inside, and nothing but Python and two packages.
+"""What a worker sees and may use: bubblewrap around it, limits inside, and nothing but Python and a few packages.
 
 In the sandbox there are the interpreter, the standard library, the packages that answers may use, the worker's own
 file and an empty /tmp of limited size: no course, no labkit, no home, no /proc, no network, and no other process.

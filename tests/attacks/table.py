@@ -298,6 +298,11 @@ def iou(n):
         "carry the secret arguments into the feedback in the name of a module",
         'def iou(n): raise ModuleNotFoundError(name="ARGUMENTS <b>" + str(n.tolist()))\n',
     ),
+    Attack(
+        "tell_by_shape",
+        "carry the secret arguments into the feedback in the shape of an empty array",
+        "def iou(n): return np.zeros((0, *(10 ** 4 + n.ravel()[:6])), np.uint8)\n",
+    ),
     # ------------------------------------------------------------------------------- to reach out of the sandbox
     Attack(
         "rewrite_gradebook",
