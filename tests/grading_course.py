@@ -9,12 +9,14 @@ import copy
 import functools
 import inspect
 import json
+import tempfile
 import types
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 
+from labkit.grading.gradebook import opened
 from labkit.questions.question import Question, of_topic
 
 
@@ -66,8 +68,19 @@ def lab_notebook(topic: str, answers: dict[str, str] | None = None, setup: str =
 
 
 def write_lab(course: Path, topic: str, **how) -> None:
-    """Write course/labs/TOPIC/TOPIC.ipynb."""
+    """Write course/labs/TOPIC/TOPIC.ipynb, and an empty gradebook if there is none."""
     write(course / "labs" / topic / f"{topic}.ipynb", lab_notebook(topic, **how))
+    if not (course / "gradebook.db").exists():
+        (course / "gradebook.db").write_bytes(empty_gradebook())
+
+
+@functools.cache
+def empty_gradebook() -> bytes:
+    """What nbgrader makes of a new gradebook; making one takes it two seconds."""
+    with tempfile.TemporaryDirectory() as folder:
+        with opened(Path(folder)):
+            pass
+        return (Path(folder) / "gradebook.db").read_bytes()
 
 
 def submit(course: Path, student: str, topic: str, answers: dict[str, str] | dict) -> Path:
