@@ -31,7 +31,7 @@ demo: .venv/installed
 
 # Two processes with one thread each: with two each, they only wait for one another. ARGS="-n 8" takes more cores.
 # Notebooks: outputs of lessons and solutions are compared with the committed ones, labs run as students get them.
-NBVAL := -q --nbval-current-env --nbval-cell-timeout 120 -n 2 --dist loadfile
+NBVAL := -q --nbval-current-env --nbval-cell-timeout 240 -n 2 --dist loadfile
 test: export OMP_NUM_THREADS := 1
 test: .venv/installed
 	$(BIN)/ruff check .

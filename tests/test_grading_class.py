@@ -1,4 +1,4 @@
-"""A class of synthetic students over all labs: every grade as constructed, nothing wrong passes, nothing right fails."""
+"""A class of synthetic students over all labs: every grade as constructed, nothing wrong passes or right fails."""
 
 import importlib.util
 
