@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import data_gen
 from labkit import mask_study
+from labkit.cli import app
 from labkit.labels import OBSTACLE, TARGET
 from labkit.mask_study import Row
 from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
@@ -115,6 +117,14 @@ def test_a_study_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     rows = mask_study.run(out, 10, 5, progress=False)
     assert calls == [10, 11, 12, 13, 14] and rows == mask_study.read(out) == [trials(s)[0] for s in range(10, 15)]
     assert [path.name for path in out.parent.iterdir()] == ["study.csv"]
+
+
+def test_the_command_runs_it_and_says_what_came_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(mask_study, "trials_of_scene", trials)
+    out = tmp_path / "study.csv"
+    done = CliRunner().invoke(app, ["study", "--out", str(out)])
+    assert done.exit_code == 0 and len(mask_study.read(out)) == mask_study.SCENES
+    assert f"{out}: {mask_study.SCENES} lifts, 50.0% succeeded (95 % interval 37.7% to 62.3%)" in done.output
 
 
 def test_what_is_left_of_other_scenes_is_not_mixed_in(tmp_path):
