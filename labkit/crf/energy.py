@@ -93,8 +93,9 @@ class PottsCRF:
         """Build the contrast-sensitive Potts model of section 2 over an image.
 
         image: (H, W) or (H, W, channels), any real dtype; sigma_I is in its own units (0 to 255 for uint8). lam >= 0,
-        sigma_p in pixels. extra: pairs (channels, sigma) such as a depth image and its scale in metres; each adds its
-        own -|d|^2 / (2 sigma^2) to the exponent, and NaN there (no reading) adds nothing. Raises ValueError.
+        sigma_p in pixels (with 4 neighbours it only rescales lam, all pairs being one pixel apart). extra: pairs
+        (channels, sigma) such as a depth image and its scale in metres; each adds its own -|d|^2 / (2 sigma^2) to the
+        exponent, and NaN there (no reading) adds nothing. Raises ValueError.
 
         >>> unary, image = np.zeros((2, 3, 2)), np.zeros((2, 3, 3), np.uint8)
         >>> crf = PottsCRF.from_image(unary, image, lam=2.0, sigma_I=10.0, sigma_p=1.0)
