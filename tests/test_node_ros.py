@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+import xmlrpc.client
 from importlib.machinery import PathFinder
 from pathlib import Path
 
@@ -35,7 +36,7 @@ if missing := [name for name in NEEDED if not PathFinder.find_spec(name, [*sys.p
 ROOT = Path(__file__).parent.parent
 TOPICS = Topics()
 MS = 1_000_000
-PATIENCE = 30.0  # seconds: only a failure waits so long
+PATIENCE = 60.0  # seconds: only a failure waits so long
 MASTER = """
 import sys, time
 sys.path.append("/usr/lib/python3/dist-packages")
@@ -273,11 +274,20 @@ def test_from_camera_topic_to_lift_over_ros(tester, living_master):
     with World(spec) as world:
         frame = world.render((320, 240))
         arm = Arm(tester.transport, world)
-        with node(tester, command=("-c", code)):
+        with node(tester, command=("-c", code)) as running:
             tester.camera.publish(frame, 5 * MS)
             tester.answer("grasp", 5 * MS)
             result = arm.act(timeout=PATIENCE)
+            shut_down("/segmentation_node")  # what `rosnode kill` does; the status is 0 as after SIGINT
+            assert running.wait(PATIENCE) == 0
     assert result.success and result.class_id == CLASSES.index("target"), result
+
+
+def shut_down(name: str) -> None:
+    with xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        _, _, uri = master.lookupNode("/tester", name)
+    with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(uri) as slave:  # it may be gone before it answers
+        slave.shutdown("/tester", "test")
 
 
 def test_the_texts_function_uses_all_of_its_arguments(monkeypatch):

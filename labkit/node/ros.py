@@ -95,7 +95,8 @@ class RosTransport:
 
     def publish(self, topic: str, message: Message) -> None:
         """Send a message to all who listen; they get it from a thread of rospy's, so this does not wait for them."""
-        self._publishers[topic].publish(to_ros(message, self._make))
+        if not self._rospy.is_shutdown():  # afterwards nobody is left
+            self._publishers[topic].publish(to_ros(message, self._make))
 
     def subscribe(self, topic: str, kind: type, callback: Callable[[Message], None]) -> None:
         """Call `callback` in a thread of rospy's with every message that comes."""
@@ -161,7 +162,7 @@ def wait_for_master(stop: threading.Event) -> bool:
 
 
 def run(pipeline: Pipeline, name: str = "segmentation_node", **options) -> Counts | None:
-    """Run the node on ROS until SIGINT or SIGTERM; what became of the frames, or None if no master ever came.
+    """Run the node on ROS until a signal or ROS ends it; what became of the frames, None if no master ever came.
 
     options: those of SegmentationNode.
     """
@@ -170,6 +171,7 @@ def run(pipeline: Pipeline, name: str = "segmentation_node", **options) -> Count
             return None
         with RosTransport(name) as transport:
             log_to_terminal()
+            ros("rospy").on_shutdown(stop.set)  # `rosnode kill`, or another node took this one's name
             node = SegmentationNode(pipeline, transport, **options)
             logger.info("%s listens to %s", name, node.topics.rgb)
             node.spin(stop)
