@@ -75,7 +75,7 @@ def tidy(notebook: NotebookNode) -> NotebookNode:
 
     >>> from nbformat.v4 import new_code_cell, new_notebook
     >>> cell = new_code_cell("1 + 1", metadata={"execution": {"iopub.status.busy": "2024-01-01"}})
-    >>> tidied = tidy(new_notebook(cells=[cell], metadata={"language_info": {"version": "3.11.2"}}))
+    >>> tidied = tidy(new_notebook(cells=[cell], metadata={"language_info": {"name": "python", "version": "3.11.2"}}))
     >>> dict(tidied.cells[0].metadata), dict(tidied.metadata.language_info)
     ({}, {'name': 'python'})
     """

@@ -106,7 +106,7 @@ def port():
         return probe.getsockname()[1]
 
 
-class Tester:
+class Watcher:
     """Camera and listener of this process."""
 
     def __init__(self, transport):
@@ -145,7 +145,7 @@ def tester(port, tmp_path_factory):
     os.environ.update(ours)
     try:
         with master(port) as started, ros.RosTransport("tester") as transport:
-            tester = Tester(transport)
+            tester = Watcher(transport)
             tester.master = started
             yield tester
     finally:

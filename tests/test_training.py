@@ -214,7 +214,7 @@ def test_the_loss_of_a_step_is_the_weighted_loss_of_its_batch():
     model = SmallSegNet()
     model.load_state_dict(trainer.model.state_dict())
     weights = class_weights(data.class_counts(4), "inverse")
-    assert trainer.step() == pytest.approx(float(segmentation_loss(model(x), y, weights)), rel=2e-2)
+    assert trainer.step() == pytest.approx(float(segmentation_loss(model(x), y, weights).detach()), rel=2e-2)
 
 
 def test_an_epoch_shows_every_image_once():
