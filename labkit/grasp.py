@@ -123,9 +123,10 @@ def plan_grasps(
     def plan_one(number: int) -> list[Grasp] | str:
         return _plan_one(number, targets[number], scene, table_z, camera_position, gripper)
 
-    one_by_one = len(targets) < 2
+    others = [_threads().submit(plan_one, number) for number in range(1, len(targets))]
+    plans = [plan_one(0), *(other.result() for other in others)] if targets else []
     grasps, reasons = [], []
-    for found in map(plan_one, range(len(targets))) if one_by_one else _threads().map(plan_one, range(len(targets))):
+    for found in plans:
         if isinstance(found, str):
             reasons.append(found)
         else:
@@ -210,7 +211,7 @@ def _frames(yaw, xy, z) -> Float[np.ndarray, "n 4 4"]:
 def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[Grasp] | str:
     """Grasps of one target, or why there is none."""
     from labkit import grasp_kernels as kernels  # numba takes its time to import
-    from labkit.grasp_measure import measure
+    from labkit.grasp_measure import find_grips
 
     if len(target) == 0:
         return "no target points"
@@ -219,17 +220,12 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     if len(target) == 0:
         return "the target is too flat: nothing of it is higher than the lowest tips"
     hand = _hand(gripper, kernels)
-    centre = kernels.middle_of_area(target)
-    around = kernels.points_near(scene, *centre, RADIUS)
-    near = around[around[:, 2] > lowest]
-    hidden = np.zeros((0, 3))
-    if camera_position is not None:
-        hidden = kernels.hidden_points(around, *centre, RADIUS, camera_position, lowest)
-    grips, costs, dropped = kernels.search(target, near, hidden, centre, _yaws(target), lowest, hand, ROUGH)
+    camera = np.zeros(0) if camera_position is None else camera_position
+    centre, near, hidden = kernels.surroundings(target, scene, RADIUS, camera, lowest)
+    around = (near, hidden, centre, _yaws(target), lowest, hand)
+    grips, measures, dropped = find_grips(target, *around, ROUGH, MEASURED, SPARE, LEAST)
     if len(grips) == 0:
         return _why_none(dropped, kernels)
-    grips = grips[np.argsort(costs)[:MEASURED]]
-    measures = measure(grips, target, hidden, centre, hand, SPARE, LEAST)
     fits = measures[:, 1] > 0.0
     if not fits.any():
         return "no room for the fingers beside the target"

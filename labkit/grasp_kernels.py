@@ -122,6 +122,20 @@ def hidden_points(scene, x, y, radius, camera, floor):
 
 
 @njit(cache=True, nogil=True)
+def surroundings(target, scene, radius, camera, lowest):
+    """What matters around a target: its middle (x, y), the points near it that are higher than `lowest`, hidden ones.
+
+    camera: its position; an empty array if nobody knows it, and then nothing is known to be hidden.
+    """
+    centre = middle_of_area(target)
+    around = points_near(scene, centre[0], centre[1], radius)
+    hidden = np.empty((0, 3))
+    if len(camera):
+        hidden = hidden_points(around, centre[0], centre[1], radius, camera, lowest)
+    return centre, around[around[:, 2] > lowest], hidden
+
+
+@njit(cache=True, nogil=True)
 def fill(heights, points, x, y, cos, sin):
     """Make a map, turned by a yaw around (x, y): the highest point of each cell."""
     heights[:] = -np.inf

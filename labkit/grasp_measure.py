@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from labkit.grasp_kernels import CELL, Grip
+from labkit.grasp_kernels import CELL, Grip, search
 
 SKIN = 0.004  # metres: what lies this close behind the outermost point is touched by the pad too
 
@@ -100,3 +100,11 @@ def shadow_height(P, height, half, low, high):
         if low < P[i, 0] < high and abs(P[i, 1]) <= half:
             z = max(z, P[i, 2] - height)
     return z
+
+
+@njit(cache=True, nogil=True)
+def find_grips(target, scene, hidden, centre, yaws, lowest, hand, weights, most, spare, least):
+    """Search, and measure the `most` best by their rough costs: grips, their measures, and what was dropped and why."""
+    grips, costs, dropped = search(target, scene, hidden, centre, yaws, lowest, hand, weights)
+    grips = grips[np.argsort(costs, kind="mergesort")[:most]]  # stable: equals stay in their order
+    return grips, measure(grips, target, hidden, centre, hand, spare, least), dropped
