@@ -29,7 +29,7 @@ SECTION = "<!-- bench: {} -->"
 # Flags of /proc/cpuinfo that decide how fast networks and kernels run, in words.
 CPU_FLAGS = {"avx2": "AVX2", "avx512f": "AVX-512", "avx512_bf16": "AVX-512 bf16", "amx_bf16": "AMX bf16"}
 VERSIONS = ("numpy", "scipy", "numba", "torch", "opencv-python-headless", "pybullet")
-PEERS = ("scikit-learn", "torchmetrics", "open3d", "pymaxflow", "pydensecrf2")
+PEERS = ("scikit-learn", "torchmetrics", "open3d", "pymaxflow", "gco-wrapper", "pydensecrf2", "onnxruntime", "nbgrader")
 
 
 def main(arguments: list[str] | None = None, folder: Path = HERE) -> int:
