@@ -23,11 +23,11 @@ from tqdm.auto import tqdm
 from data_gen.families import FAMILIES
 from data_gen.scenes import CONFIGS, sample_scene
 from data_gen.sensor import DepthSensor
-from labkit.files import write_atomically
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
+from labkit.support.files import write_atomically
 
 VERSION = 1
 DEPTH_UNIT_MM = 0.1  # one step of the 16-bit files: finer than any sensor, and 6.5 m still fit

@@ -18,7 +18,7 @@ __version__ = "0.1.0"
 
 
 def check(name: str, answer: object) -> Callable:
-    """Check a student's answer, show the result, and return the function to go on with: see `labkit.checking`."""
-    from labkit.checking import check
+    """Check a student's answer, show the result, and return the function to go on with (`labkit.course.checking`)."""
+    from labkit.course.checking import check
 
     return check(name, answer)

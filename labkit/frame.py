@@ -8,7 +8,15 @@ import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
 from labkit.labels import CLASSES
-from labkit.validation import check_depth, check_K, check_labels, check_rgb, check_same_size, check_shape, check_T
+from labkit.support.validation import (
+    check_depth,
+    check_K,
+    check_labels,
+    check_rgb,
+    check_same_size,
+    check_shape,
+    check_T,
+)
 
 
 @dataclass(frozen=True, eq=False)

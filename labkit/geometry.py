@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Integer, Real
 
-from labkit.validation import check_depth, check_finite, check_K, check_same_size, check_shape, check_T
+from labkit.support.validation import check_depth, check_finite, check_K, check_same_size, check_shape, check_T
 
 Scalar = int | float | np.integer | np.floating
 
@@ -137,7 +137,7 @@ def _back_project(
     depth: Float[np.ndarray, "H W"], K: Float[np.ndarray, "3 3"], T: Float[np.ndarray, "4 4"]
 ) -> Float32[np.ndarray, "H W 3"]:
     """Compute d (R q) + t for every pixel; NaN where there is no reading."""
-    from labkit.geometry_kernels import scale_rays  # numba: loaded when an image is first back-projected
+    from labkit.support.geometry_kernels import scale_rays  # numba: loaded when an image is first back-projected
 
     depth = _check_depth_image(depth)
     rays = _base_rays(K.tobytes(), T[:3, :3].tobytes(), *depth.shape)
@@ -322,7 +322,7 @@ def remove_outliers(
     >>> remove_outliers(P, radius=0.01, min_neighbours=1)[:, 0].tolist()
     [0.0, 0.001]
     """
-    from labkit.geometry_kernels import count_neighbours, sort_into_cells
+    from labkit.support.geometry_kernels import count_neighbours, sort_into_cells
 
     P = _check_cloud("P", P)
     _check_reach("radius", radius, P)
@@ -344,7 +344,7 @@ def cluster(P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 
     >>> [len(group) for group in cluster(P, gap=0.015, min_points=1)]
     [2, 1]
     """
-    from labkit.geometry_kernels import link_cells, sort_into_cells
+    from labkit.support.geometry_kernels import link_cells, sort_into_cells
 
     P = _check_cloud("P", P)
     _check_reach("gap", gap, P)

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Integer, Num, UInt8
 
-from labkit.validation import check_labels, check_rgb, check_same_size, check_shape
+from labkit.support.validation import check_labels, check_rgb, check_same_size, check_shape
 
 CLASSES = ("background", "surface", "target", "obstacle")
 BACKGROUND, SURFACE, TARGET, OBSTACLE = range(4)

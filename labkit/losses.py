@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float64, Integer, Num
 
 from labkit.labels import IGNORE, one_hot
-from labkit.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_shape
 
 if TYPE_CHECKING:
     import torch

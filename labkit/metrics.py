@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, Integer, Num, UInt8
 
 from labkit.labels import IGNORE
-from labkit.validation import check_finite, check_labels, check_shape
+from labkit.support.validation import check_finite, check_labels, check_shape
 
 
 def confusion_matrix(
@@ -29,7 +29,9 @@ def confusion_matrix(
     >>> confusion_matrix(np.array([0, 0, 1, 255]), np.array([0, 1, 1, 0]), 2)
     array([[1, 1], [0, 1]])
     """
-    from labkit.metrics_kernels import count_pairs  # here, so that importing this module does not wait for numba
+    from labkit.support.metrics_kernels import (
+        count_pairs,  # here, so that importing this module does not wait for numba
+    )
 
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.

@@ -9,9 +9,9 @@ from jaxtyping import Float, UInt8
 from torch import nn
 from torch.nn import functional as F
 
-from labkit.files import write_atomically
 from labkit.labels import CLASSES
-from labkit.validation import check_rgb
+from labkit.support.files import write_atomically
+from labkit.support.validation import check_rgb
 
 
 class SmallSegNet(nn.Module):

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
-from labkit.engines import Engine, open_engine
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, cluster, remove_outliers
 from labkit.grasp import GraspPlan, plan_grasps
 from labkit.labels import CLASSES, TARGET, one_hot
-from labkit.validation import check_labels, check_rgb, check_same_size, check_shape
+from labkit.stacks.engines import Engine, open_engine
+from labkit.support.validation import check_labels, check_rgb, check_same_size, check_shape
 
 # What the arm can meet: points outside this box (base frame, metres; z from the table) do not concern the grasp.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
@@ -47,8 +47,8 @@ class Pipeline:
     model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
     (H, W, C). table_z: height of the calibrated table plane in the base frame, metres. target_class: what to grasp.
     mirror: let a network look at the image and at its mirror image, and average: better, at twice the time.
-    engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.engines): equal numbers, other speeds; the
-    model may then be an ONNX file of `labkit export`.
+    engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.stacks.engines): equal numbers, other
+    speeds; the model may then be an ONNX file of `labkit export`.
     crf: True refines the labels with the kit's CRF; or a function (probabilities, frame) -> labels (H, W).
     back_project: function (depth, K, T_base_cam) -> (H, W, 3); split: function of the target's points to a list of
     clouds; grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan. The defaults are the kit's; each
@@ -120,7 +120,7 @@ class Pipeline:
         return Perception(probabilities, labels, points, clouds, scene, plan, certainty, seconds)
 
     def _in_workspace(self, points: Float[np.ndarray, "H W 3"]) -> Float[np.ndarray, "M 3"]:
-        from labkit.geometry_kernels import points_in_box  # numba takes its time to import
+        from labkit.support.geometry_kernels import points_in_box  # numba takes its time to import
 
         low, high = np.array(WORKSPACE).T + np.outer([1.0, 1.0], [0.0, 0.0, self.table_z])
         return points_in_box(np.ascontiguousarray(points).reshape(-1, 3), low, high)
@@ -160,7 +160,7 @@ def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray
     >>> most_probable(np.array([[[0.2, 0.8], [0.5, 0.5]]]))
     array([[1, 0]], dtype=uint8)
     """
-    from labkit import labels_kernels  # numba takes its time to import
+    from labkit.support import labels_kernels  # numba takes its time to import
 
     return labels_kernels.most_probable(np.asarray(probabilities))
 

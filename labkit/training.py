@@ -19,14 +19,14 @@ import torch
 from torch import nn
 from tqdm.auto import tqdm
 
-from labkit.augment import augment
-from labkit.files import write_atomically
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, IGNORE, TARGET
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.network import ARCHITECTURES, read_checkpoint, save_model, write_checkpoint
-from labkit.validation import check_labels, check_rgb
+from labkit.support.augment import augment
+from labkit.support.files import write_atomically
+from labkit.support.validation import check_labels, check_rgb
 
 
 @dataclass(frozen=True)

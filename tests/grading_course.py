@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labkit.grading.gradebook import opened
-from labkit.questions.question import Question, of_topic
+from labkit.course.grading.gradebook import opened
+from labkit.course.questions.question import Question, of_topic
 
 
 def code_cell(source: str, grade_id: str | None = None, **mark) -> dict:

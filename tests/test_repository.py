@@ -15,49 +15,34 @@ import pytest
 from packaging.requirements import Requirement
 
 import labkit
-from labkit.doctor import canonical, read_pins, requirements
+from labkit.support.packages import canonical, read_pins, requirements
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 PINS = read_pins(ROOT / "constraints.txt")
 MAX_LINES = 420
-# Who may import whom inside labkit, lowest first: a package or module imports from its own row and the rows above it.
-LAYERS = [
-    ["labkit.validation", "labkit.labels", "labkit.files"],
-    ["labkit.plots"],
-    ["labkit.frame"],
-    [
-        "labkit.geometry",
-        "labkit.losses",
-        "labkit.metrics",
-        "labkit.network",
-        "labkit.augment",
-        "labkit.crf",
-        "labkit.degrade",
-    ],
-    ["labkit.sim", "labkit.grasp", "labkit.grasp_measure", "labkit.training", "labkit.engines", "labkit.baselines"],
-    ["labkit.pipeline"],
-    [
-        "labkit.evaluation",
-        "labkit.mask_study",
-        "labkit.stack_study",
-        "labkit.demo",
-        "labkit.node",
-        "labkit.doctor",
-        "labkit.questions",
-        "labkit.widgets",
-    ],
-    ["labkit.checking", "labkit.release", "labkit.grading"],
-    ["labkit.cli"],
-]
-COMMANDS = {
-    "labkit.cli",
-    "labkit.demo",
-    "labkit.evaluation",
-    "labkit.mask_study",
-    "labkit.stack_study",
-}  # these may import data_gen, inside a function
+# The rooms of labkit, and whom each may import besides itself; the root's modules are rooms of their own.
+BASE = {"support", "frame", "labels"}
+MATHEMATICS = BASE | {"geometry", "losses", "metrics", "network", "training", "crf", "grasp"}
+ROOMS = {
+    "support": set(),
+    "labels": {"support"},
+    "frame": {"support", "labels"},
+    "geometry": BASE,
+    "losses": BASE,
+    "metrics": BASE,
+    "network": BASE,
+    "crf": BASE,
+    "grasp": BASE | {"geometry"},
+    "training": BASE | {"losses", "metrics", "network"},
+    "sim": BASE | {"geometry"},
+    "stacks": MATHEMATICS,
+    "pipeline": MATHEMATICS | {"stacks"},
+    "node": MATHEMATICS | {"stacks", "pipeline", "sim"},
+    "course": MATHEMATICS | {"stacks", "pipeline", "sim", "node"},
+    "apps": MATHEMATICS | {"stacks", "pipeline", "sim", "node", "course"},
+}
 
 
 def tracked(*patterns: str) -> list[Path]:
@@ -111,7 +96,9 @@ def test_pybullet_is_named_only_under_sim():
 
 def test_the_pipeline_imports_without_pybullet():
     """Only labkit.sim needs it, and the demo, which shows the simulator."""
-    names = [name for name in modules() if name.startswith("labkit") and not re.match(r"labkit\.(sim|demo)\b", name)]
+    names = [
+        name for name in modules() if name.startswith("labkit") and not re.match(r"labkit\.(sim\b|apps\.demo)", name)
+    ]
     code = (
         f"import importlib, sys\nfor name in {names}: importlib.import_module(name)\nprint('pybullet' in sys.modules)"
     )
@@ -124,10 +111,10 @@ def test_no_import_cycles():
         TopologicalSorter(import_graph(everywhere)).prepare()  # raises CycleError, and names the cycle
 
 
-def test_labkit_does_not_import_data_gen_but_in_a_command():
+def test_of_labkit_only_commands_import_data_gen_and_only_when_they_run():
     for name, path in modules().items():
         if name.startswith("labkit"):
-            in_functions = name in COMMANDS
+            in_functions = name.startswith("labkit.apps.")
             named = {found.split(".")[0] for found in imports(path, everywhere=not in_functions)}
             assert "data_gen" not in named, name
 
@@ -138,18 +125,14 @@ def test_no_module_imports_tests_or_notebooks():
         assert not named & {"tests", "lessons", "labs", "solutions"}, name
 
 
-def layer(name: str) -> int:
-    """The row of LAYERS that a module belongs to; raises ValueError if it has none."""
-    for number, row in enumerate(LAYERS):
-        if any(name == entry or name.startswith((f"{entry}.", f"{entry}_kernels")) for entry in row):
-            return number
-    raise ValueError(f"{name}: give it a place in LAYERS")
-
-
-def test_modules_of_labkit_import_only_from_below():
-    graph = {name: found for name, found in import_graph(False).items() if name.startswith("labkit.")}
-    upward = [f"{a} imports {b}" for a, found in graph.items() for b in found - {"labkit"} if layer(b) > layer(a)]
-    assert not upward, upward
+def test_arrows_between_rooms_point_one_way():
+    """Inside functions, too; only `labkit.check` itself, the door of the labs, reaches up."""
+    for name, found in import_graph(everywhere=True).items():
+        room = name.split(".")[1:2]
+        if name.startswith("labkit.") and room:
+            entered = {other.split(".")[1] for other in found if other.startswith("labkit.")}
+            upward = entered - ROOMS[room[0]] - set(room)
+            assert not upward, f"{name} imports {sorted(upward)}"
 
 
 # --------------------------------------------------------------------------------- what the files hold

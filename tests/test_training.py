@@ -12,11 +12,11 @@ import pytest
 import torch
 from torch import nn
 
-from labkit.augment import augment, random_colour, random_crop, random_flip, random_noise, random_sharpness
 from labkit.frame import RGBDFrame
 from labkit.losses import class_weights, segmentation_loss
 from labkit.metrics import mean_iou
 from labkit.network import SmallSegNet, load_model, predict_probabilities
+from labkit.support.augment import augment, random_colour, random_crop, random_flip, random_noise, random_sharpness
 from labkit.training import (
     ImagesInMemory,
     TrainConfig,

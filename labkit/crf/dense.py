@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Num
 
 from labkit.crf.energy import as_channels
-from labkit.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_shape
 
 
 def dense_crf(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer, Num, UInt8
 
-from labkit.validation import check_finite, check_labels, check_same_size, check_shape
+from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape
 
 # Each unordered pair of neighbours counts once: a pixel owns the pairs with these neighbours, (down, right) of it.
 OFFSETS = {4: ((0, 1), (1, 0)), 8: ((0, 1), (1, 0), (1, 1), (1, -1))}

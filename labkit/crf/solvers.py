@@ -11,7 +11,7 @@ from labkit.crf.energy import MapResult, PottsCRF, unary_from_probabilities
 from labkit.crf.exact import brute_force, min_cut, unary
 from labkit.crf.mean_field import mean_field
 from labkit.crf.messages import icm, trws
-from labkit.validation import check_depth
+from labkit.support.validation import check_depth
 
 
 def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4) -> MapResult:

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.node.messages import Buffer, CameraInfo, Header, Image, PointCloud2, PointField, Pose
-from labkit.validation import check_K, check_shape, check_T
+from labkit.support.validation import check_K, check_shape, check_T
 
 # Encoding: type of a number, numbers a pixel.
 ENCODINGS = {

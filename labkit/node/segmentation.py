@@ -27,7 +27,7 @@ from labkit.node.messages import (
 from labkit.node.sync import Synchronizer
 from labkit.node.transforms import TransformTree
 from labkit.pipeline import Perception, Pipeline
-from labkit.validation import check_T
+from labkit.support.validation import check_T
 
 logger = logging.getLogger(__name__)
 OUTPUTS = {

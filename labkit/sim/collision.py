@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from labkit.sim.kinematics import HAND_TO_FINGERS, link_frames
 from labkit.sim.shapes import data_path, read_obj
-from labkit.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_shape
 
 ARM = (*(f"link{i}" for i in range(8)), "hand")
 FINGERS = ("left finger", "right finger")

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from labkit.validation import check_finite, check_shape, check_T
+from labkit.support.validation import check_finite, check_shape, check_T
 
 PANDA_URDF = "franka_panda/panda.urdf"  # within pybullet_data
 

@@ -30,7 +30,7 @@ from labkit.sim.planning import (
     trajectory,
 )
 from labkit.sim.world import TIME_STEP, World
-from labkit.validation import check_shape, check_T
+from labkit.support.validation import check_shape, check_T
 
 ARM_JOINTS = tuple(range(7))
 FINGER_JOINTS = (9, 10)

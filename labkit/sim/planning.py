@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from labkit.sim.collision import Margin, first_contact, thin, without_robot
 from labkit.sim.kinematics import FINGER_MAX, MAX_VELOCITY, forward_kinematics, inverse_kinematics
-from labkit.validation import check_finite, check_shape, check_T
+from labkit.support.validation import check_finite, check_shape, check_T
 
 LIFT = 0.18  # m
 APPROACHES = (0.10, 0.16, 0.22)  # m, how far above the grasp the descent may begin

@@ -14,7 +14,7 @@ from labkit.sim.kinematics import HOME, PANDA_URDF
 from labkit.sim.shapes import data_path, file_for, object_mesh, part_mesh, parts_file
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
 from labkit.sim.textures import paint
-from labkit.validation import check_T
+from labkit.support.validation import check_T
 
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7

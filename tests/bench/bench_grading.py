@@ -18,9 +18,9 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import grading_course as kit  # noqa: E402
 
-from labkit.grading import grade, reading, sandbox  # noqa: E402
-from labkit.grading.run import grade_course  # noqa: E402
-from labkit.questions.question import TOPICS  # noqa: E402
+from labkit.course.grading import grade, reading, sandbox  # noqa: E402
+from labkit.course.grading.run import grade_course  # noqa: E402
+from labkit.course.questions.question import TOPICS  # noqa: E402
 
 TOPIC = "04_iou"
 ROUNDS = 5
@@ -61,14 +61,14 @@ def nbgrader(course: Path, *arguments: str) -> float:
 
 def beside_nbgrader(course: Path) -> str:
     """Both graders on the same two submissions, again and again, in turns; start-up of the command included in both."""
-    from labkit.grading.gradebook import opened
+    from labkit.course.grading.gradebook import opened
 
     new_course(course)
     ours, theirs = course / "ours", course / "theirs"
     for copy in (ours, theirs):
         new_course(copy)
     nbgrader(theirs, "generate_assignment", TOPIC, "--force")
-    command = [sys.executable, "-m", "labkit.cli", "grade", TOPIC, "--workers", "1", "--force", "--seed", "s"]
+    command = [sys.executable, "-m", "labkit.apps.cli", "grade", TOPIC, "--workers", "1", "--force", "--seed", "s"]
     times = {"nbgrader autograde": [], "labkit grade": [], "labkit grade, without starting the command": []}
     for _ in range(ROUNDS):
         times["nbgrader autograde"].append(nbgrader(theirs, "autograde", TOPIC, "--force") / len(HONEST))
@@ -98,7 +98,7 @@ def beside_nbgrader(course: Path) -> str:
 
 
 def classes(folder: Path) -> str:
-    """A class of 100 a lab, as tests/test_grading_class.py builds them, one worker: seconds and wrong verdicts."""
+    """A class of 100 a lab, as tests/course/grading builds them, one worker: seconds and wrong verdicts."""
     rows = []
     for topic in TOPICS:
         course = folder / topic

@@ -83,7 +83,7 @@ def over_ros(frame) -> str:
         ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_HOME=folder, ROS_LOG_DIR=folder
     )
     fast = ["--engine", "onnxruntime", "--no-mirror"]
-    command = [sys.executable, "-m", "labkit.cli", "node", "--ros", *fast]
+    command = [sys.executable, "-m", "labkit.apps.cli", "node", "--ros", *fast]
     master = subprocess.Popen([sys.executable, "-c", MASTER, str(port)])
     node = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     try:

@@ -13,8 +13,8 @@ from itertools import product
 import numpy as np
 
 from data_gen import render, sample_scene
+from labkit.apps.evaluation import BOUNDARY_WIDTH
 from labkit.crf import refine
-from labkit.evaluation import BOUNDARY_WIDTH
 from labkit.labels import CLASSES, TARGET
 from labkit.metrics import boundary_counts, confusion_matrix, iou, mean_iou
 from labkit.network import load_model, predict_probabilities, weights_path

@@ -17,13 +17,13 @@ import cv2
 import numpy as np
 
 from data_gen import render, sample_scene
-from labkit.baselines.matlab import cloud_of_mask, montage, semanticseg
-from labkit.baselines.threshold import fit_hsv, hsv_mask
-from labkit.engines import export, open_engine, segment_like_cpp
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import backproject_to_base
 from labkit.labels import SURFACE, TARGET
 from labkit.network import load_model, weights_path
+from labkit.stacks.engines import export, open_engine, segment_like_cpp
+from labkit.stacks.matlab import cloud_of_mask, montage, semanticseg
+from labkit.stacks.threshold import fit_hsv, hsv_mask
 
 HERE = Path(__file__).parent
 BLOB = (320, 240)  # the text's C++ listing: any image is squeezed to this

@@ -1,0 +1,277 @@
+"""The command `labkit`: one thin function a command, which imports what it needs only when it runs.
+
+A new command is a function here that turns its options into one call of a module, and prints what comes back. Wrong
+input may raise ValueError or OSError anywhere below: `main` says it in one line.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+app = typer.Typer(
+    help="Semantic segmentation for robotic manipulation: from one RGB-D image to a lifted object.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def options(debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False) -> None:
+    """Options before the command's name; `main` looks for --debug itself."""
+
+
+@app.command()
+def doctor() -> None:
+    """Check Python, packages, PyBullet, a render, disk, cores and GPU; exit status 1 if something needed is missing."""
+    from labkit.apps.doctor import all_well, examine, report
+
+    findings = examine()
+    typer.echo(report(findings))
+    raise typer.Exit(0 if all_well(findings) else 1)
+
+
+@app.command()
+def train(
+    data: Annotated[Path, typer.Argument(help="Data set to train on, as data_gen writes it.")] = Path("data/train"),
+    val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
+    model: Annotated[Literal["unet", "smallsegnet"], typer.Option(help="Which network.")] = "unet",
+    epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
+    device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
+    seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
+    resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in OUT, if there is one.")] = True,
+) -> None:
+    """Train a network; stopped with Ctrl-C, the same command goes on where it was."""
+    from dataclasses import replace
+
+    import data_gen
+    from labkit import training
+
+    recipe = training.RECIPES[model]
+    config = replace(recipe, seed=seed, epochs=recipe.epochs if epochs is None else epochs)
+    val_set = None if val is None else data_gen.load(val)
+    history = training.train(data_gen.load(data), val_set, config, out, resume=resume, device=device)
+    last = history[-1]
+    scores = f", validation mIoU {last['mean_iou']:.3f}" if "mean_iou" in last else ""
+    typer.echo(f"{out / f'{model}.pt'}: {last['epoch']} epochs, loss {last['loss']:.3f}{scores}")
+
+
+@app.command()
+def evaluate(
+    scenes: Annotated[int, typer.Option(help="How many scenes; each is one trial.", min=1)] = 100,
+    first_seed: Annotated[int, typer.Option(help="Seed of the first scene; the others follow.", min=0)] = 900_000,
+    config: Annotated[Literal["test", "hard", "train"], typer.Option(help="Which kind of scenes.")] = "test",
+    masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
+        "predicted"
+    ),
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")] = False,
+    json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+) -> None:
+    """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
+    from data_gen import sample_scene
+    from labkit.apps.evaluation import as_json, run_trials, summarise, table
+    from labkit.network import load_model, weights_path
+    from labkit.support.files import write_atomically
+
+    weights = None if masks == "truth" else weights_path(model)
+    if weights is not None:
+        load_model(weights)  # so that wrong weights are said before anything is simulated
+    specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
+    report = summarise(run_trials(specs, weights, crf=crf, workers=workers))
+    typer.echo(table(report))
+    if json is not None:
+        write_atomically(json, as_json(report).encode())
+
+
+@app.command()
+def export(
+    onnx: Annotated[Path, typer.Option(help="The file to write.")],
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+) -> None:
+    """Write a network as one ONNX file, which OpenCV, onnxruntime and other stacks read."""
+    from labkit.network import load_model, weights_path
+    from labkit.stacks import engines
+
+    engines.export(load_model(weights_path(model)), onnx)
+    typer.echo(f"wrote {onnx}")
+
+
+@app.command()
+def compare(
+    out: Annotated[Path, typer.Option(help="The table to write, a CSV file.")] = Path("lessons/09_other_stacks.csv"),
+    scenes: Annotated[int, typer.Option(help="How many scenes.", min=1)] = 40,
+) -> None:
+    """Compare the stacks on the same scenes, masks, times and lifts: the table that lesson 09 reads (some minutes)."""
+    from labkit.apps import stack_study
+
+    typer.echo(stack_study.table(stack_study.run(out, scenes=scenes)))
+
+
+@app.command()
+def study(
+    out: Annotated[Path, typer.Option(help="Where to write the table.")] = Path("lessons/07_grasp.csv"),
+    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+) -> None:
+    """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it goes on where it was."""
+    from labkit.apps import mask_study
+
+    rows = mask_study.run(out, workers=workers)
+    rate, low, high = mask_study.lift_rate(rows)
+    typer.echo(f"{out}: {len(rows)} lifts, {rate:.1%} succeeded (95 % interval {low:.1%} to {high:.1%})")
+
+
+@app.command()
+def demo(
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
+    ] = None,
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's mask with the CRF.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
+) -> None:
+    """Show the whole chain on one random scene: from the camera's image to the object in the air."""
+    import secrets
+
+    from data_gen import sample_scene
+    from labkit.apps import demo as show
+    from labkit.network import load_model, weights_path
+
+    seed = secrets.randbelow(1_000_000) if seed is None else seed
+    typer.echo(f"labkit demo --seed {seed}")
+    story = show.tell(sample_scene(seed, "test"), load_model(weights_path(model)), crf=crf)
+    typer.echo(show.report(story))
+    for path in show.save(story, out):
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
+def node(
+    sim: Annotated[bool, typer.Option("--sim", help="Rehearse in this process: camera, node, and an arm.")] = False,
+    ros: Annotated[bool, typer.Option("--ros", help="Run on ROS 1 until SIGINT.")] = False,
+    bag: Annotated[
+        Path | None, typer.Option(help="Answer the frames of a bag: NAME.bag, or a folder of ROS 2.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="The bag to write, of either kind.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the scene of --sim.", min=0)] = 0,
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch",
+    mirror: Annotated[bool, typer.Option(help="Look at the mirror image, too: better, at twice the time.")] = True,
+    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")] = False,
+    target: Annotated[int, typer.Option(help="The class to grasp.")] = 2,
+    table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
+    camera_pose: Annotated[
+        str | None, typer.Option(help='Where the camera stands in the base frame, "x y z qx qy qz qw"; else /tf says.')
+    ] = None,
+    base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link",
+    topic: Annotated[list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image, mask=/my/mask ...")] = None,
+    probabilities: Annotated[
+        bool, typer.Option("--probabilities", help="Write class probabilities to OUT, too.")
+    ] = False,
+) -> None:
+    """Run the segmentation node: on a simulated scene, on a bag, or on ROS."""
+    from labkit.node import command
+
+    if (sim, ros, bag is not None).count(True) != 1:
+        raise ValueError("node: expected one of --sim, --ros and --bag")
+    if (bag is None) != (out is None):
+        raise ValueError("out: expected --out with --bag, and only with it")
+    settings = command.Settings(
+        model, engine, crf, target, table_z, camera_pose, base_frame, tuple(topic or ()), mirror
+    )
+    if sim:
+        from data_gen import sample_scene
+
+        typer.echo(command.rehearse(settings, sample_scene(seed, "test")))
+    elif ros:
+        command.run_on_ros(settings)
+    else:
+        typer.echo(command.answer_bag(settings, bag, out, probabilities))
+
+
+@app.command()
+def release(
+    topics: Annotated[list[str] | None, typer.Argument(help="Topics such as 04_iou; all if none is given.")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; exit status 1 if something would change.")
+    ] = False,
+    course: Annotated[Path, typer.Option(help="Folder that holds lessons, solutions and labs.")] = Path("."),
+) -> None:
+    """Generate labs/ from solutions/ with nbgrader, and tidy the notebooks of solutions/ and lessons/."""
+    from labkit.course.release import release
+
+    changed = release(course, topics or (), check=check)
+    for path in changed:
+        typer.echo(f"{path}: not what `labkit release` makes of it" if check else f"changed {path}")
+    if not changed:
+        typer.echo("labs, solutions and lessons are as they should be")
+    raise typer.Exit(1 if check and changed else 0)
+
+
+@app.command()
+def grade(
+    topic: Annotated[str, typer.Argument(help="Which lab, such as 04_iou.")],
+    submissions: Annotated[
+        Path | None, typer.Option(help="Folder of STUDENT/TOPIC/TOPIC.ipynb; COURSE/submitted if not given.")
+    ] = None,
+    seed: Annotated[str | None, typer.Option(help="Secret seed of the cases; drawn once, and kept in OUT.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Submissions at a time; one a core if not given.", min=1)] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
+    course: Annotated[Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.")] = Path("."),
+    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to grade on.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-no-sandbox", help="Without bubblewrap: submissions may do anything here.")
+    ] = False,
+) -> None:
+    """Grade submissions of a lab in a sandbox; exit status 1 if something needs a look, 2 if it could not be done."""
+    import os
+
+    from labkit.course.grading.outputs import terminal_table
+    from labkit.course.grading.run import grade_course
+    from labkit.course.grading.sandbox import NO_SANDBOX
+
+    workers = workers or os.cpu_count() or 1
+    how = {"workers": workers, "dask": dask, "force": force, "unsafe": unsafe}
+    graded = grade_course(topic, course, submissions, out, seed, **how)
+    typer.echo(terminal_table(graded.lab, graded.records))
+    folder = out or course / "grades" / topic
+    typer.echo(f"{len(graded.records)} students, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
+    if unsafe:
+        typer.echo(f"Warning: {NO_SANDBOX}.", err=True)
+    raise typer.Exit(1 if graded.needs_a_look else 0)
+
+
+def main() -> None:
+    """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
+    try:
+        app(prog_name="labkit")
+    except (ValueError, OSError, ModuleNotFoundError) as error:
+        if "--debug" in sys.argv:
+            raise
+        print(f"labkit: {one_line(error)}", file=sys.stderr)
+        sys.exit(2)
+
+
+def one_line(error: Exception) -> str:
+    """Say an error in one line.
+
+    >>> one_line(FileNotFoundError(2, "No such file or directory", "data/train"))
+    'data/train: No such file or directory'
+    """
+    if isinstance(error, OSError) and error.filename is not None:
+        text = f"{error.filename}: {error.strerror}"
+    elif isinstance(error, ModuleNotFoundError):
+        text = f"{error}; `labkit doctor` tells what is missing"
+    else:
+        text = str(error) or type(error).__name__
+    return " ".join(text.split())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,216 @@
+"""The main job, shown: one scene from camera to lift, with a table of stages, a picture of every step and a film."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Polygon
+from PIL import Image
+
+from labkit.apps.evaluation import lift
+from labkit.frame import RGBDFrame
+from labkit.geometry import centroid_and_covariance
+from labkit.labels import CLASSES, PALETTE, TARGET, colorize
+from labkit.metrics import confusion_matrix, iou, mean_iou
+from labkit.pipeline import Perception, Pipeline
+from labkit.sim.panda import LiftResult
+from labkit.sim.spec import Camera, SceneSpec
+from labkit.sim.world import TIME_STEP, World
+
+FILM_SIZE = (480, 360)
+FILM_RATE = 12  # pictures a second, of simulated time
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """All that the demo saw: the frame, what was perceived, what became of the lift, the film, the seconds by stage."""
+
+    spec: SceneSpec
+    frame: RGBDFrame
+    perception: Perception
+    result: LiftResult
+    film: list[UInt8[np.ndarray, "H W 3"]]
+    true_centroids: dict[str, np.ndarray]
+    seconds: dict[str, float]
+
+
+def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool = False) -> Story:
+    """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
+    start = time.perf_counter()
+    with World(spec) as world:
+        built = time.perf_counter()
+        frame = world.render(size)
+        rendered = time.perf_counter()
+        pipeline = Pipeline(model, spec.table.z, crf=crf)
+        pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
+        warm = time.perf_counter()
+        perception = pipeline.run(frame)
+        true_centroids = {t.name: world.centre(t.name) for t in spec.objects if t.class_id == TARGET}
+        film = []
+        camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
+
+        def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
+            record.steps += 1
+            if record.steps % every == 0:
+                film.append(world.render(FILM_SIZE, camera).rgb)
+
+        record.steps = -1
+        world.observers.append(record)
+        before = time.perf_counter()
+        result = lift(world, perception)
+        seconds = {"scene": built - start, "render": rendered - built, "warm-up": warm - rendered, **perception.seconds}
+        seconds["lift and film"] = time.perf_counter() - before
+    return Story(spec, frame, perception, result, film, true_centroids, seconds)
+
+
+def report(story: Story) -> str:
+    """The table of stages and the outcome, for a terminal."""
+    p, counts = story.perception, story.spec.class_counts()
+    n = confusion_matrix(story.frame.labels, p.labels, len(CLASSES))
+    width, height = story.frame.size
+    found = {
+        "scene": f"seed {story.spec.seed}, {counts['target']} target(s) among {counts['obstacle']} obstacles",
+        "render": f"{width} x {height} RGB-D image",
+        "warm-up": "a first run, which compiles",
+        "network": f"probabilities of {len(CLASSES)} classes a pixel",
+        "labels": f"{np.count_nonzero(p.labels == TARGET)} target pixels",
+        "crf": "labels refined along edges of colour and depth",
+        "back_projection": f"{np.count_nonzero(np.isfinite(p.points[..., 2]))} points in the base frame",
+        "clouds": f"{len(p.clouds)} target cloud(s) of {', '.join(str(len(c)) for c in p.clouds) or 'no'} points",
+        "grasps": f"{len(p.plan.grasps)} candidates" if p.plan.grasps else f"none: {p.plan.reason}",
+        "lift and film": "lifted a target" if story.result.success else f"failed: {story.result.reason}",
+    }
+    rows = [f"{'stage':<17}{'ms':>9}  result"]
+    rows += [f"{stage:<17}{1000.0 * s:>9.1f}  {found.get(stage, '')}" for stage, s in story.seconds.items()]
+    scores = ", ".join(f"{name} {value:.3f}" for name, value in zip(CLASSES, iou(n), strict=True))
+    rows += ["", f"IoU of this frame: {scores}; mean {mean_iou(n):.3f}"]
+    for number, cloud in enumerate(p.clouds, start=1):
+        centroid, _ = centroid_and_covariance(cloud)
+        name, distance = nearest(centroid, story.true_centroids)
+        place = ", ".join(f"{x:+.3f}" for x in centroid)
+        rows.append(
+            f"cloud {number}: visible centroid ({place}) m, {100.0 * distance:.1f} cm from the middle of {name}"
+        )
+    if p.plan.grasps:
+        grasp = p.plan.grasps[0]
+        place = ", ".join(f"{x:+.3f}" for x in grasp.T_base_grasp[:3, 3])
+        rows.append(f"best grasp: at ({place}) m, jaws {100.0 * grasp.width:.1f} cm apart")
+    outcome = f"lifted {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
+    return "\n".join([*rows, outcome])
+
+
+def nearest(point: np.ndarray, places: dict[str, np.ndarray]) -> tuple[str, float]:
+    """The name of the place nearest to a point, and how far it is."""
+    distances = {name: float(np.linalg.norm(place - point)) for name, place in places.items()}
+    name = min(distances, key=distances.get)
+    return name, distances[name]
+
+
+def picture(story: Story) -> Figure:
+    """Six panels: what the camera saw, labels, overlay, target cloud, grasp from above, and the arm at the end."""
+    figure = Figure(figsize=(13.5, 8.2), layout="constrained", dpi=100)
+    panels = figure.subplot_mosaic(
+        [["rgb", "labels", "overlay"], ["cloud", "grasp", "arm"]], per_subplot_kw={"cloud": {"projection": "3d"}}
+    )
+    frame, p = story.frame, story.perception
+    painted = frame.rgb.copy()
+    outlines, _ = cv2.findContours((p.labels == TARGET).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    painted[p.labels == TARGET] = (0.45 * painted[p.labels == TARGET] + 0.55 * PALETTE[TARGET]).astype(np.uint8)
+    cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+    images = {
+        "rgb": (frame.rgb, "1  the camera's image"),
+        "labels": (colorize(p.labels), "2  a class for each pixel"),
+        "overlay": (painted, "3  the target mask"),
+        "arm": (story.film[-1] if story.film else frame.rgb, "6  " + outcome_in_words(story)),
+    }
+    for name, (image, title) in images.items():
+        panels[name].imshow(image)
+        panels[name].set_title(title, loc="left")
+        panels[name].set_axis_off()
+    handles = [Patch(color=PALETTE[c] / 255.0, label=name) for c, name in enumerate(CLASSES)]
+    panels["labels"].legend(handles=handles, loc="lower center", ncols=4, fontsize=8, handlelength=1.0)
+    draw_cloud(panels["cloud"], story)
+    draw_grasp(panels["grasp"], story)
+    return figure
+
+
+def outcome_in_words(story: Story) -> str:
+    return f"lifted: {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
+
+
+def draw_cloud(axes, story: Story) -> None:
+    """The points round the targets in their colours, with visible and true centres: they are not the same point."""
+    p, frame, table_z = story.perception, story.frame, story.spec.table.z
+    middle = np.mean(list(story.true_centroids.values()), axis=0)
+    near = (np.abs(p.points[..., :2] - middle[:2]).max(axis=-1) < 0.17) & (p.points[..., 2] > table_z - 0.01)
+    shown = frame.rgb.copy()
+    shown[p.labels == TARGET] = PALETTE[TARGET]
+    axes.scatter(*p.points[near].T, s=2.5, c=shown[near] / 255.0, depthshade=False, rasterized=True)
+    marks = {"visible centroid": ("k+", [centroid_and_covariance(cloud)[0] for cloud in p.clouds])}
+    marks["true middle"] = ("wx", list(story.true_centroids.values()))
+    for label, (style, places) in marks.items():
+        if places:
+            axes.plot(*np.transpose(places), style, ms=10, mew=2, label=label, zorder=10)
+    low, high = middle - 0.17, middle + 0.17
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(table_z, table_z + 0.2))
+    axes.set_box_aspect((1.0, 1.0, 0.59), zoom=1.05)
+    eye = frame.T_base_cam[:3, 3] - middle
+    axes.view_init(elev=28.0, azim=float(np.degrees(np.arctan2(eye[1], eye[0]))) + 25.0)
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.tick_params(labelsize=7)
+    axes.locator_params(nbins=4)
+    axes.set_title("4  the target cloud in the robot's frame, z up", loc="left")
+    axes.legend(fontsize=8, loc="upper right", facecolor="0.75")
+
+
+def draw_grasp(axes, story: Story) -> None:
+    """From above: every point by its height, the target in orange, and the two jaws of the best candidates."""
+    p, table_z = story.perception, story.spec.table.z
+    axes.set_title("5  the grasp, seen from above", loc="left")
+    axes.set(xlabel="y of the base frame (m)", ylabel="x of the base frame (m)")
+    axes.set_aspect("equal", adjustable="box")
+    middle = p.plan.grasps[0].T_base_grasp[:2, 3] if p.plan.grasps else np.array([0.52, 0.0])
+    axes.set(xlim=(middle[1] - 0.16, middle[1] + 0.16), ylim=(middle[0] - 0.12, middle[0] + 0.12))
+    raised = p.scene[p.scene[:, 2] > table_z + 0.004]
+    axes.scatter(raised[:, 1], raised[:, 0], c=raised[:, 2], s=4, cmap="Greys", vmin=table_z - 0.06, rasterized=True)
+    for cloud in p.clouds:
+        axes.scatter(cloud[:, 1], cloud[:, 0], s=4, color=PALETTE[TARGET] / 255.0, rasterized=True)
+    if not p.plan.grasps:
+        axes.text(middle[1], middle[0], p.plan.reason, ha="center", wrap=True)
+        return
+    for rank, grasp in reversed(list(enumerate(p.plan.grasps[:5]))):
+        for side in (-1.0, 1.0):
+            corners = jaw(grasp, side)[:, [1, 0]]
+            style = (
+                {"facecolor": "tab:blue", "alpha": 0.9} if rank == 0 else {"fill": False, "edgecolor": "0.5", "lw": 0.6}
+            )
+            axes.add_patch(Polygon(corners, **style))
+
+
+def jaw(grasp, side: float, width: float = 0.02, thickness: float = 0.012) -> np.ndarray:
+    """The corners of a jaw in the base frame's x and y, (4, 2); side is -1 or 1."""
+    inner = side * grasp.width / 2.0
+    outer = inner + side * thickness
+    corners = np.array([[-width / 2, inner], [width / 2, inner], [width / 2, outer], [-width / 2, outer]])
+    return corners @ grasp.T_base_grasp[:2, :2].T + grasp.T_base_grasp[:2, 3]
+
+
+def save(story: Story, out: Path) -> list[Path]:
+    """Write demo.png and demo.gif into the folder `out`; returns their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    paths = [out / "demo.png"]
+    picture(story).savefig(paths[0])
+    if story.film:
+        paths.append(out / "demo.gif")
+        frames = [Image.fromarray(image) for image in story.film]
+        # One palette for all, taken from pictures all over the film, so that it does not flicker.
+        some = np.hstack([story.film[i] for i in np.linspace(0, len(frames) - 1, 5).astype(int)])
+        palette = Image.fromarray(some).quantize(128)
+        frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in frames]
+        pause = [1000 // FILM_RATE] * (len(frames) - 1) + [1500]
+        frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=pause, loop=0, optimize=False)
+    return paths

@@ -1,0 +1,178 @@
+"""What `labkit doctor` looks at: is everything here that the kit needs, and if not, what mends it."""
+
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+from labkit.support.packages import read_pins, requirements
+
+ROOT = Path(__file__).resolve().parents[2]  # the checkout, when labkit is installed from one with -e
+NEEDED_GB = 2.0  # free disk for a data set to train on, checkpoints and pictures
+NEEDED_RENDER_MM = 0.1
+
+OK, NOTE, WRONG = "ok", "note", "WRONG"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report. state: OK, NOTE (good to know, nothing needs mending) or WRONG; mend: what to do then."""
+
+    name: str
+    state: str
+    found: str
+    mend: str = ""
+
+
+def examine(folder=".") -> list[Finding]:
+    """Look at everything and return what was found; `folder` is where data and pictures will be written."""
+    checks: list[tuple[str, Callable[[], Iterable[Finding]]]] = [
+        ("Python", check_python),
+        ("packages", check_packages),
+        ("PyBullet", check_pybullet),
+        ("render", check_render),
+        ("disk", lambda: check_disk(folder)),
+        ("cores", check_cores),
+        ("GPU", check_gpu),
+    ]
+    return [finding for name, check in checks for finding in run_check(name, check)]
+
+
+def run_check(name: str, check: Callable[[], Iterable[Finding]]) -> list[Finding]:
+    """Run one check; one that cannot even run is WRONG, and the others still have their say.
+
+    >>> run_check("GPU", lambda: 1 / 0)
+    [Finding(name='GPU', state='WRONG', found='ZeroDivisionError: division by zero', mend='see the packages above')]
+    """
+    try:
+        return list(check())
+    except Exception as error:  # whatever is broken on this machine: finding it is what this is for
+        return [Finding(name, WRONG, f"{type(error).__name__}: {error}", "see the packages above")]
+
+
+def check_python() -> list[Finding]:
+    """The interpreter. Its version was checked when labkit was imported; here, whether the environment is its own."""
+    version = platform.python_version()
+    if sys.prefix != sys.base_prefix:
+        return [Finding("Python", OK, f"{version}, in a virtual environment")]
+    mend = "python3.11 -m venv .venv, and install labkit there"
+    return [Finding("Python", NOTE, f"{version}, shared with other projects, which may change its packages", mend)]
+
+
+def check_packages(constraints: Path = ROOT / "constraints.txt") -> Iterator[Finding]:
+    """Everything that labkit requires, directly or not, against the pins; then each extra."""
+    pins = read_pins(constraints) if constraints.is_file() else {}
+    if not pins:
+        yield Finding("pins", NOTE, f"no {constraints.name} beside the package: versions are not compared")
+    runtime = requirements("labkit")
+    yield compare("packages", runtime, pins)
+    for extra in metadata.metadata("labkit").get_all("Provides-Extra", []):
+        of_extra = requirements("labkit", extra)
+        yield compare(f"[{extra}]", {name: of_extra[name] for name in of_extra.keys() - runtime.keys()}, pins, extra)
+
+
+def compare(title: str, installed: dict[str, str | None], pins: dict[str, Requirement], extra: str = "") -> Finding:
+    """Say which packages are missing or not at their pinned versions. Missing ones of an extra are only a note.
+
+    A version's local part does not count: 2.13.0+cpu meets ==2.13.0.
+    """
+    missing = sorted(name for name, version in installed.items() if version is None)
+    differing = sorted(
+        f"{name} {version} (pinned {pins[name].specifier})"
+        for name, version in installed.items()
+        if version is not None and name in pins and not pins[name].specifier.contains(version, prereleases=True)
+    )
+    target = f"'.[{extra}]'" if extra else "."
+    mend = f"python -m pip install -c constraints.txt -e {target}"
+    problems = [f"missing: {', '.join(missing)}"] if missing else []
+    problems += [f"other versions: {', '.join(differing)}"] if differing else []
+    if not problems:
+        return Finding(title, OK, f"{len(installed)}, all there" + (" at their pinned versions" if pins else ""))
+    purpose = f" (only `make {extra}` needs them)" if extra else ""
+    return Finding(title, WRONG if missing and not extra else NOTE, "; ".join(problems) + purpose, mend)
+
+
+def check_pybullet() -> list[Finding]:
+    """PyBullet must be built with numpy: without it, images arrive as tuples, a hundred times slower."""
+    from labkit.sim.client import pybullet  # imported only under labkit.sim
+
+    version = metadata.version("pybullet")
+    if pybullet.isNumpyEnabled():
+        return [Finding("PyBullet", OK, f"{version}, with numpy")]
+    mend = "python -m pip install --force-reinstall --no-deps --only-binary :all: -c constraints.txt pybullet"
+    return [Finding("PyBullet", WRONG, f"{version}, built without numpy", mend)]
+
+
+def check_render() -> list[Finding]:
+    """Render a table, turn the depth image back into points: they must lie on the table's known plane."""
+    error_mm = 1000.0 * table_error()
+    found = f"the table's points lie within {error_mm:.3f} mm of its plane"
+    if error_mm <= NEEDED_RENDER_MM:
+        return [Finding("render", OK, found)]
+    return [Finding("render", WRONG, f"{found}, expected {NEEDED_RENDER_MM} mm", "install the pinned PyBullet")]
+
+
+def table_error() -> float:
+    """Largest distance in metres of a rendered table's points from the plane where the scene puts its top."""
+    import numpy as np
+
+    from labkit.geometry import back_project_to_base
+    from labkit.sim.spec import Camera, SceneSpec
+    from labkit.sim.world import World
+
+    # From so near, the tilted and rolled camera sees nothing but the table's top.
+    spec = SceneSpec(objects=(), camera=Camera.looking_at((0.55, 0.0, 0.0), 0.4, 0.3, 1.0, roll=0.2), robot=False)
+    with World(spec) as world:
+        frame = world.render((320, 240))
+    P_base = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)
+    return float(np.abs(P_base[..., 2] - spec.table.z).max())
+
+
+def check_disk(folder=".") -> list[Finding]:
+    """Free disk where data and pictures go."""
+    free = shutil.disk_usage(folder).free / 1e9
+    state = OK if free >= NEEDED_GB else WRONG
+    return [Finding("disk", state, f"{free:.1f} GB free", f"free {NEEDED_GB:.0f} GB" if state == WRONG else "")]
+
+
+def check_cores() -> list[Finding]:
+    """Processor cores that this process may use."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return [Finding("cores", OK if cores >= 2 else NOTE, f"{cores}, {platform.machine()}")]
+
+
+def check_gpu() -> list[Finding]:
+    """A GPU that this build of PyTorch can use; nothing needs one."""
+    import torch
+
+    if torch.cuda.is_available():
+        return [Finding("GPU", OK, f"{torch.cuda.get_device_name()}, PyTorch {torch.__version__}")]
+    return [Finding("GPU", NOTE, f"none for PyTorch {torch.__version__}: networks run on the CPU")]
+
+
+def report(findings: list[Finding]) -> str:
+    """Lay the findings out as a table, each with its mend on the line below.
+
+    >>> print(report([Finding("Python", OK, "3.11.7"), Finding("disk", WRONG, "0.1 GB free", "free 2 GB")]))
+    ok     Python  3.11.7
+    WRONG  disk    0.1 GB free
+                   mend: free 2 GB
+    """
+    width = max(len(finding.name) for finding in findings)
+    lines = []
+    for finding in findings:
+        lines.append(f"{finding.state:<5}  {finding.name:<{width}}  {finding.found}")
+        if finding.mend:
+            lines.append(" " * (width + 9) + f"mend: {finding.mend}")
+    return "\n".join(lines)
+
+
+def all_well(findings: list[Finding]) -> bool:
+    """Whether nothing that the kit needs is missing."""
+    return all(finding.state != WRONG for finding in findings)

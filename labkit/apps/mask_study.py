@@ -1,0 +1,200 @@
+"""What is a point of IoU worth? Masks spoilt on purpose, scored by IoU, and by whether the arm still lifts the object.
+
+`labkit study` runs it: one trial a scene and way of spoiling its mask. Lesson 07 reads the table.
+"""
+
+import csv
+import io
+import multiprocessing
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool
+from tqdm.auto import tqdm
+
+from labkit.apps import degrade
+from labkit.apps.evaluation import lift
+from labkit.frame import RGBDFrame
+from labkit.labels import OBSTACLE, TARGET
+from labkit.metrics import wilson_interval
+from labkit.pipeline import Perception, Pipeline
+from labkit.support.files import write_atomically
+
+FIRST_SEED, SCENES, SIZE = 600_000, 60, (320, 240)
+
+# How a mask is spoilt: the strengths tried, weakest first, and a function of mask, strength and generator.
+KINDS: dict[str, tuple[tuple[float, ...], Callable]] = {
+    "true": ((0,), lambda mask, strength, rng: mask),
+    "eroded": ((1, 2, 3, 5), lambda mask, pixels, rng: degrade.erode(mask, round(pixels))),
+    "dilated": ((1, 2, 4, 8), lambda mask, pixels, rng: degrade.dilate(mask, round(pixels))),
+    "shifted": ((2, 4, 8, 14), lambda mask, pixels, rng: _shifted(mask, pixels, rng.uniform(0, 2 * np.pi))),
+    "holed": ((0.2, 0.4, 0.6, 0.8), degrade.holes),
+    "part missing": (
+        (0.2, 0.4, 0.6, 0.8),
+        lambda mask, share, rng: degrade.cut(mask, share, rng.uniform(0, 2 * np.pi)),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One trial: the scene, how its mask was spoilt and how much, the mask's IoU, and what became of the lift.
+
+    strength: pixels for eroded, dilated and shifted, else the share that is missing. lifted: 1 or 0. reason: "lifted",
+    or why not.
+    """
+
+    seed: int
+    kind: str
+    strength: float
+    iou: float
+    lifted: int
+    reason: str
+
+
+def target_mask(spec, frame: RGBDFrame) -> tuple[str, Bool[np.ndarray, "H W"]]:
+    """Choose the target of a scene that shows the most pixels: its name and its true mask."""
+    numbers = [i for i, thing in enumerate(spec.objects, start=1) if thing.class_id == TARGET]
+    number = max(numbers, key=lambda number: int((frame.instances == number).sum()))
+    return spec.objects[number - 1].name, frame.instances == number
+
+
+def spoil(mask: Bool[np.ndarray, "H W"], kind: str, strength: int | float, seed: int) -> Bool[np.ndarray, "H W"]:
+    """Spoil a mask; the same scene is always spoilt in the same direction and places, so that more is really more.
+
+    Raises ValueError for an unknown kind.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    return KINDS[kind][1](mask, strength, np.random.default_rng([seed, list(KINDS).index(kind)]))
+
+
+def mask_iou(a: Bool[np.ndarray, "H W"], b: Bool[np.ndarray, "H W"]) -> float:
+    """IoU of two masks, of which one at least is not empty.
+
+    >>> mask_iou(np.array([[True, True, False]]), np.array([[False, True, True]]))
+    0.3333333333333333
+    """
+    return float((a & b).sum() / (a | b).sum())
+
+
+def see(spec, frame: RGBDFrame, mask: Bool[np.ndarray, "H W"]) -> Perception:
+    """Run the pipeline on a frame in which `mask` is all that is labelled target; other targets are obstacles."""
+    others = np.where(frame.labels == TARGET, OBSTACLE, frame.labels)
+    labels = np.where(mask, TARGET, others).astype(np.uint8)
+    return Pipeline(lambda rgb: rgb, spec.table.z).run(frame, labels=labels)
+
+
+def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None = None) -> list[Row]:
+    """Render a scene once, and try to lift its best visible target by each spoilt mask, each time in a fresh world.
+
+    kinds: pairs (kind, strength), default all. A lift is a success if it is this very target that comes up.
+    """
+    from data_gen import sample_scene
+    from labkit.sim.world import World  # PyBullet stays out of this module's import
+
+    kinds = [(kind, s) for kind, (strengths, _) in KINDS.items() for s in strengths] if kinds is None else kinds
+    spec = sample_scene(seed, "test")
+    with World(spec) as world:
+        frame = world.render(SIZE)
+    name, truth = target_mask(spec, frame)
+    rows = []
+    for kind, strength in kinds:
+        mask = spoil(truth, kind, strength, seed)
+        lifted, reason = try_lift(spec, see(spec, frame, mask), name)
+        rows.append(Row(seed, kind, float(strength), round(mask_iou(mask, truth), 4), int(lifted), reason))
+    return rows
+
+
+def try_lift(spec, perception: Perception, name: str) -> tuple[bool, str]:
+    """Let the arm try in a fresh world: whether the object of that name came up, and "lifted" or why not."""
+    from labkit.sim.world import World
+
+    if not perception.plan.grasps:
+        return False, perception.plan.reason
+    with World(spec) as world:
+        result = lift(world, perception)
+    if result.success and result.name != name:
+        return False, "lifted another target"
+    return result.success, result.reason
+
+
+def run(out, first_seed: int = FIRST_SEED, scenes: int = SCENES, workers: int = 1, progress: bool = True) -> list[Row]:
+    """Run all trials of so many scenes and write them to `out`, a CSV file with a row a trial.
+
+    What is finished is kept beside it, scene by scene, in a file OUT.unfinished: stopped with Ctrl-C, the same call
+    goes on where it was. Raises ValueError if that file is of other scenes.
+    """
+    out = Path(out)
+    unfinished = out.with_name(out.name + ".unfinished")
+    seeds = range(first_seed, first_seed + scenes)
+    done = {}
+    for row in read(unfinished) if unfinished.exists() else []:
+        done.setdefault(row.seed, []).append(row)
+    if not done.keys() <= set(seeds):
+        raise ValueError(f"out: {unfinished} is of other scenes; remove it, or ask for those")
+    missing = [seed for seed in seeds if seed not in done]
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, context) if workers > 1 else nullcontext()
+    with pool as executor, tqdm(total=scenes, initial=len(done), unit="scene", disable=not progress) as bar:
+        for rows in (executor.map if executor else map)(trials_of_scene, missing):
+            done[rows[0].seed] = rows
+            write(unfinished, [row for seed in sorted(done) for row in done[seed]])
+            bar.update()
+    rows = [row for seed in seeds for row in done[seed]]
+    write(out, rows)
+    unfinished.unlink(missing_ok=True)
+    return rows
+
+
+def write(path, rows: Sequence[Row]) -> None:
+    """Write rows as CSV, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(field.name for field in fields(Row))
+    writer.writerows(astuple(row) for row in rows)
+    write_atomically(path, text.getvalue().encode())
+
+
+def read(path) -> list[Row]:
+    """Read what `write` wrote. Raises ValueError if the columns are others."""
+    with open(path, newline="") as file:
+        lines = list(csv.reader(file))
+    kinds = {field.name: field.type for field in fields(Row)}
+    if not lines or lines[0] != list(kinds):
+        raise ValueError(f"path: expected a CSV file with columns {', '.join(kinds)} in {path}")
+    return [Row(*(kind(cell) for kind, cell in zip(kinds.values(), line, strict=True))) for line in lines[1:]]
+
+
+def lift_rate(rows: Sequence[Row]) -> tuple[float, float, float]:
+    """The share of trials that lifted, and its 95 % Wilson interval. Raises ValueError without any trial.
+
+    >>> row = Row(600000, "true", 0.0, 1.0, 1, "lifted")
+    >>> [round(x, 2) for x in lift_rate([row] * 20)]
+    [1.0, 0.84, 1.0]
+    """
+    lifts = sum(row.lifted for row in rows)
+    low, high = wilson_interval(lifts, len(rows))
+    return lifts / len(rows), low, high
+
+
+def by_iou(rows: Iterable[Row], edges: Sequence[float]) -> list[list[Row]]:
+    """Sort trials into bins of IoU: bin k holds edges[k] <= IoU < edges[k + 1], the last one its upper edge too.
+
+    >>> row = Row(600000, "true", 0.0, 1.0, 1, "lifted")
+    >>> [len(members) for members in by_iou([row], [0.0, 0.5, 1.0])]
+    [0, 1]
+    """
+    bins = [[] for _ in edges[1:]]
+    for row in rows:
+        if edges[0] <= row.iou <= edges[-1]:
+            bins[min(int(np.searchsorted(edges, row.iou, side="right")) - 1, len(bins) - 1)].append(row)
+    return bins
+
+
+def _shifted(mask: Bool[np.ndarray, "H W"], pixels: int | float, direction: float) -> Bool[np.ndarray, "H W"]:
+    return degrade.shift(mask, round(pixels * np.cos(direction)), round(pixels * np.sin(direction)))

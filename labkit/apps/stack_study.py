@@ -1,0 +1,250 @@
+"""The stacks side by side: every way to a mask on the same frames, by its IoU, its time, and the lifts that follow.
+
+`labkit compare` runs it: one trial a scene and method. Lesson 09 reads the table.
+"""
+
+import csv
+import io
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Integer, UInt8
+from tqdm.auto import tqdm
+
+from labkit.apps.evaluation import lift
+from labkit.frame import RGBDFrame
+from labkit.labels import CLASSES, SURFACE, TARGET
+from labkit.metrics import confusion_matrix, wilson_interval
+from labkit.pipeline import Pipeline, class_probabilities, most_probable
+from labkit.stacks import regions
+from labkit.stacks.engines import open_engine, segment_like_cpp
+from labkit.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
+from labkit.support.files import write_atomically
+
+FIRST_SEED, SCENES, SIZE = 600_000, 40, (320, 240)
+TRAINING_SEEDS = range(630_000, 630_024)  # what the classical methods are fitted to, and the small FCN is trained on
+STEPS = 1000  # of the small FCN's training
+K = 6  # regions of k-means
+LEAST = 30  # pixels of a region that may be a target
+
+Method = Callable[[RGBDFrame], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One trial: the scene, the method, pixels in its and the true mask and in either of them, milliseconds, the lift.
+
+    lifted: 1 if the arm lifted a target. reason: "lifted", or why not.
+    """
+
+    seed: int
+    method: str
+    target_both: int
+    target_either: int
+    surface_both: int
+    surface_either: int
+    milliseconds: float
+    lifted: int
+    reason: str
+
+
+# ---------------------------------------------------------------------------------------------- the methods
+
+
+def threshold_labels(rgb: UInt8[np.ndarray, "H W 3"], table: HSVRange) -> UInt8[np.ndarray, "H W"]:
+    """Labels by the table's colour: what has it is surface, and what stands on it is taken for a target."""
+    surface = hsv_mask(rgb, table)
+    return np.where(things_on_table(surface), TARGET, np.where(surface, SURFACE, 0)).astype(np.uint8)
+
+
+def region_labels(rgb: UInt8[np.ndarray, "H W 3"], typical: regions.Typical) -> UInt8[np.ndarray, "H W"]:
+    """Labels by k-means: the piece that fills most of the image's middle is surface; of those within its box, the one
+    that looks most like a target is the target."""
+    colours = cv2.medianBlur(regions.segment_kmeans(rgb, K), 5)  # single pixels are no regions
+    pieces = regions.components(colours)
+    m = regions.measure(pieces)
+    height, width = pieces.shape
+    middle = pieces[height // 4 : -height // 4, width // 4 : -width // 4]
+    surface = int(np.bincount(middle.ravel()).argmax())
+    box = m.box[surface - 1]
+    within = (m.box[:, :2] >= box[:2]).all(axis=1) & (m.box[:, 2:] <= box[2:]).all(axis=1)
+    within[surface - 1] = False
+    chosen = regions.choose_region(m, typical, within & ~m.at_border & (m.area >= LEAST))
+    return np.where((pieces == chosen) & (chosen > 0), TARGET, np.where(pieces == surface, SURFACE, 0)).astype(np.uint8)
+
+
+def network_labels(model, rgb: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
+    """Labels by a network or an engine, one look."""
+    return most_probable(class_probabilities(model, rgb))
+
+
+def methods(frames: Sequence[RGBDFrame], unet) -> dict[str, Method]:
+    """Make every method by its name: frame -> labels. `frames` are what the classical ones are fitted to.
+
+    Only "HSV, this table" reads the true labels of the frame that it is to label: the best that a threshold could do.
+    """
+    from labkit.stacks.small_fcn import train_small_fcn
+
+    images, labels = [frame.rgb for frame in frames], [frame.labels for frame in frames]
+    anywhere = fit_hsv(images, [y == SURFACE for y in labels])
+    typical = regions.learn_typical(target_masks(frames))
+    small, _ = train_small_fcn(images, labels, steps=STEPS)
+    opencv, onnxruntime = open_engine("opencv", unet), open_engine("onnxruntime", unet)
+
+    def this_table(frame):
+        return threshold_labels(frame.rgb, fit_hsv([frame.rgb], [frame.labels == SURFACE]))
+
+    return {
+        "U-Net, PyTorch": lambda frame: network_labels(unet, frame.rgb),
+        "U-Net, onnxruntime": lambda frame: network_labels(onnxruntime, frame.rgb),
+        "U-Net, OpenCV as in C++": lambda frame: segment_like_cpp(opencv, cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR)),
+        "three-layer FCN": lambda frame: network_labels(small, frame.rgb),
+        "HSV, other tables": lambda frame: threshold_labels(frame.rgb, anywhere),
+        "HSV, this table": this_table,
+        "k-means, one region": lambda frame: region_labels(frame.rgb, typical),
+    }
+
+
+def target_masks(frames: Sequence[RGBDFrame]) -> list[np.ndarray]:
+    """The true mask of every target that is seen whole enough, one each."""
+    masks = []
+    for frame in frames:
+        for number in np.unique(frame.instances[frame.labels == TARGET]):
+            mask = (frame.instances == number) & (frame.labels == TARGET)
+            if mask.sum() >= LEAST:
+                masks.append(mask)
+    return masks
+
+
+# ------------------------------------------------------------------------------------------------ the trials
+
+
+def trials_of_scene(seed: int, ways: dict[str, Method]) -> list[Row]:
+    """Render a scene once, label it by every method, and let the arm try by each of the masks, in a fresh world."""
+    from data_gen import sample_scene
+    from labkit.sim.world import World  # PyBullet stays out of this module's import
+
+    spec = sample_scene(seed, "test")
+    with World(spec) as world:
+        frame = world.render(SIZE)
+    rows, tried = [], {}
+    for name, way in ways.items():
+        start = time.perf_counter()
+        labels = way(frame)
+        milliseconds = round(1000.0 * (time.perf_counter() - start), 2)
+        if labels.tobytes() not in tried:  # equal labels make the same lift: the simulator is deterministic
+            perception = Pipeline(np.asarray, spec.table.z).run(frame, labels=labels)
+            with World(spec) as world:
+                tried[labels.tobytes()] = lift(world, perception)
+        result = tried[labels.tobytes()]
+        n = confusion_matrix(frame.labels, labels, len(CLASSES))
+        counts = (x for c in (TARGET, SURFACE) for x in (int(n[c, c]), int(n[c].sum() + n[:, c].sum() - n[c, c])))
+        reason = "lifted" if result.success else result.reason
+        rows.append(Row(seed, name, *counts, milliseconds, int(result.success), reason))
+    return rows
+
+
+def run(out, first_seed: int = FIRST_SEED, scenes: int = SCENES, progress: bool = True) -> list[Row]:
+    """Run every method on so many scenes and write `out`, a CSV file with a row a trial.
+
+    What is finished is kept in OUT.unfinished: stopped with Ctrl-C, the same call goes on where it was. Raises
+    ValueError if that file is of other scenes.
+    """
+    from data_gen import render, sample_scene
+    from labkit.network import load_model, weights_path
+
+    unfinished = Path(f"{out}.unfinished")
+    rows = read(unfinished) if unfinished.exists() else []
+    seeds, done = range(first_seed, first_seed + scenes), {row.seed for row in rows}
+    if not done <= set(seeds):
+        raise ValueError(f"out: {unfinished} is of other scenes; remove it, or ask for those")
+    training = [render(sample_scene(seed, "train"), SIZE) for seed in TRAINING_SEEDS]
+    ways = methods(training, load_model(weights_path("unet")))
+    for seed in tqdm([seed for seed in seeds if seed not in done], unit="scene", disable=not progress):
+        rows += trials_of_scene(seed, ways)
+        write(unfinished, rows)
+    write(out, sorted(rows, key=lambda row: row.seed))
+    unfinished.unlink(missing_ok=True)
+    return read(out)
+
+
+def write(path, rows: Sequence[Row]) -> None:
+    """Write rows as CSV, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(field.name for field in fields(Row))
+    writer.writerows(astuple(row) for row in rows)
+    write_atomically(path, text.getvalue().encode())
+
+
+def read(path) -> list[Row]:
+    """Read what `write` wrote. Raises ValueError if the columns are others."""
+    with open(path, newline="") as file:
+        lines = list(csv.reader(file))
+    kinds = {field.name: field.type for field in fields(Row)}
+    if not lines or lines[0] != list(kinds):
+        raise ValueError(f"path: expected a CSV file with columns {', '.join(kinds)} in {path}")
+    return [Row(*(kind(cell) for kind, cell in zip(kinds.values(), line, strict=True))) for line in lines[1:]]
+
+
+# ------------------------------------------------------------------------------------------------ the table
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A method over all its trials: IoU of pooled counts, median milliseconds, lifts and their 95 % interval."""
+
+    method: str
+    target_iou: float
+    surface_iou: float
+    milliseconds: float
+    lifts: int
+    trials: int
+    interval: tuple[float, float]
+
+
+def summarise(rows: Sequence[Row]) -> list[Summary]:
+    """Pool the trials of each method, in the order in which they first come.
+
+    >>> row = Row(1, "a", 10, 20, 90, 100, 5.0, 1, "lifted")
+    >>> [summary] = summarise([row] * 4)
+    >>> summary.target_iou, summary.surface_iou, summary.lifts
+    (0.5, 0.9, 4)
+    """
+    summaries = []
+    for name in dict.fromkeys(row.method for row in rows):
+        own = [row for row in rows if row.method == name]
+        counts = _columns(own)
+        lifts = sum(row.lifted for row in own)
+        summaries.append(
+            Summary(
+                method=name,
+                target_iou=float(counts[:, 0].sum() / counts[:, 1].sum()),
+                surface_iou=float(counts[:, 2].sum() / counts[:, 3].sum()),
+                milliseconds=float(np.median([row.milliseconds for row in own])),
+                lifts=lifts,
+                trials=len(own),
+                interval=wilson_interval(lifts, len(own)),
+            )
+        )
+    return summaries
+
+
+def _columns(rows: Sequence[Row]) -> Integer[np.ndarray, "n 4"]:
+    return np.array([(row.target_both, row.target_either, row.surface_both, row.surface_either) for row in rows])
+
+
+def table(rows: Sequence[Row]) -> str:
+    """The comparison as text: a line a method."""
+    lines = [f"{'method':<25}{'target IoU':>11}{'table IoU':>11}{'ms':>8}{'lifted':>9}   95 % interval"]
+    for s in summarise(rows):
+        low, high = s.interval
+        lines.append(
+            f"{s.method:<25}{s.target_iou:>11.3f}{s.surface_iou:>11.3f}{s.milliseconds:>8.1f}"
+            f"{f'{s.lifts}/{s.trials}':>9}   {low:.0%} to {high:.0%}"
+        )
+    return "\n".join(lines)

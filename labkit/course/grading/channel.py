@@ -1,0 +1,181 @@
+"""The grader's end of a worker's pipes: requests out, replies in until a deadline; nothing that comes is believed.
+
+A reply is a number of bytes with a limit, a letter, and then numbers or a short word of known ones: never a pickle,
+never text of the student's own, so that nothing of the secret inputs finds its way into the feedback either.
+"""
+
+import builtins
+import contextlib
+import math
+import pickle
+import re
+import struct
+import subprocess
+import threading
+
+import numpy as np
+
+from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_PARTS, ONE
+from labkit.course.questions.judge import Problem
+
+KINDS = {"c": "complex numbers", "O": "objects", "U": "text", "S": "bytes", "M": "dates", "m": "spans of time"}
+
+
+class WorkerLost(Exception):
+    """The worker is gone, by its own doing or because it had to be stopped; `problem` says why."""
+
+    def __init__(self, problem: Problem):
+        super().__init__(problem.says)
+        self.problem = problem
+
+
+class Worker:
+    """One worker: `ask` it, and `close` it; it is a context manager, too."""
+
+    def __init__(self, process: subprocess.Popen):
+        self.process = process
+        self.late = False
+
+    def __enter__(self) -> "Worker":
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self.close()
+
+    def ask(self, request: tuple, limit_s: float) -> object:
+        """Send a request and return what the reply holds; raises WorkerLost, and kills the worker, if none came."""
+        data = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL)
+        return self.exchange(struct.pack("<I", len(data)) + data, limit_s)
+
+    def greet(self, limit_s: float) -> None:
+        """Wait until the worker has loaded its packages; no student's code has run by then."""
+        self.exchange(b"", limit_s)
+
+    def exchange(self, data: bytes, limit_s: float) -> object:
+        """Write, then read one reply. The deadline holds for both: a pipe that nobody reads gets full."""
+        alarm = threading.Timer(limit_s, self.stop_late)
+        alarm.start()
+        try:
+            self.process.stdin.write(data)
+            self.process.stdin.flush()
+            return decode(self.read())
+        except (OSError, EOFError, ValueError) as error:
+            self.close()
+            if self.late:
+                raise WorkerLost(Problem("time", "it did not return in time: does a loop never end?")) from None
+            if isinstance(error, ValueError):
+                raise WorkerLost(
+                    Problem("channel", "it wrote to the grader's channel, or returned far too much")
+                ) from None
+            raise WorkerLost(Problem("ended", "it ended or crashed the process that it ran in")) from None
+        finally:
+            alarm.cancel()
+
+    def stop_late(self) -> None:
+        """Kill the worker because its time is up, which ends the reading and writing of `exchange`."""
+        self.late = True
+        self.process.kill()
+
+    def read(self) -> bytes:
+        """Read one reply, of a length that is reasonable."""
+        (length,) = struct.unpack("<I", self.read_exactly(4))
+        if length > MOST_BYTES:
+            raise ValueError("length: a reply that is too long")
+        return self.read_exactly(length)
+
+    def read_exactly(self, count: int) -> bytes:
+        """Read that many bytes; raises EOFError if the worker is gone before."""
+        data = self.process.stdout.read(count)
+        if len(data) < count:
+            raise EOFError
+        return data
+
+    def close(self) -> None:
+        """Kill the worker and everything that it started, and wait until it is gone."""
+        self.process.kill()
+        for stream in (self.process.stdin, self.process.stdout):
+            with contextlib.suppress(OSError):
+                stream.close()
+        self.process.wait()
+
+
+def decode(reply: bytes) -> object:
+    """Read a reply: an array or number, a tuple of these, None for a cell that ran, or the Problem that it tells.
+
+    Raises ValueError for anything that `worker.encode` does not write.
+
+    >>> decode(b"V\\xff\\x03\\x01" + struct.pack("<q2i", 2, 5, -1))
+    array([ 5, -1], dtype=int32)
+    """
+    letter, rest = reply[:1], reply[1:]
+    if letter == b"V":
+        return decode_values(rest)
+    if letter == b"E" and len(rest) >= 4:
+        (line,) = struct.unpack("<I", rest[:4])
+        return Problem("exception", f"it raises {exception_name(rest[4:])}", ((line, ""),))
+    if letter in (b"K", b"M", b"D"):
+        return worded(letter, rest.decode("ascii", "replace"))
+    fixed = {
+        b"O": None,
+        b"U": Problem("unanswered", "not answered yet"),
+        b"A": Problem("missing", "its cell defines no function of this name"),
+        b"L": Problem("kind", f"it returns a tuple or list of more than {MOST_PARTS}"),
+        b"B": Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"),
+    }
+    if letter not in fixed or rest:
+        raise ValueError("reply: expected one that a worker writes")
+    return fixed[letter]
+
+
+def worded(letter: bytes, word: str) -> Problem:
+    """Say what was returned, or which module is missing; a word of the student's own making is not repeated."""
+    if letter == b"D":
+        return Problem("dtype", f"expected real numbers, got {KINDS.get(word, 'records')}")
+    if letter == b"M":
+        named = word if re.fullmatch(r"[A-Za-z_][\w.]{0,59}", word, re.ASCII) else "that"
+        return Problem("module", f"there is no module {named} where answers are graded")
+    if word == "NoneType":
+        return Problem("kind", "it returns None: is a `return` missing?")
+    named = word if isinstance(getattr(builtins, word, None), type) else "something else"
+    return Problem("kind", f"expected an array or a number, got {named}")
+
+
+def exception_name(name: bytes) -> str:
+    """The name of one of Python's own exceptions; any other is "an exception"."""
+    word = name.decode("ascii", "replace")
+    known = getattr(builtins, word, None)
+    return word if isinstance(known, type) and issubclass(known, BaseException) else "an exception"
+
+
+def decode_values(data: bytes) -> object:
+    """Read arrays: first what they claim to be, then, if the bytes are as many as these make, the bytes."""
+    count, at = data[0] if data else 0, 1
+    claims = []
+    for _ in range(1 if count == ONE else count):
+        code, ndim = struct.unpack_from("<BB", claimable(data, at, 2), 0)
+        if code >= len(DTYPES) or ndim > MOST_AXES:
+            raise ValueError("reply: no such dtype, or too many axes")
+        shape = struct.unpack(f"<{ndim}q", claimable(data, at + 2, 8 * ndim))
+        if any(n < 0 for n in shape):
+            raise ValueError("reply: a negative length")
+        claims.append((np.dtype(DTYPES[code]).newbyteorder("<"), shape))
+        at += 2 + 8 * ndim
+    if not data or (count != ONE and count > MOST_PARTS):
+        raise ValueError("reply: no values, or too many")
+    if len(data) - at != sum(dtype.itemsize * math.prod(shape) for dtype, shape in claims):
+        raise ValueError("reply: not as many bytes as it claims")
+    values = []
+    for dtype, shape in claims:
+        size = math.prod(shape)
+        array = np.frombuffer(data, dtype, size, at).reshape(shape)
+        values.append((array.view(np.uint8) != 0 if dtype.kind == "b" else array)[()])  # no truth value but 0 and 1
+        at += size * dtype.itemsize
+    return values[0] if count == ONE else tuple(values)
+
+
+def claimable(data: bytes, at: int, length: int) -> bytes:
+    """Cut out a piece of a reply; raises ValueError if it ends before."""
+    piece = data[at : at + length]
+    if len(piece) < length:
+        raise ValueError("reply: it ends too early")
+    return piece

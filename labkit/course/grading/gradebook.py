@@ -1,0 +1,150 @@
+"""nbgrader's gradebook, and the copies of submissions that formgrader shows.
+
+nbgrader's own autograder would run a submission's tests in the submission's kernel; here it only gets the scores. In
+the copies, autograded/STUDENT/TOPIC, everything is the released lab's but the answers, and nothing was executed.
+"""
+
+import copy
+import datetime
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from labkit.course.grading.batch import Record
+from labkit.course.grading.outputs import lines_of
+from labkit.course.grading.reading import Lab, Submission, Unreadable, grade_id, source_of
+from labkit.course.grading.sandbox import NO_SANDBOX
+from labkit.support.files import write_atomically
+
+
+def write_gradebook(
+    course: Path,
+    lab: Lab,
+    graded: Iterable[tuple[Record, Submission, Path | Unreadable]],
+    done: Callable[[Record], None] = lambda record: None,
+) -> None:
+    """Write scores and comments into course/gradebook.db, and the copies; `done` hears of each record that is in.
+
+    Manual scores stay, and are marked for another look where the answer was graded again. Raises ValueError if the
+    gradebook has a lab of that name with other questions.
+    """
+    course = Path(course)
+    register(course, lab)
+    with opened(course) as gradebook:
+        for record, submission, place in graded:
+            if record.reason:
+                write_nothing(gradebook, lab, record)
+            else:
+                write_scores(gradebook, lab, record, submission, place)
+                target = course / "autograded" / record.student / lab.topic / f"{lab.topic}.ipynb"
+                write_atomically(target, copy_for_formgrader(lab, record, submission))
+            done(record)
+
+
+@contextmanager
+def opened(course: Path) -> Iterator:
+    """Open course/gradebook.db, or make it, for which nbgrader runs `alembic` from the environment's folder."""
+    from nbgrader.api import Gradebook
+
+    path = os.environ.get("PATH", os.defpath)
+    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # SQLAlchemy's, about nbgrader's way with sessions
+            with Gradebook(url_of(course)) as gradebook:
+                yield gradebook
+    finally:
+        os.environ["PATH"] = path
+
+
+def url_of(course: Path) -> str:
+    """Where nbgrader keeps its gradebook by default."""
+    return f"sqlite:///{course.resolve() / 'gradebook.db'}"
+
+
+def register(course: Path, lab: Lab) -> None:
+    """Tell the gradebook of the released lab, as `nbgrader generate_assignment` does."""
+    import nbformat
+    from nbgrader.api import MissingEntry
+    from nbgrader.preprocessors import SaveCells
+
+    with opened(course) as gradebook:
+        try:
+            gradebook.find_assignment(lab.topic)
+        except MissingEntry:
+            gradebook.add_assignment(lab.topic)
+    names = {"notebook": lab.topic, "assignment": lab.topic, "db_url": url_of(course)}
+    try:
+        SaveCells().preprocess(nbformat.from_dict(lab.notebook), {"nbgrader": names})
+    except RuntimeError as error:
+        raise ValueError(f"{lab.topic}: the gradebook has it with other cells: {error}") from error
+
+
+def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, place: Path | Unreadable) -> None:
+    """Write one submission's scores, what is said about each answer, and what a person has to grade."""
+    where = (lab.topic, lab.topic, record.student)
+    gradebook.update_or_create_student(record.student)
+    gradebook.update_or_create_submission(lab.topic, record.student, timestamp=timestamp_of(place))
+    for result in record.results:
+        grade = gradebook.find_grade(f"check_{result.question}", *where)
+        grade.auto_score = result.points
+        grade.needs_manual_grade = grade.manual_score is not None or bool(result.flag)
+        warning = [] if record.sandboxed else [f"Warning: {NO_SANDBOX}."]
+        gradebook.find_comment(result.question, *where).auto_comment = " ".join([*lines_of(result), *warning])
+    released = {grade_id(cell): source_of(cell) for cell in lab.notebook["cells"]}
+    for name in lab.written:
+        answered = submission.cells.get(name, released[name]) != released[name]
+        grade = gradebook.find_grade(name, *where)
+        grade.auto_score = None if answered else 0.0
+        grade.needs_manual_grade = answered or grade.manual_score is not None
+        gradebook.find_comment(name, *where).auto_comment = None if answered else "No response."
+    gradebook.db.commit()
+
+
+def write_nothing(gradebook, lab: Lab, record: Record) -> None:
+    """Take back the scores of a submission that was graded once and cannot be read any more."""
+    from nbgrader.api import MissingEntry
+
+    try:
+        notebook = gradebook.find_submission_notebook(lab.topic, lab.topic, record.student)
+    except MissingEntry:
+        return
+    for grade in notebook.grades:
+        grade.auto_score, grade.needs_manual_grade = 0.0, True
+    gradebook.db.commit()
+
+
+def timestamp_of(place: Path | Unreadable) -> datetime.datetime | None:
+    """When it was handed in, if nbgrader's timestamp.txt beside the notebook says so."""
+    from nbgrader.utils import parse_utc
+
+    if isinstance(place, Unreadable):
+        return None
+    try:
+        with open(os.open(place.with_name("timestamp.txt"), os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
+            return parse_utc(file.read(100).decode().strip())
+    except (OSError, ValueError, OverflowError):
+        return None
+
+
+def copy_for_formgrader(lab: Lab, record: Record, submission: Submission) -> bytes:
+    """The released lab with a student's answers, and the verdict as the output of each tests cell."""
+    notebook = copy.deepcopy(lab.notebook)
+    results = {f"check_{result.question}": result for result in record.results}
+    for cell in notebook["cells"]:
+        name = grade_id(cell)
+        if name in submission.cells:
+            cell["source"] = submission.cells[name]
+        if cell["cell_type"] == "code":
+            cell["outputs"], cell["execution_count"] = [], None
+        if name in results:
+            result = results[name]
+            text = "\n".join([f"{result.points:g} of {result.max_points:g} points", *lines_of(result)])
+            if not record.sandboxed:
+                text += f"\nWarning: {NO_SANDBOX}."
+            cell["outputs"] = [{"output_type": "stream", "name": "stdout", "text": text + "\n"}]
+    return (json.dumps(notebook, indent=1) + "\n").encode()

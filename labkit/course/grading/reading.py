@@ -1,0 +1,242 @@
+"""Reading a released lab, which is the instructor's, and submissions of it, which are anybody's.
+
+A submission is bytes of a stranger: its place is looked at before it is opened, its size before it is read, and all
+that is taken from it is the source of the cells that carry one of the lab's grade ids. Its tests, its points, its
+outputs and the order of its cells are not looked at, and its code is not even parsed here.
+"""
+
+import ast
+import hashlib
+import json
+import os
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from labkit.course.questions.question import Question, of_topic
+
+MOST_BYTES = 20 << 20
+MOST_SOURCE = 200_000  # characters of one cell
+LONGEST_NAME = 100
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A released lab. answers: source of each blank by its grade id; points: what each is worth, by the same.
+
+    setup: source of the cell that the answers build on. written: grade ids of the answers that a person grades.
+    notebook: all of it, as JSON has it; digest: of the file.
+    """
+
+    topic: str
+    setup: str
+    answers: dict[str, str]
+    points: dict[str, float]
+    written: tuple[str, ...]
+    notebook: dict
+    digest: str
+
+
+@dataclass(frozen=True)
+class Submission:
+    """What a student handed in. cells: source by grade id, of the answers and of the written ones.
+
+    problems: by grade id, why there is no source. reason: why none of it can be graded; "" if it can.
+    """
+
+    student: str
+    cells: dict[str, str]
+    problems: dict[str, str]
+    reason: str
+    digest: str
+
+
+class Unreadable(Exception):
+    """A submission that cannot be read; the text says why, for the instructor's table."""
+
+
+def read_lab(course: Path, topic: str) -> tuple[Lab, dict[str, Question]]:
+    """Read course/labs/TOPIC/TOPIC.ipynb and the questions that belong to it, in the lab's order.
+
+    Raises ValueError if it is not a released lab of that topic.
+    """
+    questions = of_topic(topic)
+    path = Path(course) / "labs" / topic / f"{topic}.ipynb"
+    if not path.is_file():
+        raise ValueError(f"topic: expected a released lab at {path}; `labkit release {topic}` makes it")
+    data = path.read_bytes()
+    notebook = json.loads(data)
+    for cell in notebook["cells"]:
+        cell["source"] = source_of(cell)
+    cells = {grade_id(cell): cell for cell in notebook["cells"] if grade_id(cell)}
+    marks = {name: cell["metadata"]["nbgrader"] for name, cell in cells.items()}
+    answers = {name: source_of(cells[name]) for name in marks if name in questions and marks[name].get("solution")}
+    lacking = [name for name in questions if name not in answers or f"check_{name}" not in cells]
+    if lacking or "setup" not in cells:
+        raise ValueError(f"{path}: expected a cell `setup` and an answer and tests of each question, lacks {lacking}")
+    points = {name: float(marks[f"check_{name}"]["points"]) for name in answers}
+    written = tuple(name for name, mark in marks.items() if mark.get("grade") and mark.get("solution"))
+    lab = Lab(topic, source_of(cells["setup"]), answers, points, written, notebook, hashlib.sha256(data).hexdigest())
+    return lab, {name: questions[name] for name in answers}
+
+
+def imported_roots(source: str) -> tuple[str, ...]:
+    """The packages beside the standard library that the instructor's own code imports; NumPy always.
+
+    >>> imported_roots("import torch.nn as nn")
+    ('numpy', 'torch')
+    """
+    import sys
+
+    nodes = list(ast.walk(ast.parse(source)))
+    names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    roots = {name.partition(".")[0] for name in names} - sys.stdlib_module_names
+    return tuple(sorted({"numpy", *roots}))
+
+
+# -------------------------------------------------------------------------------------------------- submissions
+
+
+def find_submissions(folder: Path, topic: str) -> Iterator[tuple[str, Path | Unreadable]]:
+    """Go through a folder of students' folders by their names, and give the notebook of each, or why there is none.
+
+    What begins with a dot is passed over, and so is a student who handed in nothing of this topic. Raises ValueError
+    if there is no such folder.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ValueError(f"submissions: expected a folder of students' folders, got {folder}")
+    for entry in sorted(os.scandir(folder), key=lambda entry: os.fsencode(entry.name)):
+        if entry.name.startswith("."):
+            continue
+        student = shown_name(entry.name)
+        try:
+            notebook = find_notebook(Path(entry.path), topic)
+        except Unreadable as reason:
+            yield student, reason
+        else:
+            if notebook is not None:
+                yield student, notebook
+
+
+def find_notebook(place: Path, topic: str) -> Path | None:
+    """The notebook in a student's folder, None if there is no folder of this topic; follows no link."""
+    if not is_folder(place, "the student's folder"):
+        raise Unreadable(f"not in a student's folder; expected STUDENT/{topic}/{topic}.ipynb")
+    name = os.fsencode(place.name)
+    if shown_name(place.name) != place.name or len(name) > LONGEST_NAME or not place.name.isprintable():
+        raise Unreadable("the student's folder has a name that is too long, not UTF-8 or not printable")
+    if not is_folder(place / topic, f"the folder {topic}"):
+        return None
+    notebook = place / topic / f"{topic}.ipynb"
+    mode = mode_of(notebook)
+    if mode is None:
+        raise Unreadable(f"the folder {topic} holds no {topic}.ipynb")
+    if not stat.S_ISREG(mode):
+        raise Unreadable(f"{topic}.ipynb is a symbolic link" if stat.S_ISLNK(mode) else f"{topic}.ipynb is no file")
+    return notebook
+
+
+def is_folder(path: Path, what: str) -> bool:
+    """Whether there is a folder; a link in its place is Unreadable."""
+    mode = mode_of(path)
+    if mode is not None and stat.S_ISLNK(mode):
+        raise Unreadable(f"{what} is a symbolic link")
+    return mode is not None and stat.S_ISDIR(mode)
+
+
+def mode_of(path: Path) -> int | None:
+    """Kind of what is at a path, a link itself; None if there is nothing."""
+    try:
+        return os.lstat(path).st_mode
+    except FileNotFoundError:
+        return None
+
+
+def shown_name(name: str) -> str:
+    """A file's name as text that can be written anywhere: bytes that are no UTF-8 as escapes."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def read_submission(student: str, found: Path | Unreadable, lab: Lab) -> Submission:
+    """Read what was found of a student; never raises for what it holds."""
+    digest = "unreadable"
+    try:
+        if isinstance(found, Unreadable):
+            raise found
+        data = read_bytes(found)
+        digest = hashlib.sha256(data).hexdigest()
+        cells, problems = pick_cells(parse(data), lab)
+    except Unreadable as reason:
+        return Submission(student, {}, {}, str(reason), digest)
+    return Submission(student, cells, problems, "", digest)
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a file that is no link and no longer than it may be."""
+    try:
+        with open(
+            os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)), "rb"
+        ) as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise Unreadable(f"it cannot be opened: {error.strerror}") from error
+    if len(data) > MOST_BYTES:
+        raise Unreadable(f"it is larger than {MOST_BYTES >> 20} MB")
+    return data
+
+
+def parse(data: bytes) -> list:
+    """The cells of a notebook of format 4."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Unreadable("it is not UTF-8 text") from None
+    try:
+        notebook = json.loads(text)
+    except (ValueError, RecursionError):
+        raise Unreadable("it is not JSON, so not a notebook") from None
+    if not isinstance(notebook, dict) or not isinstance(notebook.get("cells"), list):
+        raise Unreadable("it is not a notebook of format 4: there is no list of cells")
+    return notebook["cells"]
+
+
+def pick_cells(cells: list, lab: Lab) -> tuple[dict[str, str], dict[str, str]]:
+    """The sources of the cells that the lab asks for, and what is wrong with the others, both by grade id."""
+    wanted = (*lab.answers, *lab.written)
+    found = {name: [cell for cell in cells if grade_id(cell) == name] for name in wanted}
+    if not any(found.values()):
+        raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
+    sources, problems = {}, {}
+    for name, same in found.items():
+        texts = {source_of(cell) for cell in same}
+        if not same:
+            problems[name] = "its cell is missing"
+        elif len(texts) > 1:
+            problems[name] = f"{len(same)} different cells have its grade id"
+        elif (text := texts.pop()) is None or (name in lab.answers and same[0].get("cell_type") != "code"):
+            problems[name] = "its cell is not a code cell with source"
+        elif len(text) > MOST_SOURCE:
+            problems[name] = f"its cell is longer than {MOST_SOURCE} characters"
+        else:
+            sources[name] = text
+    return sources, problems
+
+
+def grade_id(cell: object) -> str | None:
+    """The grade id of a cell, None if it has none or is none."""
+    try:
+        name = cell["metadata"]["nbgrader"]["grade_id"]
+    except (TypeError, KeyError):
+        return None
+    return name if isinstance(name, str) else None
+
+
+def source_of(cell: dict) -> str | None:
+    """The source of a cell, which may be text or a list of lines; None if it is neither."""
+    source = cell.get("source")
+    if isinstance(source, list) and all(isinstance(line, str) for line in source):
+        source = "".join(source)
+    return source.encode("utf-8", "replace").decode() if isinstance(source, str) else None

@@ -1,0 +1,221 @@
+"""What a worker sees and may use: bubblewrap around it, limits inside, and nothing but Python and a few packages.
+
+In the sandbox there are the interpreter, the standard library, the packages that answers may use, the worker's own
+file and an empty /tmp of limited size: no course, no labkit, no home, no /proc, no network, and no other process.
+Where the caller is root, the worker becomes another user; elsewhere it has a user namespace of its own.
+"""
+
+import functools
+import itertools
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from labkit.course.grading import seccomp, worker
+from labkit.course.grading.channel import Worker, WorkerLost
+from labkit.support.packages import requirements
+
+PACKAGES = "/packages"
+LOADERS = ("/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1")
+FIRST_UID, UIDS = 61184, 4000  # of systemd's range for short-lived users: never a person's
+ENVIRONMENT = {
+    "HOME": "/tmp",
+    "LANG": "C.UTF-8",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "PYTHONHASHSEED": "0",
+    "TMPDIR": "/tmp",
+}
+NO_SANDBOX = "graded WITHOUT a sandbox: a submission could read and change anything here, grades and this file included"
+counter = itertools.count(os.getpid())
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one worker may use. Seconds are of the clock; MB of memory are address space, with torch or without it."""
+
+    start_s: float = 120.0
+    case_s: float = 10.0
+    submission_s: float = 60.0
+    memory_mb: int = 1024
+    torch_memory_mb: int = 3072
+    file_mb: int = 16
+    tmp_mb: int = 64
+    threads: int = 32
+
+
+def start(packages: Sequence[str], limits: Limits, unsafe: bool = False) -> Worker:
+    """Start a worker that has loaded some packages, and has no others. unsafe: as a plain process.
+
+    Raises ValueError if no sandbox can be made here.
+    """
+    options = {
+        "uid": None if unsafe or os.getuid() else FIRST_UID + next(counter) % UIDS,
+        "path": site_folders() if unsafe else [PACKAGES],
+        "load": list(packages),
+        "only": list(allowed_roots(packages)) if unsafe else None,
+        "memory": (limits.torch_memory_mb if "torch" in packages else limits.memory_mb) << 20,
+        "file_size": limits.file_mb << 20,
+        "threads": None if unsafe else limits.threads,
+        "cpu_s": int(limits.submission_s) + 5,
+    }
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    if unsafe:
+        command = [sys.executable, "-I", "-B", worker.__file__, json.dumps(options)]
+        process = subprocess.Popen(command, **pipes, cwd=tempfile.gettempdir(), env=dict(ENVIRONMENT))
+    else:
+        reading, writing = os.pipe()
+        try:
+            os.write(writing, seccomp.program())
+            os.close(writing)
+            command = [*bubblewrap(tuple(packages), limits.tmp_mb << 20, reading), json.dumps(options)]
+            process = subprocess.Popen(command, **pipes, pass_fds=(reading,))
+        finally:
+            os.close(reading)
+    started = Worker(process)
+    try:
+        started.greet(limits.start_s)
+    except WorkerLost as lost:
+        raise ValueError(f"sandbox: a worker with {', '.join(packages)} does not start: {lost.problem.says}") from None
+    return started
+
+
+def probe(packages: Sequence[str], limits: Limits) -> None:
+    """Start a worker to see whether the sandbox works here; raises ValueError that says what is missing."""
+    if shutil.which("bwrap") is None:
+        raise ValueError(
+            "sandbox: bubblewrap (`bwrap`) is not installed; on Debian and Ubuntu it is the package `bubblewrap`, on "
+            "macOS and Windows there is none. --unsafe-no-sandbox grades without it: submissions may then do anything"
+        )
+    reading, writing = os.pipe()
+    os.write(writing, seccomp.program())
+    os.close(writing)
+    try:
+        command = [*bubblewrap(tuple(packages), limits.tmp_mb << 20, reading)[:-1], "-c", ""]
+        done = subprocess.run(command, pass_fds=(reading,), capture_output=True, text=True, timeout=limits.start_s)
+    finally:
+        os.close(reading)
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
+        raise ValueError(f"sandbox: bubblewrap 0.7 or later is needed, and a kernel that lets it: {said}")
+    start(packages, limits).close()
+
+
+def bubblewrap(packages: tuple[str, ...], tmp_bytes: int, filter_fd: int) -> list[str]:
+    """The command line up to the worker's file; its options follow."""
+    python, shown = shown_files(packages)
+    command = ["bwrap", "--unshare-pid", "--unshare-net", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try"]
+    # Root keeps what it needs to become another user; anybody else gets a namespace with nobody but themselves.
+    command += ["--cap-drop", "ALL"]
+    command += ["--unshare-user"] if os.getuid() else ["--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID"]
+    command += [
+        "--die-with-parent",
+        "--new-session",
+        "--clearenv",
+        "--hostname",
+        "sandbox",
+        "--seccomp",
+        str(filter_fd),
+    ]
+    for name, value in ENVIRONMENT.items():
+        command += ["--setenv", name, value]
+    made = set()
+    for place, source in shown:
+        for folder in reversed(Path(place).parents[:-1]):
+            if folder not in made:
+                command += ["--perms", "0755", "--dir", str(folder)]
+                made.add(folder)
+        if source is None:
+            command += ["--size", "4096", "--tmpfs", place, "--remount-ro", place]
+        else:
+            command += ["--dev-bind" if place.startswith("/dev/") else "--ro-bind", source, place]
+    command += ["--perms", "1777", "--size", str(tmp_bytes), "--tmpfs", "/tmp", "--chdir", "/tmp", "--remount-ro", "/"]
+    return [*command, python, "-I", "-S", "-B", "/worker.py"]
+
+
+# ------------------------------------------------------------------------------------ what there is to be seen
+
+# Run by the interpreter that the sandbox will have: where it is, and the shared libraries that it and packages load.
+LOOK = """
+import importlib, json, os, sys
+sys.path += json.loads(sys.argv[1])
+libraries = os.path.join(os.path.dirname(os.__file__), "lib-dynload")
+for name in [*sorted(n.partition(".")[0] for n in os.listdir(libraries) if "tkinter" not in n), *sys.argv[2:]]:
+    try:
+        importlib.import_module(name)
+    except ImportError:
+        pass
+mapped = {line.split(maxsplit=5)[5].strip() for line in open("/proc/self/maps") if ".so" in line}
+print(json.dumps([os.path.realpath(sys.executable), os.path.dirname(os.__file__), sorted(mapped)]))
+"""
+
+
+@functools.lru_cache
+def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | None]]]:
+    """The interpreter, and what the sandbox shows: (place, source on this machine); None as source is an empty folder.
+
+    Shared libraries are shown one by one, not their folders, in which a system keeps Python packages as well.
+    """
+    run = [os.path.realpath(sys.executable), "-I", "-S", "-B", "-c", LOOK, json.dumps(site_folders()), *packages]
+    done = subprocess.run(run, capture_output=True, text=True, check=True, env=dict(ENVIRONMENT))
+    python, library, mapped = json.loads(done.stdout)
+    tops = package_files(packages)
+    covered = (library + os.sep, *(f"{path}{os.sep}" for path in tops.values()), *map(str, tops.values()))
+    shown = [(python, python), (library, library)]
+    shown += [(f"{library}/site-packages", None)] if os.path.isdir(f"{library}/site-packages") else []
+    for path in mapped:
+        if os.path.isfile(path) and not path.startswith(covered) and path != python:
+            shown += [(name, path) for name in names_of(path)]
+    shown += [(loader, os.path.realpath(loader)) for loader in LOADERS if os.path.exists(loader)]
+    shown += [(f"{PACKAGES}/{name}", str(path)) for name, path in sorted(tops.items())]
+    shown += [(f"/dev/{name}", f"/dev/{name}") for name in ("null", "urandom", "zero")]
+    return python, [*dict.fromkeys(shown), ("/worker.py", os.path.abspath(worker.__file__))]
+
+
+def names_of(library: str) -> list[str]:
+    """A file and the links beside it that lead to it, by which it is looked for: libz.so.1 -> libz.so.1.2.13."""
+    folder = os.path.dirname(library)
+    stem = os.path.basename(library).partition(".so")[0]
+    beside = [entry.path for entry in os.scandir(folder) if entry.name.startswith(stem) and entry.is_symlink()]
+    return [library, *sorted(path for path in beside if os.path.realpath(path) == os.path.realpath(library))]
+
+
+def site_folders() -> list[str]:
+    """Where this interpreter keeps installed packages."""
+    return list(
+        dict.fromkeys(str(Path(str(metadata.distribution(name).locate_file("")))) for name in ("numpy", "torch"))
+    )
+
+
+@functools.lru_cache
+def package_files(packages: tuple[str, ...]) -> dict[str, Path]:
+    """Files and folders of packages, named by what is imported, and of everything that they require."""
+    distributions = metadata.packages_distributions()
+    found = {}
+    for package in packages:
+        if package not in distributions:
+            raise ValueError(f"packages: expected an installed package, got {package}")
+        for name in distributions[package]:
+            for required in (name, *requirements(name)):
+                found |= top_levels(required)
+    return found
+
+
+def top_levels(distribution: str) -> dict[str, Path]:
+    """What a distribution puts into the folder of packages, without its metadata and what lies outside."""
+    files = metadata.distribution(distribution).files or []
+    tops = {file.parts[0] for file in files} - {"..", "__pycache__"}
+    locate = metadata.distribution(distribution).locate_file
+    return {top: Path(str(locate(top))) for top in tops if not top.endswith((".dist-info", ".pth"))}
+
+
+def allowed_roots(packages: Iterable[str]) -> set[str]:
+    """Names that can be imported beside the standard library's."""
+    return {name.partition(".")[0] for name in package_files(tuple(packages))}

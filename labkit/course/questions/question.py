@@ -1,0 +1,95 @@
+"""What a question is, and where the questions of the nine topics are found."""
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+TOPICS = (
+    "01_labels",
+    "02_crf",
+    "03_gradient",
+    "04_iou",
+    "05_class_weights",
+    "06_back_projection",
+    "07_grasp",
+    "08_node",
+    "09_other_stacks",
+)
+
+
+@dataclass(frozen=True)
+class Misconception:
+    """A wrong answer that students really give: a name, how it behaves, and the hint that it earns."""
+
+    name: str
+    answer: Callable
+    hint: str
+
+
+@dataclass(frozen=True)
+class Property:
+    """Something that every right answer fulfils: in words, and as a function (arguments, output) -> bool."""
+
+    says: str
+    holds: Callable[[tuple, object], bool]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Question:
+    """One blank of a lab: a function of arrays to an array, a number, or a tuple of these.
+
+    name: "04_iou.iou", the topic and the function's name, which is the grade id of its cell. reference: the right
+    answer, short and complete in itself. inputs: function of a numpy Generator to the arguments of one random case,
+    asymmetric so that swaps show. by_hand: arguments of cases small enough to do by hand; each is always tried.
+    random_cases: how many cases are drawn. rtol, atol: what counts as equal. points: what the blank is worth.
+    properties: what the check may say about a wrong output before it compares. misconceptions: at least five.
+    alternatives: at least three correct answers written differently. canonical: maps an output to the one form of
+    those that are equally right (the sign of an axis, say). forbidden: modules that would do the work; they do not
+    exist where answers are graded.
+    """
+
+    name: str
+    reference: Callable
+    inputs: Callable[[np.random.Generator], tuple]
+    by_hand: tuple[tuple, ...] = ()
+    random_cases: int = 4
+    rtol: float = 1e-4
+    atol: float = 1e-6
+    points: int = 2
+    properties: tuple[Property, ...] = ()
+    misconceptions: tuple[Misconception, ...] = ()
+    alternatives: tuple[Callable, ...] = ()
+    canonical: Callable = lambda output: output
+    forbidden: tuple[str, ...] = ()
+
+    @property
+    def topic(self) -> str:
+        """The topic that it belongs to, "04_iou"."""
+        return self.name.partition(".")[0]
+
+    @property
+    def function(self) -> str:
+        """The name of the function that answers it, and the grade id of its cell."""
+        return self.name.partition(".")[2]
+
+
+def of_topic(topic: str) -> dict[str, Question]:
+    """Give the questions of a topic by their functions' names, in the lab's order.
+
+    Raises ValueError for a topic that there is not.
+    """
+    if topic not in TOPICS:
+        raise ValueError(f"topic: expected one of {', '.join(TOPICS)}, got {topic!r}")
+    module = importlib.import_module(f"labkit.course.questions.t{topic}")
+    return {question.function: question for question in module.QUESTIONS}
+
+
+def find(name: str) -> Question:
+    """Find a question by its name, such as "04_iou.iou"; raises ValueError, and lists the names that there are."""
+    topic, _, function = name.partition(".")
+    questions = of_topic(topic)
+    if function not in questions:
+        raise ValueError(f"name: expected one of {', '.join(q.name for q in questions.values())}, got {name!r}")
+    return questions[function]

@@ -1,0 +1,53 @@
+"""What the MATLAB listing does, step by step: labels with scores, a montage, the cloud of a mask (section 9)."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Bool, Float, Real, UInt8
+
+from labkit.geometry import back_project, transform_points
+from labkit.support.validation import check_K, check_rgb, check_same_size, check_shape, check_T
+
+
+def semanticseg(
+    rgb: UInt8[np.ndarray, "H W 3"], net: Callable[[np.ndarray], np.ndarray]
+) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
+    """Label an image and say how sure the network is: the best class of each pixel, and its probability.
+
+    net: an engine of labkit.stacks.engines, or any function from an RGB image to class probabilities (H, W, C).
+
+    >>> labels, scores = semanticseg(np.zeros((1, 1, 3), np.uint8), lambda rgb: np.array([[[0.1, 0.7, 0.2]]]))
+    >>> int(labels[0, 0]), float(scores[0, 0])
+    (1, 0.7)
+    """
+    p = check_shape("net", net(check_rgb("rgb", rgb)), (*rgb.shape[:2], None))
+    return p.argmax(axis=2).astype(np.uint8), p.max(axis=2)
+
+
+def montage(rgb: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W2 3"]:
+    """Put an image and its mask side by side, the mask in white on black, as imshowpair(..., "montage") does.
+
+    >>> montage(np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), bool)).shape
+    (2, 6, 3)
+    """
+    check_same_size("rgb", check_rgb("rgb", rgb), "mask", check_shape("mask", mask, (None, None)))
+    white = np.where(mask[..., None], 255, 0).astype(np.uint8)
+    return np.hstack([rgb, np.repeat(white, 3, axis=2)])
+
+
+def cloud_of_mask(
+    mask: Bool[np.ndarray, "H W"],
+    depth: Float[np.ndarray, "H W"],
+    K: Real[np.ndarray, "3 3"],
+    T_base_cam: Real[np.ndarray, "4 4"],
+) -> Float[np.ndarray, "N 3"]:
+    """Back-project a mask to the base frame, metres, in the order of MATLAB's find: column by column.
+
+    Pixels without depth are left out, which the listing forgets: they would all lie in the camera. Otherwise the points
+    are those of labkit.geometry.backproject_to_base. Raises ValueError for arguments that do not fit.
+    """
+    mask = check_shape("mask", mask, (None, None))
+    points = back_project(depth, check_K("K", K))
+    check_same_size("depth", points, "mask", mask)
+    u, v = np.nonzero(mask.T & (points[..., 2] > 0.0).T)
+    return transform_points(check_T("T_base_cam", T_base_cam), points[v, u])

@@ -1,0 +1,200 @@
+"""Segmentation without labels: k-means of colours, connected components, and the choice of one (section 10)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float64, Integer, UInt8
+
+from labkit.support.validation import check_finite, check_rgb, check_shape
+
+SAMPLE = 4096  # pixels that the means are found from; all pixels are then assigned to them
+
+
+def kmeans(
+    X: Float[np.ndarray, "N D"], k: int, seed: int = 0, iterations: int = 50
+) -> tuple[Float64[np.ndarray, "k D"], Integer[np.ndarray, " N"]]:
+    """Cluster points by Lloyd's algorithm from a k-means++ start; returns the means and each point's cluster.
+
+    It ends when no point changes its cluster, or after `iterations`. A cluster that loses all its points takes the
+    point that is furthest from its mean. Raises ValueError for fewer than k different points.
+
+    >>> means, labels = kmeans(np.array([[0.0], [1.0], [10.0]]), 2)
+    >>> sorted(means.ravel().tolist()), bool(labels[0] == labels[1])
+    ([0.5, 10.0], True)
+    """
+    X = check_finite("X", check_shape("X", X, (None, None))).astype(np.float64)
+    if not 1 <= k <= len(np.unique(X, axis=0)):
+        raise ValueError(f"k: expected 1 to {len(np.unique(X, axis=0))}, the number of different points, got {k}")
+    rng = np.random.default_rng(seed)
+    means = X[rng.integers(len(X))][None]
+    while len(means) < k:  # the next start is drawn by its squared distance to the nearest one
+        weight = _squared_distances(X, means).min(axis=1)
+        means = np.vstack([means, X[rng.choice(len(X), p=weight / weight.sum())]])
+    labels = np.full(len(X), -1)
+    for _ in range(iterations):
+        distances = _squared_distances(X, means)
+        nearest = distances.argmin(axis=1)
+        for empty in np.setdiff1d(np.arange(k), nearest):
+            furthest = distances[np.arange(len(X)), nearest].argmax()
+            nearest[furthest], distances[furthest] = empty, 0.0
+        if np.array_equal(nearest, labels):
+            break
+        labels = nearest
+        means = np.stack([X[labels == j].mean(axis=0) for j in range(k)])
+    return means, labels
+
+
+def _squared_distances(X: Float[np.ndarray, "N D"], means: Float[np.ndarray, "k D"]) -> Float[np.ndarray, "N k"]:
+    return ((X[:, None, :] - means[None]) ** 2).sum(axis=2)
+
+
+def segment_kmeans(rgb: UInt8[np.ndarray, "H W 3"], k: int, seed: int = 0) -> UInt8[np.ndarray, "H W"]:
+    """Split an image into k regions of similar colour, numbered from 0 by their size, largest first.
+
+    Colours are compared in CIE L*a*b*, where distance is closer to what is seen; the means are found from a few
+    thousand pixels. A region need not be connected: `components` takes it apart. Raises ValueError if the image has
+    fewer than k colours among them. Section 10 of the text.
+    """
+    lab = cv2.cvtColor(check_rgb("rgb", rgb).astype(np.float32) / 255.0, cv2.COLOR_RGB2Lab).reshape(-1, 3)
+    sample = lab[:: max(1, len(lab) // SAMPLE)]
+    means, _ = kmeans(sample, k, seed)
+    regions = np.concatenate([_squared_distances(part, means).argmin(axis=1) for part in np.array_split(lab, 16)])
+    order = np.argsort(-np.bincount(regions, minlength=k), kind="stable")
+    rank = np.empty(k, np.uint8)
+    rank[order] = np.arange(k)
+    return rank[regions].reshape(rgb.shape[:2])
+
+
+def components(regions: Integer[np.ndarray, "H W"], connectivity: int = 4) -> Integer[np.ndarray, "H W"]:
+    """Number the connected pieces of equal value from 1, in the order in which their first pixels are read.
+
+    connectivity: 4 or 8 neighbours. Every pixel belongs to a piece; the value 0 is no background.
+
+    >>> components(np.array([[5, 5, 0], [0, 5, 5]]))
+    array([[1, 1, 2],
+           [3, 1, 1]], dtype=int32)
+    """
+    regions = check_shape("regions", regions, (None, None))
+    if connectivity not in (4, 8):
+        raise ValueError(f"connectivity: expected 4 or 8, got {connectivity!r}")
+    pieces, count = np.zeros(regions.shape, np.int32), 0
+    for value in np.unique(regions):
+        n, found = cv2.connectedComponents((regions == value).astype(np.uint8), connectivity=connectivity)
+        pieces += np.where(found > 0, found + count, 0)
+        count += n - 1
+    first = np.full(count + 1, pieces.size)
+    np.minimum.at(first, pieces.ravel(), np.arange(pieces.size))
+    number = np.empty(count + 1, np.int32)
+    number[np.argsort(first[1:]) + 1] = np.arange(1, count + 1)
+    return number[pieces]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Measures of pieces 1 to n, each an array of length n (row i is piece i + 1); pixels.
+
+    area; centroid (u, v); box: first and last column and row, (u0, v0, u1, v1); extent: share of its box that a piece
+    fills; elongation: ratio of the longer to the shorter axis of the ellipse with its second moments; at_border: it
+    touches the image's edge, and may go on beyond.
+    """
+
+    area: Integer[np.ndarray, " n"]
+    centroid: Float[np.ndarray, "n 2"]
+    box: Integer[np.ndarray, "n 4"]
+    extent: Float[np.ndarray, " n"]
+    elongation: Float[np.ndarray, " n"]
+    at_border: Bool[np.ndarray, " n"]
+
+    def features(self) -> Float[np.ndarray, "n 3"]:
+        """What a piece looks like wherever it lies: log area, log elongation, extent."""
+        return np.stack([np.log(self.area), np.log(self.elongation), self.extent], axis=1)
+
+
+def measure(pieces: Integer[np.ndarray, "H W"]) -> Measurements:
+    """Measure the pieces of an image of `components`; pixels of value 0 belong to none.
+
+    A pixel counts as a unit square, so a single one has an elongation of 1. Raises ValueError for a negative value or a
+    number without a pixel.
+    """
+    pieces = check_shape("pieces", pieces, (None, None))
+    if pieces.dtype.kind not in "iu" or (pieces.size and pieces.min() < 0):
+        raise ValueError(f"pieces: expected integers of at least 0, got dtype {pieces.dtype}")
+    H, W = pieces.shape
+    flat = pieces.ravel().astype(np.int64)
+    area = np.bincount(flat)[1:]
+    if not area.all():
+        raise ValueError(f"pieces: expected a pixel of each number up to {len(area)}, got none of {area.argmin() + 1}")
+    v, u = (grid.ravel().astype(np.float64) for grid in np.mgrid[:H, :W])
+
+    def mean(values):
+        return np.bincount(flat, values, len(area) + 1)[1:] / area
+
+    centroid = np.stack([mean(u), mean(v)], axis=1)
+    uu, vv = mean(u * u) - centroid[:, 0] ** 2 + 1 / 12, mean(v * v) - centroid[:, 1] ** 2 + 1 / 12
+    uv = mean(u * v) - centroid[:, 0] * centroid[:, 1]
+    middle, radius = (uu + vv) / 2, np.hypot((uu - vv) / 2, uv)
+    box = np.stack([_extreme(np.minimum, flat, u, len(area), W), _extreme(np.minimum, flat, v, len(area), H)], axis=1)
+    far = np.stack([_extreme(np.maximum, flat, u, len(area), -1), _extreme(np.maximum, flat, v, len(area), -1)], axis=1)
+    box = np.hstack([box, far])
+    sides = box[:, 2:] - box[:, :2] + 1
+    return Measurements(
+        area=area,
+        centroid=centroid,
+        box=box,
+        extent=area / sides.prod(axis=1),
+        elongation=np.sqrt((middle + radius) / np.maximum(middle - radius, 1 / 12)),
+        at_border=(box[:, :2] == 0).any(axis=1) | (box[:, 2:] == (W - 1, H - 1)).any(axis=1),
+    )
+
+
+def _extreme(reduce, flat, values, count: int, start: int) -> Integer[np.ndarray, " n"]:
+    """The smallest or largest value of each piece."""
+    out = np.full(count + 1, start, np.int64)
+    reduce.at(out, flat, values.astype(np.int64))
+    return out[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class Typical:
+    """What the wanted pieces look like: mean and covariance of their features."""
+
+    mean: Float64[np.ndarray, "3"]
+    covariance: Float64[np.ndarray, "3 3"]
+
+
+def learn_typical(masks: Sequence[Bool[np.ndarray, "H W"]]) -> Typical:
+    """Learn what wanted pieces look like from true masks of one each; raises ValueError for fewer than five."""
+    rows = [measure(mask.astype(np.int32)).features() for mask in masks if mask.any()]
+    if len(rows) < 5:
+        raise ValueError(f"masks: expected at least five with a pixel, to learn three features from, got {len(rows)}")
+    features = np.concatenate(rows)
+    return Typical(features.mean(axis=0), np.cov(features.T) + 1e-6 * np.eye(3))
+
+
+def choose_region(measurements: Measurements, typical: Typical, allowed: Bool[np.ndarray, " n"]) -> int:
+    """Select the piece that looks most like the wanted ones: least Mahalanobis distance; its number, 0 if none may be.
+
+    allowed: which pieces come into question, such as `~measurements.at_border`. Section 10's "label of the target".
+    """
+    allowed = check_shape("allowed", allowed, measurements.area.shape)
+    if not allowed.any():
+        return 0
+    off = measurements.features() - typical.mean
+    distance = np.einsum("ni,ij,nj->n", off, np.linalg.inv(typical.covariance), off)
+    return 1 + int(np.where(allowed, distance, np.inf).argmin())
+
+
+def colorize_regions(pieces: Integer[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
+    """Paint pieces so that neighbours in number differ clearly: hues in steps of the golden angle; 0 is black (RGB).
+
+    >>> colorize_regions(np.array([[0, 1]])).tolist()[0][0]
+    [0, 0, 0]
+    """
+    pieces = check_shape("pieces", pieces, (None, None))
+    numbers = np.arange(int(pieces.max(initial=0)) + 1)
+    hsv = np.stack([(numbers * 137.508) % 360.0, 0.55 + 0.35 * (numbers % 2), 0.95 - 0.3 * (numbers % 3 == 2)], axis=1)
+    hsv[0] = 0.0
+    colours = cv2.cvtColor(hsv[None].astype(np.float32), cv2.COLOR_HSV2RGB)[0]
+    return np.round(255.0 * colours).astype(np.uint8)[pieces]

@@ -1,0 +1,47 @@
+"""What a package requires, what of it is installed, and what the constraints file pins."""
+
+import re
+from importlib import metadata
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+
+def canonical(name: str) -> str:
+    """Spell a package's name as the index does: `Jupyter_Core` is `jupyter-core`."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def read_pins(constraints) -> dict[str, Requirement]:
+    """Read the lines NAME==VERSION of a constraints file, by canonical name."""
+    lines = (line.split("#")[0].strip() for line in Path(constraints).read_text().splitlines())
+    pins = [Requirement(line) for line in lines if line]
+    return {canonical(pin.name): pin for pin in pins}
+
+
+def requirements(package: str, extra: str = "") -> dict[str, str | None]:
+    """The version of each package that `package` requires on this machine, directly or not; None if it is missing.
+
+    Raises PackageNotFoundError if `package` itself is not installed.
+    """
+    metadata.version(package)
+    found: dict[str, str | None] = {}
+    seen, waiting = set(), [(canonical(package), extra)]
+    while waiting:
+        name, extra = waiting.pop()
+        if (name, extra) in seen:
+            continue
+        seen.add((name, extra))
+        for line in metadata.requires(name) or []:
+            needed = Requirement(line)
+            if needed.marker is not None and not needed.marker.evaluate({"extra": extra}):
+                continue
+            child = canonical(needed.name)
+            try:
+                found[child] = metadata.version(child)
+            except metadata.PackageNotFoundError:
+                found[child] = None
+                continue
+            waiting += [(child, e) for e in ("", *needed.extras)]
+    found.pop(canonical(package), None)
+    return found

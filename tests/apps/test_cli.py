@@ -1,0 +1,158 @@
+"""The command line: quick to answer, one line for what the user can mend, and training from end to end."""
+
+import errno
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+
+import data_gen
+from labkit.apps import cli, doctor
+from labkit.network import load_model
+
+HEAVY = ("torch", "numpy", "cv2", "pybullet", "numba", "matplotlib")
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """Four tiny frames to train on."""
+    folder = tmp_path_factory.mktemp("data") / "train"
+    data_gen.generate(folder, range(4), "train", (64, 48), progress=False)
+    return folder
+
+
+def run(monkeypatch, *arguments) -> int:
+    """Run a command in this process and return its exit status."""
+    monkeypatch.setattr(sys, "argv", ["labkit", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    return stop.value.code
+
+
+def test_help_names_the_commands_and_imports_nothing_heavy():
+    code = (
+        "import sys; sys.argv = ['labkit', '--help']\n"
+        "from labkit.apps import cli\n"
+        "try: cli.main()\n"
+        f"finally: print('heavy:', [name for name in {HEAVY} if name in sys.modules])"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "doctor" in shown and "train" in shown
+    assert shown.splitlines()[-1] == "heavy: []"
+
+
+def test_every_command_says_what_it_does(monkeypatch, capsys):
+    for command in cli.app.registered_commands:
+        assert run(monkeypatch, command.callback.__name__, "--help") == 0
+        assert command.callback.__doc__.splitlines()[0].split(";")[0] in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    "error, line",
+    [
+        (ValueError("K: expected (3, 3),\n got (4,)"), "labkit: K: expected (3, 3), got (4,)"),
+        (FileNotFoundError(errno.ENOENT, "No such file", "a.pt"), "labkit: a.pt: No such file"),
+        (
+            OSError(errno.ENOSPC, "No space left on device", "out/demo.png"),
+            "labkit: out/demo.png: No space left on device",
+        ),
+        (ModuleNotFoundError("No module named 'torch'"), "labkit: No module named 'torch'; `labkit doctor` tells"),
+    ],
+)
+def test_what_the_user_can_mend_is_one_line_and_status_2(monkeypatch, capsys, error, line):
+    def fail():
+        raise error
+
+    monkeypatch.setattr(doctor, "examine", fail)
+    assert run(monkeypatch, "doctor") == 2
+    said = capsys.readouterr().err
+    assert said.startswith(line) and said.count("\n") == 1
+    monkeypatch.setattr(sys, "argv", ["labkit", "--debug", "doctor"])
+    with pytest.raises(type(error)):
+        cli.main()
+
+
+def test_a_mistake_in_the_program_keeps_its_traceback(monkeypatch):
+    def fail():
+        raise TypeError("a bug")
+
+    monkeypatch.setattr(doctor, "examine", fail)
+    monkeypatch.setattr(sys, "argv", ["labkit", "doctor"])
+    with pytest.raises(TypeError, match="a bug"):
+        cli.main()
+
+
+@pytest.mark.parametrize("state, status", [(doctor.OK, 0), (doctor.NOTE, 0), (doctor.WRONG, 1)])
+def test_doctor_fails_only_when_something_needed_is_missing(monkeypatch, capsys, state, status):
+    monkeypatch.setattr(doctor, "examine", lambda: [doctor.Finding("thing", state, "as it is")])
+    assert run(monkeypatch, "doctor") == status
+    assert "as it is" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments, name",
+    [(["train", "--model", "x"], "--model"), (["train", "--epochs", "x"], "--epochs"), (["lift"], "lift")],
+)
+def test_wrong_usage_is_status_2_and_names_the_option(monkeypatch, capsys, arguments, name):
+    assert run(monkeypatch, *arguments) == 2
+    assert name in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments, name",
+    [
+        (["nowhere"], "nowhere"),
+        (["--epochs", 0], "epochs"),
+        (["--val", "nowhere"], "nowhere"),
+        (["--seed", -1], "seed"),
+    ],
+)
+def test_bad_training_arguments_are_named(monkeypatch, capsys, data, tmp_path, arguments, name):
+    given = arguments if arguments[0] == "nowhere" else [data, *arguments]
+    assert run(monkeypatch, "train", *given, "--out", tmp_path) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("labkit: ") and name in said
+
+
+def test_train_writes_weights_and_a_second_run_finds_it_done(monkeypatch, capsys, data, tmp_path):
+    command = ["train", data, "--val", data, "--epochs", 2, "--device", "cpu", "--out", tmp_path]
+    assert run(monkeypatch, *command) == 0
+    assert "2 epochs" in capsys.readouterr().out
+    history = json.loads((tmp_path / "unet.history.json").read_text())
+    assert [row["epoch"] for row in history] == [1, 2] and "mean_iou" in history[1]
+    assert load_model(tmp_path / "unet.pt", 4) is not None
+    weights = (tmp_path / "unet.pt").read_bytes()
+    assert run(monkeypatch, *command) == 0
+    assert (tmp_path / "unet.pt").read_bytes() == weights
+    assert run(monkeypatch, *command, "--seed", 1) == 2  # not the run that the checkpoint belongs to
+    assert "seed" in capsys.readouterr().err
+    assert run(monkeypatch, *command, "--seed", 1, "--no-resume") == 0
+    assert (tmp_path / "unet.pt").read_bytes() != weights
+
+
+def test_ctrl_c_ends_training_with_status_130_and_a_checkpoint(data, tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "labkit.apps.cli",
+        "train",
+        data,
+        "--epochs",
+        "100000",
+        "--device",
+        "cpu",
+        "--out",
+        tmp_path,
+    ]
+    with subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True) as process:
+        said = ""
+        while "loss" not in said:  # the progress bar shows a loss as soon as a step is done
+            character = process.stderr.read(1)
+            assert character, said
+            said += character
+        process.send_signal(signal.SIGINT)
+        process.stderr.read()
+    assert process.returncode == 130
+    assert (tmp_path / "unet.checkpoint.pt").is_file()

@@ -1,0 +1,102 @@
+"""Masks spoilt on purpose, against distances computed another way, and against counts."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import distance_transform_edt
+
+from labkit.apps import degrade
+
+
+def blob(seed=0, size=(40, 56)):
+    """A mask with a slanted side, a notch and a hole, and more to the right than to the left."""
+    v, u = np.mgrid[0 : size[0], 0 : size[1]]
+    mask = (v > 5) & (v < 33) & (u > 12) & (u + 0.4 * v < 52)
+    mask[18:22, 12:20] = False
+    row, column = np.random.default_rng(seed).integers((8, 24), (30, 34))
+    mask[row - 1 : row + 2, column - 1 : column + 2] = False
+    return mask
+
+
+@pytest.mark.parametrize("pixels", [0, 1, 2, 3, 5])
+def test_dilate_adds_and_erode_removes_what_lies_within_a_distance(pixels):
+    mask = blob()
+    np.testing.assert_array_equal(degrade.dilate(mask, pixels), distance_transform_edt(~mask) <= pixels)
+    np.testing.assert_array_equal(degrade.erode(mask, pixels), distance_transform_edt(mask) > pixels)
+
+
+def test_the_images_border_is_no_edge():
+    full = np.ones((9, 12), bool)
+    assert degrade.erode(full, 3).all()
+    assert not degrade.dilate(~full, 3).any()
+
+
+@given(right=st.integers(-60, 60), down=st.integers(-45, 45))
+@settings(max_examples=40, deadline=None)
+def test_shift_moves_each_pixel_and_loses_those_that_leave(right, down):
+    mask = blob()
+    moved = np.zeros_like(mask)
+    for v, u in np.argwhere(mask):
+        if 0 <= v + down < mask.shape[0] and 0 <= u + right < mask.shape[1]:
+            moved[v + down, u + right] = True
+    np.testing.assert_array_equal(degrade.shift(mask, right, down), moved)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.5, 0.8, 1.0])
+def test_holes_take_their_share_and_hardly_more(share):
+    mask = blob()
+    for seed in range(5):
+        left = degrade.holes(mask, share, np.random.default_rng(seed))
+        assert not (left & ~mask).any()
+        lost = 1.0 - left.sum() / mask.sum()
+        assert share <= lost <= share + 0.07
+    same = [degrade.holes(mask, share, np.random.default_rng(3)) for _ in range(2)]
+    np.testing.assert_array_equal(*same)
+
+
+def test_a_hole_is_round_and_of_a_twentieth_of_the_mask():
+    mask = np.ones((60, 80), bool)
+    first = mask & ~degrade.holes(mask, 1e-9, np.random.default_rng(6))
+    v, u = np.nonzero(first)
+    radius = np.sqrt(mask.sum() / 20 / np.pi)
+    distance = np.hypot(v - v.mean(), u - u.mean())
+    assert abs(first.sum() / mask.sum() - 0.05) < 0.003 and distance.max() <= radius + 0.5
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.7, np.pi / 2, 3.0, 5.1])
+def test_cut_loses_the_share_that_lies_furthest_in_the_direction(direction):
+    mask = blob()
+    before = mask
+    for share in (0.0, 0.2, 0.4, 0.75, 1.0):
+        left = degrade.cut(mask, share, direction)
+        assert left.sum() == mask.sum() - round(share * mask.sum())
+        assert not (left & ~before).any()  # a larger cut takes the smaller one with it
+        before = left
+        far = [v * np.sin(direction) + u * np.cos(direction) for v, u in np.argwhere(mask & ~left)]
+        near = [v * np.sin(direction) + u * np.cos(direction) for v, u in np.argwhere(left)]
+        assert not far or not near or max(near) <= min(far) + 1e-9
+
+
+def test_the_truth_is_left_as_it_was():
+    mask = blob()
+    copy = mask.copy()
+    degrade.erode(mask, 2), degrade.dilate(mask, 2), degrade.shift(mask, 3, 1)
+    degrade.holes(mask, 0.5, np.random.default_rng(0)), degrade.cut(mask, 0.5, 1.0)
+    np.testing.assert_array_equal(mask, copy)
+
+
+@pytest.mark.bad_input
+def test_what_is_no_mask_or_no_strength_is_said():
+    mask = blob()
+    for function, arguments in ((degrade.erode, (1,)), (degrade.shift, (1, 1)), (degrade.cut, (0.5, 0.0))):
+        with pytest.raises(ValueError, match="mask: expected bool, got dtype uint8"):
+            function(mask.astype(np.uint8), *arguments)
+    with pytest.raises(ValueError, match="mask: expected shape"):
+        degrade.dilate(mask[0], 1)
+    with pytest.raises(ValueError, match="pixels: expected 0 or more, got -1"):
+        degrade.erode(mask, -1)
+    with pytest.raises(ValueError, match=r"share: expected a share in .*, got 20"):
+        degrade.cut(mask, 20, 0.0)
+    with pytest.raises(ValueError, match=r"share: expected a share in .*, got -0.1"):
+        degrade.holes(mask, -0.1, np.random.default_rng(0))

@@ -1,0 +1,135 @@
+"""labkit doctor: what is whole is called whole, and each thing that can be broken is found when it is broken."""
+
+import shutil
+from types import SimpleNamespace
+
+import pytest
+
+from labkit.apps import doctor
+from labkit.apps.doctor import NOTE, OK, WRONG
+from labkit.support import packages
+
+
+def write_package(folder, name: str, version: str, *requires: str):
+    """Install a package that is nothing but its metadata."""
+    info = folder / f"{name}-{version}.dist-info"
+    info.mkdir()
+    lines = ["Metadata-Version: 2.4", f"Name: {name}", f"Version: {version}"]
+    (info / "METADATA").write_text("\n".join(lines + [f"Requires-Dist: {r}" for r in requires]) + "\n")
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    """toy -> toy_a[fast] -> toy_b, toy (a cycle) and, for [fast], toy_c; toy's extra "draw" -> toy_d, not installed."""
+    write_package(tmp_path, "toy", "1.0", "toy_a[fast]", "toy-d>=2; extra == 'draw'", "toy-old; python_version < '3'")
+    write_package(tmp_path, "toy_a", "1.1", "toy.b", "toy-c; extra == 'fast'", "toy-other; extra == 'slow'", "toy")
+    write_package(tmp_path, "toy_b", "2.13.0+cpu")
+    write_package(tmp_path, "toy_c", "1.3rc1")
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def pins(tmp_path, *lines: str):
+    path = tmp_path / "constraints.txt"
+    path.write_text("\n".join(lines))
+    return packages.read_pins(path)
+
+
+def test_requirements_follow_dependencies_markers_and_extras(toy):
+    assert packages.requirements("toy") == {"toy-a": "1.1", "toy-b": "2.13.0+cpu", "toy-c": "1.3rc1"}
+    assert packages.requirements("toy", "draw")["toy-d"] is None
+
+
+def test_requirements_of_a_package_that_is_not_installed_raise():
+    with pytest.raises(ModuleNotFoundError, match="no-such-package"):
+        packages.requirements("no-such-package")
+
+
+def test_versions_compare_as_pins_do_with_local_parts_and_pre_releases(toy, tmp_path):
+    kept = pins(tmp_path, "# a comment", "", "toy_A==1.1", "toy-b==2.13.0  # any build", "Toy.C==1.3rc1")
+    assert doctor.compare("packages", packages.requirements("toy"), kept).state == OK
+    changed = pins(tmp_path, "toy-a==1.1", "toy-b==2.12.0", "toy-c==1.3")
+    finding = doctor.compare("packages", packages.requirements("toy"), changed)
+    assert finding.state == NOTE
+    assert "toy-b 2.13.0+cpu (pinned ==2.12.0), toy-c 1.3rc1 (pinned ==1.3)" in finding.found
+    assert "toy-a" not in finding.found
+
+
+def test_a_missing_package_is_wrong_unless_only_an_extra_needs_it():
+    needed = doctor.compare("packages", {"numpy": "2.4", "torch": None}, {})
+    assert needed.state == WRONG and "missing: torch" in needed.found and "constraints.txt" in needed.mend
+    optional = doctor.compare("[bench]", {"open3d": None}, {}, "bench")
+    assert optional.state == NOTE and "make bench" in optional.found and ".[bench]" in optional.mend
+
+
+def test_this_environment_has_every_package_at_its_pin():
+    findings = {finding.name: finding for finding in doctor.check_packages()}
+    assert findings["packages"].state == findings["[test]"].state == OK, findings
+    assert "at their pinned versions" in findings["packages"].found
+
+
+def test_without_a_constraints_file_versions_are_not_compared(tmp_path):
+    first, packages, *_ = doctor.check_packages(tmp_path / "constraints.txt")
+    assert first.state == NOTE and "not compared" in first.found
+    assert packages.state == OK and "pinned" not in packages.found
+
+
+def test_pybullet_without_numpy_is_found(monkeypatch):
+    assert doctor.check_pybullet()[0].state == OK
+    monkeypatch.setattr("pybullet.isNumpyEnabled", lambda: 0)
+    assert doctor.check_pybullet()[0].state == WRONG
+
+
+def test_the_render_check_passes_here_and_sees_a_shift_of_half_a_pixel(monkeypatch):
+    assert doctor.check_render()[0].state == OK
+    from labkit.sim import world
+
+    measured = world.intrinsics
+
+    def shifted(*arguments):
+        K = measured(*arguments)
+        K[1, 2] += 0.5
+        return K
+
+    monkeypatch.setattr(world, "intrinsics", shifted)
+    assert doctor.check_render()[0].state == WRONG
+
+
+def test_pixels_without_depth_fail_the_render_check(monkeypatch):
+    monkeypatch.setattr(doctor, "table_error", lambda: float("nan"))
+    assert doctor.check_render()[0].state == WRONG
+
+
+@pytest.mark.parametrize("free, state", [(1e8, WRONG), (50e9, OK)])
+def test_disk_needs_room_for_a_data_set(monkeypatch, free, state):
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
+    assert doctor.check_disk()[0].state == state
+
+
+def test_a_gpu_is_welcome_but_not_needed(monkeypatch):
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    assert doctor.check_gpu()[0].state == NOTE
+    monkeypatch.setattr("torch.cuda.is_available", lambda: True)
+    monkeypatch.setattr("torch.cuda.get_device_name", lambda: "Toy GPU")
+    finding = doctor.check_gpu()[0]
+    assert finding.state == OK and "Toy GPU" in finding.found
+
+
+def test_outside_a_virtual_environment_the_report_says_so(monkeypatch):
+    assert doctor.check_python()[0].found.startswith("3.11.")
+    monkeypatch.setattr("sys.prefix", "/usr")
+    monkeypatch.setattr("sys.base_prefix", "/usr")
+    assert doctor.check_python()[0].state == NOTE
+
+
+def test_one_broken_check_leaves_the_others_standing(monkeypatch):
+    def broken():
+        raise ImportError("libthing.so: cannot open shared object file")
+
+    for name in ("check_packages", "check_render", "check_gpu"):
+        monkeypatch.setattr(doctor, name, lambda: [])
+    monkeypatch.setattr(doctor, "check_pybullet", broken)
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert findings["PyBullet"].state == WRONG and "libthing.so" in findings["PyBullet"].found
+    assert findings["cores"].found[0].isdigit()
+    assert not doctor.all_well(list(findings.values()))
+    assert "mend: " in doctor.report(list(findings.values()))

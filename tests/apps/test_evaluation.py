@@ -1,0 +1,100 @@
+"""Scores and lifts over scenes: pooled, honest, and as the command prints them."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from data_gen import sample_scene
+from labkit.apps.evaluation import Trial, lift, perceive, run_trial, summarise, table
+from labkit.grasp import GraspPlan
+from labkit.labels import CLASSES, OBSTACLE, TARGET
+from labkit.metrics import confusion_matrix, iou
+from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
+from labkit.sim.world import World
+
+
+def trial(counts, lifted=True, reason="", edges=(1, 2)):
+    counts = np.array(counts)
+    return Trial(0, counts, (np.full(4, edges[0]), np.full(4, edges[1])), lifted, reason, "mug", {"network": 0.1})
+
+
+def test_counts_are_added_before_they_are_divided():
+    """1 of 1 and 0 of 99 average to 0.5; pooled they are 0.01."""
+    good, bad = np.zeros((2, 4, 4), int)
+    good[TARGET, TARGET] = 1
+    bad[TARGET, OBSTACLE] = 99
+    report = summarise([trial(good), trial(bad, False, "slipped")])
+    assert np.isclose(report.iou["target"], 0.01)
+    assert report.lift_rate == 0.5 and report.failures == {"slipped": 1} and report.trials == 2
+    low, high = report.lift_interval
+    assert 0.0 < low < 0.5 < high < 1.0
+
+
+def test_no_trial_is_an_error():
+    with pytest.raises(ValueError, match="trials"):
+        summarise([])
+
+
+def test_a_trial_with_true_masks_scores_one_and_the_table_says_so():
+    result = run_trial(sample_scene(500_000, "test"), None, (160, 120))
+    report = summarise([result])
+    assert all(value == 1.0 for value in report.iou.values() if not np.isnan(value))
+    assert "lifted" in table(report) and "mean" in table(report)
+
+
+def post_scene(class_id):
+    thing = ObjectSpec("post", "post", class_id, (0.5, 0.05, 0.026), parts=(Part("box", (0.03, 0.03, 0.05)),))
+    camera = Camera.looking_at((0.5, 0.0, 0.0), 0.7, 0.2, 0.9)
+    return SceneSpec((thing,), camera)
+
+
+def test_lifting_a_non_target_is_a_failure():
+    """The mask says target, the simulator says obstacle: the arm lifts it, and the trial fails."""
+    outcomes = {}
+    for class_id in (TARGET, OBSTACLE):
+        with World(post_scene(class_id)) as world:
+            frame = world.render()
+            mask = np.where(frame.instances == 1, TARGET, frame.labels)
+            frame = type(frame)(frame.rgb, frame.depth, frame.K, frame.T_base_cam, labels=mask)
+            outcomes[class_id] = lift(world, perceive(frame, None, 0.0))
+    assert outcomes[TARGET].success
+    assert not outcomes[OBSTACLE].success and "obstacle" in outcomes[OBSTACLE].reason
+
+
+def test_no_candidate_is_a_failure_with_the_planners_reason():
+    with World(post_scene(OBSTACLE)) as world:
+        perception = perceive(world.render(), None, 0.0)
+        result = lift(world, perception)
+    assert isinstance(perception.plan, GraspPlan)
+    assert not result.success and result.reason == perception.plan.reason != ""
+
+
+def test_the_command_writes_the_promised_keys(tmp_path):
+    out = tmp_path / "scores.json"
+    arguments = ["--scenes", "2", "--first-seed", "500000", "--config", "test", "--masks", "truth", "--json", str(out)]
+    run = subprocess.run(
+        [sys.executable, "-m", "labkit.apps.cli", "evaluate", *arguments], capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    scores = json.loads(out.read_text())
+    promised = "iou mean_iou boundary_iou pixel_accuracy lift_rate lift_interval trials failures seconds"
+    assert set(promised.split()) <= set(scores)
+    assert set(scores["iou"]) == set(CLASSES) and scores["trials"] == 2
+    assert scores["mean_iou"] == scores["boundary_iou"] == scores["pixel_accuracy"] == 1.0
+    assert "IoU" in run.stdout and "95 %" in run.stdout
+
+
+def test_predicted_masks_are_scored_against_the_truth():
+    spec = sample_scene(500_001, "test")
+
+    def all_surface(rgb):
+        return np.dstack([np.zeros(rgb.shape[:2]), np.ones(rgb.shape[:2]), np.zeros((*rgb.shape[:2], 2))])
+
+    result = run_trial(spec, all_surface, (160, 120))
+    with World(spec) as world:
+        labels = world.render((160, 120)).labels
+    assert np.array_equal(result.counts, confusion_matrix(labels, np.ones_like(labels), 4))
+    assert not result.lifted and iou(result.counts)[TARGET] == 0.0

@@ -1,0 +1,151 @@
+"""The study of masks: its committed table comes out again, and it can be stopped anywhere."""
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import data_gen
+from labkit.apps import mask_study
+from labkit.apps.cli import app
+from labkit.apps.mask_study import Row
+from labkit.labels import OBSTACLE, TARGET
+from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
+from labkit.sim.world import World
+
+TABLE = Path(__file__).parents[2] / "lessons" / "07_grasp.csv"
+ALL = [(kind, float(s)) for kind, (strengths, _) in mask_study.KINDS.items() for s in strengths]
+
+
+@pytest.fixture(scope="module")
+def table():
+    return mask_study.read(TABLE)
+
+
+def test_the_table_holds_every_way_of_spoiling_in_every_scene(table):
+    assert len(table) >= 1000
+    seeds = range(mask_study.FIRST_SEED, mask_study.FIRST_SEED + mask_study.SCENES)
+    assert [(row.seed, row.kind, row.strength) for row in table] == [(s, *way) for s in seeds for way in ALL]
+    assert all((row.lifted == 1) == (row.reason == "lifted") for row in table)
+
+
+def test_more_spoilt_masks_have_less_iou(table):
+    scores = defaultdict(list)
+    for row in table:
+        scores[row.seed, row.kind].append(row.iou)
+    assert all((np.diff(iou) <= 0.0).all() for iou in scores.values())
+    assert all(iou == [1.0] for (_, kind), iou in scores.items() if kind == "true")
+
+
+def test_iou_is_worth_something(table):
+    worse, better = (mask_study.lift_rate(rows) for rows in mask_study.by_iou(table, [0.0, 0.4, 1.0]))
+    assert worse[2] < better[1]  # the intervals lie apart
+
+
+def test_a_few_lifts_made_again_give_the_tables_rows(table):
+    ways = [("true", 0.0), ("part missing", 0.2)]
+    again = mask_study.trials_of_scene(600_001, ways)
+    assert again == [row for row in table if row.seed == 600_001 and (row.kind, row.strength) in ways]
+    assert [row.lifted for row in again] == [1, 0]
+
+
+@pytest.mark.parametrize("seed", [600_007, 600_031])
+def test_the_masks_of_a_scene_made_again_have_the_tables_iou(table, seed):
+    spec = data_gen.sample_scene(seed, "test")
+    _, truth = mask_study.target_mask(spec, data_gen.render(spec, mask_study.SIZE))
+    for row in table:
+        if row.seed == seed:
+            mask = mask_study.spoil(truth, row.kind, row.strength, seed)
+            assert round(mask_study.mask_iou(mask, truth), 4) == row.iou
+
+
+def scene():
+    """A small target and a large one, side by side."""
+    things = [
+        ObjectSpec(name, "post", TARGET, (0.5, y, size / 2 + 0.001), parts=(Part("box", (size, size, size)),))
+        for name, y, size in (("small", -0.1, 0.03), ("large", 0.1, 0.045))
+    ]
+    return SceneSpec(tuple(things), Camera.looking_at((0.5, 0.0, 0.0), 0.7, 0.2, 0.9))
+
+
+def test_only_the_masks_target_is_a_target_and_only_that_one_counts():
+    spec = scene()
+    with World(spec) as world:
+        frame = world.render((160, 120))
+    name, truth = mask_study.target_mask(spec, frame)
+    assert name == "large" and truth.sum() == (frame.instances == 2).sum()
+    perception = mask_study.see(spec, frame, truth)
+    assert len(perception.clouds) == 1
+    assert (perception.labels[frame.instances == 1] == OBSTACLE).all()
+    assert (perception.labels[truth] == TARGET).all()
+    assert mask_study.try_lift(spec, perception, "large") == (True, "lifted")
+    assert mask_study.try_lift(spec, perception, "small") == (False, "lifted another target")
+    nothing = mask_study.see(spec, frame, np.zeros_like(truth))
+    assert mask_study.try_lift(spec, nothing, "large") == (False, "no target points")
+
+
+def test_a_scene_is_always_spoilt_in_the_same_way():
+    mask = np.zeros((60, 80), bool)
+    mask[10:40, 20:70] = True
+    for kind, strength in (("shifted", 8), ("holed", 0.4), ("part missing", 0.4)):
+        one, two, other = (mask_study.spoil(mask, kind, strength, seed) for seed in (600_000, 600_000, 600_001))
+        assert (one == two).all() and (one != other).any()
+
+
+def trials(seed, calls=None):
+    """A trial that costs nothing, for the tests of `run`."""
+    if calls is not None:
+        calls.append(seed)
+    return [Row(seed, "true", 0.0, 1.0, seed % 2, "lifted" if seed % 2 else "slipped, alas")]
+
+
+def test_a_study_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
+    calls, out = [], tmp_path / "new" / "study.csv"
+
+    def stops(seed):
+        if seed == 13:
+            raise KeyboardInterrupt
+        return trials(seed, calls)
+
+    monkeypatch.setattr(mask_study, "trials_of_scene", stops)
+    with pytest.raises(KeyboardInterrupt):
+        mask_study.run(out, 10, 5, progress=False)
+    assert not out.exists() and calls == [10, 11, 12]
+    monkeypatch.setattr(mask_study, "trials_of_scene", lambda seed: trials(seed, calls))
+    rows = mask_study.run(out, 10, 5, progress=False)
+    assert calls == [10, 11, 12, 13, 14] and rows == mask_study.read(out) == [trials(s)[0] for s in range(10, 15)]
+    assert [path.name for path in out.parent.iterdir()] == ["study.csv"]
+
+
+def test_the_command_runs_it_and_says_what_came_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(mask_study, "trials_of_scene", trials)
+    out = tmp_path / "study.csv"
+    done = CliRunner().invoke(app, ["study", "--out", str(out)])
+    assert done.exit_code == 0 and len(mask_study.read(out)) == mask_study.SCENES
+    assert f"{out}: {mask_study.SCENES} lifts, 50.0% succeeded (95 % interval 37.7% to 62.3%)" in done.output
+
+
+def test_what_is_left_of_other_scenes_is_not_mixed_in(tmp_path):
+    out = tmp_path / "study.csv"
+    mask_study.write(tmp_path / "study.csv.unfinished", trials(3))
+    with pytest.raises(ValueError, match="of other scenes"):
+        mask_study.run(out, 10, 5, progress=False)
+    (tmp_path / "study.csv.unfinished").write_text("seed,kind\n")
+    with pytest.raises(ValueError, match="expected a CSV file with columns seed, kind, strength"):
+        mask_study.run(out, 10, 5, progress=False)
+
+
+def test_bins_take_each_trial_once_and_their_upper_edge_only_at_the_end():
+    rows = [Row(0, "true", 0.0, iou, 1, "lifted") for iou in (0.0, 0.49, 0.5, 0.99, 1.0, 1.2)]
+    assert [[row.iou for row in members] for members in mask_study.by_iou(rows, [0.0, 0.5, 1.0])] == [
+        [0.0, 0.49],
+        [0.5, 0.99, 1.0],
+    ]
+
+
+@pytest.mark.bad_input
+def test_an_unknown_way_of_spoiling_is_said():
+    with pytest.raises(ValueError, match="kind: expected one of true, eroded"):
+        mask_study.spoil(np.ones((3, 4), bool), "melted", 1, 0)

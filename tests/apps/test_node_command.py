@@ -1,0 +1,71 @@
+"""The command `labkit node`: its words, its one line, and what it says about wrong ones."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import data_gen
+from labkit.apps import cli
+from labkit.apps.node_command import Settings
+from labkit.node.actors import Camera
+from labkit.node.bags import BagWriter
+
+
+def run(monkeypatch, *arguments) -> int:
+    """Run the command in this process and return its exit status."""
+    monkeypatch.setattr(sys, "argv", ["labkit", "node", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    return stop.value.code
+
+
+def test_sim_goes_from_camera_topic_to_lift_in_one_line():
+    command = [sys.executable, "-m", "labkit.apps.cli", "node", "--sim", "--seed", "0"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (line,) = done.stdout.splitlines()
+    assert line.startswith("scene 0: frame answered") and "lifted lego_0" in line
+
+
+def test_bag_says_what_became_of_the_frames(monkeypatch, capsys, tmp_path):
+    frame = data_gen.render(data_gen.sample_scene(620000, "test"), (64, 48))
+    with BagWriter(tmp_path / "in.bag") as bag:
+        Camera(bag).publish(frame, 1)
+    out = tmp_path / "out"
+    assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 0
+    assert f"wrote {out}: 1 frames answered, 0 frames and 0 messages skipped" in capsys.readouterr().out
+    assert (out / "metadata.yaml").is_file()
+    assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 2
+    assert "it is there already" in capsys.readouterr().err
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        ([], "expected one of --sim, --ros and --bag"),
+        (["--sim", "--ros"], "expected one of"),
+        (["--bag", "a.bag"], "out"),
+        (["--sim", "--out", "a.bag"], "out"),
+        (["--bag", "nowhere.bag", "--out", "a.bag", "--model", "smallsegnet"], "nowhere.bag"),
+        (["--bag", "a.bag", "--out", "b.bag", "--model", "smallsegnet", "--camera-pose", "1 2 3"], "camera_pose"),
+        (["--bag", "a.bag", "--out", "b.bag", "--model", "smallsegnet", "--topic", "rgp=/a"], "topic"),
+        (["--sim", "--engine", "abacus"], "engine"),
+        (["--sim", "--model", "smallsegnet", "--target", "9"], "target_class"),
+    ],
+)
+def test_wrong_words_are_one_line_and_status_2(monkeypatch, capsys, arguments, said):
+    assert run(monkeypatch, *arguments) == 2
+    assert said in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_settings_become_a_pipeline_and_a_node():
+    settings = Settings("smallsegnet", target=1, camera_pose="0.5, 0, 0.8, 1 0 0 0", renamed=("rgb=/a", "mask=/b"))
+    pipeline, options = settings.pipeline(0.1), settings.node()
+    assert pipeline.target_class == 1 and pipeline.table_z == 0.1
+    assert np.allclose(
+        options["T_base_cam"], np.diag([1.0, -1.0, -1.0, 1.0]) + np.outer([0.5, 0, 0.8, 0], [0, 0, 0, 1])
+    )
+    assert (options["topics"].rgb, options["topics"].mask) == ("/a", "/b")

@@ -1,0 +1,184 @@
+"""Hostile and odd submissions: none earns what it should not, none leaves anything outside, and the class is graded."""
+
+import csv
+import os
+import socket
+import time
+from pathlib import Path
+
+import grading_course as kit
+import pytest
+from attacks.odd import ODD
+from attacks.table import ATTACKS
+
+from labkit.course.grading.batch import file_name
+from labkit.course.grading.reading import shown_name
+from labkit.course.grading.run import grade_course
+from labkit.course.grading.sandbox import Limits
+
+TOPIC = "04_iou"
+SECRET_VARIABLE = "LABKIT_TEST_SECRET"
+LIMITS = Limits(case_s=2.0, submission_s=60.0, memory_mb=512)
+REST = 9.0  # points of the other questions of 04_iou
+
+
+def workers_alive() -> set[int]:
+    """Processes that run a worker, of any grading on this machine."""
+    found = set()
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            try:
+                command = (folder / "cmdline").read_bytes()
+            except OSError:
+                continue
+            if b"/worker.py" in command:
+                found.add(int(folder.name))
+    return found
+
+
+@pytest.fixture(scope="module")
+def hostile_class(tmp_path_factory):
+    """Grade a class in which everybody attacks but one, whose grade is in the gradebook before."""
+    course = tmp_path_factory.mktemp("course")
+    outside = tmp_path_factory.mktemp("outside")
+    right = kit.right_answers(TOPIC)
+    kit.write_lab(course, TOPIC)
+    kit.submit(course, "honest", TOPIC, right)
+    grade_course(TOPIC, course, seed="secret", limits=LIMITS, progress=False)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.setblocking(False)
+        known = {
+            "{course}": str(course),
+            "{marker}": str(outside / "marker"),
+            "{port}": str(server.getsockname()[1]),
+            "{secret}": SECRET_VARIABLE,
+        }
+        for attack in ATTACKS:
+            source = attack.source
+            for name, value in known.items():
+                source = source.replace(name, value)
+            kit.submit(course, attack.name, TOPIC, right | {"iou": source})
+        notebook = kit.lab_notebook(TOPIC, right)
+        for odd in ODD:
+            odd.write(course / "submitted" / odd.name / TOPIC, notebook)
+        os.environ[SECRET_VARIABLE] = "4711"
+        try:
+            graded = grade_course(TOPIC, course, seed="secret", limits=LIMITS, workers=2, progress=False)
+        finally:
+            del os.environ[SECRET_VARIABLE]
+        try:
+            reached = server.accept()
+        except BlockingIOError:
+            reached = None
+    return course, outside, {record.student: record for record in graded.records}, reached
+
+
+def points(record) -> dict[str, float]:
+    return {result.question: result.points for result in record.results}
+
+
+@pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.name)
+def test_an_attack_earns_nothing_and_costs_nobody_else(hostile_class, attack):
+    earned = points(hostile_class[2][attack.name])
+    assert earned.pop("iou") == 0.0
+    assert sum(earned.values()) <= REST
+    if attack.rest:
+        assert sum(earned.values()) == REST, hostile_class[2][attack.name]
+
+
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: ascii(odd.name)[:30])
+def test_an_odd_submission_is_graded_or_has_its_reason(hostile_class, odd):
+    record = hostile_class[2][shown_name(odd.name)]
+    assert record.reason == odd.reason
+    if odd.reason:
+        assert record.results == () and record.points == 0.0
+        return
+    earned = points(record)
+    assert earned.pop("iou") == odd.points and sum(earned.values()) == REST
+    said = next(result.says for result in record.results if result.question == "iou")
+    assert said.startswith(odd.says or "right in all")
+
+
+def test_no_attack_and_no_odd_submission_is_accepted_or_rejected_falsely(hostile_class, capsys):
+    records = hostile_class[2]
+    accepted = [attack.name for attack in ATTACKS if points(records[attack.name])["iou"] > 0.0]
+    graded = {odd.name: points(records[shown_name(odd.name)]).get("iou", 0.0) for odd in ODD}
+    accepted += [odd.name for odd in ODD if graded[odd.name] > odd.points]
+    rejected = [odd.name for odd in ODD if graded[odd.name] < odd.points]
+    with capsys.disabled():
+        right = sum(odd.points > 0.0 for odd in ODD)
+        wrong = len(ATTACKS) + len(ODD) - right
+        print(f"\n{len(ATTACKS)} attacks, {len(ODD)} odd submissions: ", end="")
+        print(f"false accepts {len(accepted)} of {wrong}, false rejects {len(rejected)} of {right}")
+    assert not accepted and not rejected
+
+
+def test_there_are_attacks_enough():
+    assert len(ATTACKS) >= 30 and sum(attack.blind for attack in ATTACKS) >= 10
+    assert len({attack.name for attack in ATTACKS}) == len(ATTACKS)
+
+
+def test_the_honest_student_keeps_the_grade(hostile_class):
+    from labkit.course.grading.gradebook import opened
+
+    course, _, records, _ = hostile_class
+    assert records["honest"].points == REST + 2.0
+    with opened(course) as gradebook:
+        assert gradebook.find_submission(TOPIC, "honest").score == REST + 2.0
+        for attack in ATTACKS:
+            assert gradebook.find_submission(TOPIC, attack.name).score <= REST
+
+
+def test_nothing_is_left_outside_the_sandbox(hostile_class):
+    course, outside, _, _ = hostile_class
+    assert list(outside.iterdir()) == []
+    known = {"labs", "submitted", "autograded", "grades", "gradebook.db"}
+    assert {path.name for path in course.iterdir()} == known
+    made = {path.name for path in (course / "grades" / TOPIC).iterdir()}
+    assert made == {"grades.csv", "feedback", "results", "records", "secret_seed"}
+    assert not (Path(kit.np.__file__).parent / "evil.py").exists()
+
+
+def test_nobody_came_through_the_network(hostile_class):
+    assert hostile_class[3] is None
+
+
+def test_no_worker_outlives_the_batch(hostile_class):
+    left = workers_alive()
+    deadline = time.monotonic() + 100.0  # of other gradings at the same time, which end by themselves
+    while left & workers_alive() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not left & workers_alive()
+
+
+def test_no_argument_reaches_what_students_read(hostile_class):
+    """The attacks tell_by_... raise and return what holds "ARGUMENTS" and these; only their own line is shown."""
+    records = hostile_class[2]
+    for name in ("tell_by_message", "tell_by_name", "tell_by_class", "tell_by_module", "tell_by_shape"):
+        said = next(result.says for result in records[name].results if result.question == "iou")
+        shown = said.partition(" in line ")[0]
+        assert "ARGUMENTS" not in shown and "[" not in shown and "6" not in shown, said
+
+
+def test_what_instructors_should_look_at_is_flagged(hostile_class):
+    records = hostile_class[2]
+    for name, word in [
+        ("exit_hard", "ended or crashed"),
+        ("forged_length", "channel"),
+        ("kit_by_import", "labkit"),
+        ("another_library", "sklearn"),
+        ("two_answers", "2 different cells"),
+    ]:
+        flags = {result.question: result.flag for result in records[name].results}
+        assert word in flags["iou"], name
+    assert not any(result.flag for result in records["honest"].results)
+
+
+def test_names_do_no_harm_in_tables_and_pages(hostile_class):
+    course = hostile_class[0] / "grades" / TOPIC
+    rows = list(csv.reader((course / "grades.csv").open()))
+    assert not [cell for row in rows for cell in row if cell.startswith(("=", "+", "@"))]
+    assert "'=HYPERLINK(1)" in {row[0] for row in rows}
+    for page in (course / "feedback").iterdir():
+        assert "<script" not in page.read_text()
+    assert (course / "feedback" / f"{file_name('Zoë Ångström')}.html").name == "Zoë Ångström.html"

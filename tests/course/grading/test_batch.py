@@ -1,0 +1,335 @@
+"""A folder of submissions: what is written, what is graded again, what a killed run leaves, Dask, the gradebook."""
+
+import csv
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import grading_course as kit
+import pytest
+from typer.testing import CliRunner
+
+from labkit.apps.cli import app
+from labkit.course.grading import sandbox
+from labkit.course.grading.batch import read_record, record_path, secret_for
+from labkit.course.grading.grade import packages_for
+from labkit.course.grading.gradebook import opened
+from labkit.course.grading.reading import Submission, read_lab
+from labkit.course.grading.run import grade_course
+from labkit.course.questions.question import find, of_topic
+
+TOPIC = "04_iou"
+SECRET = "2718281828459045"
+ROOT = Path(__file__).parents[3]
+
+
+def misconceived(number: int) -> dict[str, str]:
+    """Each question answered with one of its misconceptions."""
+    questions = of_topic(TOPIC).items()
+    return {name: kit.as_cell(question.misconceptions[number].answer, name) for name, question in questions}
+
+
+@pytest.fixture
+def course(tmp_path):
+    """Three students: all right, all wrong, and one whose second answer crashes the worker."""
+    right = kit.right_answers(TOPIC)
+    kit.write_lab(tmp_path, TOPIC)
+    kit.submit(tmp_path, "ada", TOPIC, right)
+    kit.submit(tmp_path, "ben", TOPIC, misconceived(0))
+    kit.submit(tmp_path, "eve", TOPIC, right | {"iou": "import os\ndef iou(n):\n    os._exit(1)\n"})
+    return tmp_path
+
+
+def grade(course: Path, **how):
+    return grade_course(TOPIC, course, **{"seed": SECRET, "progress": False} | how)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """All files of a folder by their relative paths."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def for_students(course: Path) -> dict[str, bytes]:
+    """What students get to see."""
+    found = files(course / "grades" / TOPIC)
+    return {name: data for name, data in found.items() if name.startswith(("feedback", "results"))}
+
+
+# -------------------------------------------------------------------------------------------- what is written
+
+
+def test_points_and_words_are_as_constructed(course):
+    graded = grade(course)
+    assert [record.student for record in graded.records] == ["ada", "ben", "eve"] and graded.graded_now == 3
+    ada, ben, eve = graded.records
+    assert [result.points for result in ada.results] == [2.0, 2.0, 2.0, 2.0, 3.0] and not ada.needs_a_look
+    assert ben.points == 0.0
+    for result, question in zip(ben.results, of_topic(TOPIC).values(), strict=True):
+        assert result.hint == question.misconceptions[0].hint
+    assert [result.points for result in eve.results] == [2.0, 0.0, 2.0, 2.0, 3.0] and eve.needs_a_look
+    rows = list(csv.DictReader((course / "grades" / TOPIC / "grades.csv").open()))
+    assert [(row["student"], row["question"], float(row["points"])) for row in rows] == [
+        (record.student, result.question, result.points) for record in graded.records for result in record.results
+    ]
+
+
+def test_gradescope_reads_scores_of_each_question(course):
+    grade(course)
+    data = json.loads((course / "grades" / TOPIC / "results" / "eve" / "results.json").read_text())
+    assert data["score"] == sum(test["score"] for test in data["tests"]) == 9.0
+    assert [test["status"] for test in data["tests"]] == ["passed", "failed", "passed", "passed", "passed"]
+    assert sum(test["max_score"] for test in data["tests"]) == 11.0
+
+
+def test_students_learn_no_seed_and_no_expected_value(course):
+    from labkit.course.grading.grade import secret_cases
+
+    grade(course)
+    told = for_students(course)
+    assert len(told) == 6
+    drawn = [case for question in of_topic(TOPIC).values() for case in secret_cases(question, SECRET)]
+    values = {f"{float(value):.4f}" for case in drawn for value in kit.np.ravel(case.expected) if value % 1 > 0}
+    assert len(values) > 20
+    for name, data in told.items():
+        text = data.decode()
+        assert SECRET not in text, name
+        assert not [value for value in values if value in text], name
+
+
+def test_the_secret_is_kept_for_the_next_run_and_private(tmp_path):
+    first = secret_for(tmp_path, None)
+    assert len(first) == 32 and secret_for(tmp_path, None) == first
+    assert secret_for(tmp_path, "mine") == "mine" == secret_for(tmp_path, None)
+    assert stat.S_IMODE((tmp_path / "secret_seed").stat().st_mode) == 0o600
+    assert secret_for(tmp_path / "other", None) != first
+
+
+def test_another_secret_draws_other_cases():
+    from labkit.course.grading.grade import secret_cases
+
+    question = find("04_iou.iou")
+    one, two = secret_cases(question, "one"), secret_cases(question, "two")
+    by_hand = len(question.by_hand)
+    assert kit.np.array_equal(one[0].args[0], two[0].args[0])
+    assert not any(kit.np.array_equal(a.args[0], b.args[0]) for a, b in zip(one[by_hand:], two[by_hand:], strict=True))
+
+
+# ---------------------------------------------------------------------------------- again, killed, elsewhere
+
+
+def test_again_grades_only_what_changed(course):
+    first = grade(course)
+    before = files(course / "grades")
+    again = grade(course)
+    assert again.graded_now == 0 and files(course / "grades") == before
+    assert [r.results for r in again.records] == [r.results for r in first.records]
+    kit.submit(course, "ben", TOPIC, kit.right_answers(TOPIC))
+    third = grade(course)
+    assert third.graded_now == 1 and third.records[1].points == 11.0
+    assert grade(course, force=True).graded_now == 3
+
+
+def test_another_seed_or_lab_grades_everything_again(course):
+    grade(course)
+    assert grade(course, seed="another").graded_now == 3
+    kit.write_lab(course, TOPIC, setup="import numpy as np  # and nothing else")
+    assert grade(course, seed="another").graded_now == 3
+
+
+def test_a_broken_record_is_made_again(course):
+    grade(course)
+    path = record_path(course / "grades" / TOPIC, "ada")
+    path.write_text('{"student": "ada"')
+    assert read_record(path) is None
+    assert grade(course).graded_now == 1
+
+
+def test_killed_in_the_middle_and_run_again(course):
+    """SIGKILL while the third of five submissions is graded: what was done is kept, and the grades are the same."""
+    slow = "import time\ndef iou(n):\n    time.sleep({})\n"
+    for student in ("fay", "gus"):
+        kit.submit(course, student, TOPIC, kit.right_answers(TOPIC))
+    waiting = kit.right_answers(TOPIC)
+    waiting["iou"] = waiting["iou"] + slow.format(600)
+    path = kit.submit(course, "eve", TOPIC, waiting)
+    command = [sys.executable, "-m", "labkit.apps.cli", "grade", TOPIC, "--course", str(course), "--seed", SECRET]
+    process = subprocess.Popen([*command, "--workers", "1"], cwd=ROOT, stderr=subprocess.DEVNULL)
+    done = record_path(course / "grades" / TOPIC, "ben")
+    try:
+        deadline = time.monotonic() + 120.0
+        while not done.exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert done.exists() and not (course / "grades" / TOPIC / "grades.csv").exists()
+    path.write_text(json.dumps(kit.lab_notebook(TOPIC, kit.right_answers(TOPIC))))
+    graded = grade(course)
+    assert graded.graded_now == 3 and [r.points for r in graded.records] == [11.0, 0.0, 11.0, 11.0, 11.0]
+    kept = files(course / "grades")
+    assert grade(course, force=True).graded_now == 5 and files(course / "grades") == kept
+
+
+def test_a_dask_cluster_gives_the_same_bytes(course):
+    from distributed import LocalCluster
+
+    grade(course)
+    here = files(course / "grades")
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster:
+        graded = grade(course, force=True, dask=cluster.scheduler_address)
+    assert graded.graded_now == 3 and files(course / "grades") == here
+
+
+# --------------------------------------------------------------------------------------- without a sandbox
+
+
+def test_without_a_sandbox_every_file_says_so(course):
+    graded = grade(course, unsafe=True)
+    assert [record.points for record in graded.records] == [11.0, 0.0, 9.0]
+    written = files(course / "grades" / TOPIC)
+    shown = {name: data for name, data in written.items() if not name.startswith(("records", "secret"))}
+    assert len(shown) == 7 and all(b"WITHOUT a sandbox" in data for data in shown.values())
+    for copied in (course / "autograded").rglob("*.ipynb"):
+        assert "WITHOUT a sandbox" in copied.read_text()
+    assert grade(course).graded_now == 3
+    assert not [name for name, data in for_students(course).items() if b"WITHOUT" in data]
+
+
+def test_without_bubblewrap_nothing_is_graded(course, monkeypatch):
+    monkeypatch.setattr(sandbox.shutil, "which", lambda name: None)
+    with pytest.raises(ValueError, match="bubblewrap"):
+        grade(course)
+    assert not (course / "grades" / TOPIC / "grades.csv").exists()
+
+
+# --------------------------------------------------------------------------------------------- the gradebook
+
+
+def test_the_gradebook_has_the_scores_and_keeps_manual_ones(course):
+    grade(course)
+    with opened(course) as book:
+        assert [book.find_submission(TOPIC, s).score for s in ("ada", "ben", "eve")] == [11.0, 0.0, 9.0]
+        assert "Hint" in book.find_comment("iou", TOPIC, TOPIC, "ben").auto_comment
+        written = book.find_grade("explain", TOPIC, TOPIC, "ada")
+        assert written.needs_manual_grade and written.auto_score is None
+        written.manual_score, written.needs_manual_grade = 3.0, False
+        book.db.commit()
+    grade(course)  # nothing changed: nothing is asked again
+    with opened(course) as book:
+        written = book.find_grade("explain", TOPIC, TOPIC, "ada")
+        assert (written.manual_score, written.needs_manual_grade) == (3.0, False)
+        assert book.find_submission(TOPIC, "ada").score == 14.0
+    notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC) | {"iou": "iou = None"})
+    kit.submit(course, "ada", TOPIC, notebook)
+    grade(course)
+    with opened(course) as book:
+        written = book.find_grade("explain", TOPIC, TOPIC, "ada")
+        assert (written.manual_score, written.needs_manual_grade) == (3.0, True)
+        assert book.find_submission(TOPIC, "ada").score == 12.0
+
+
+def test_an_answer_in_words_that_was_not_written_earns_nothing(course):
+    notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC))
+    notebook["cells"][-1]["source"] = "*Your answer.*"
+    kit.submit(course, "ada", TOPIC, notebook)
+    grade(course)
+    with opened(course) as book:
+        written = book.find_grade("explain", TOPIC, TOPIC, "ada")
+        assert (written.auto_score, written.needs_manual_grade) == (0.0, False)
+
+
+def test_the_copy_for_formgrader_is_the_lab_with_the_answers(course):
+    grade(course)
+    lab = json.loads((course / "labs" / TOPIC / f"{TOPIC}.ipynb").read_text())
+    copied = json.loads((course / "autograded" / "eve" / TOPIC / f"{TOPIC}.ipynb").read_text())
+    assert len(copied["cells"]) == len(lab["cells"])
+    for ours, theirs in zip(lab["cells"], copied["cells"], strict=True):
+        assert ours["metadata"] == theirs["metadata"]
+        answer = ours["metadata"]["nbgrader"]["solution"]
+        assert answer or ours["source"] == theirs["source"]
+    outputs = {c["metadata"]["nbgrader"]["grade_id"]: c.get("outputs") for c in copied["cells"]}
+    assert outputs["check_iou"][0]["text"].startswith("0 of 2 points") and outputs["iou"] == []
+
+
+def test_what_can_not_be_read_any_more_loses_its_scores(course):
+    grade(course)
+    (course / "submitted" / "ada" / TOPIC / f"{TOPIC}.ipynb").write_text("{")
+    graded = grade(course)
+    assert graded.records[0].reason and graded.graded_now == 1
+    with opened(course) as book:
+        assert book.find_submission(TOPIC, "ada").score == 0.0
+        assert book.find_grade("check_iou", TOPIC, TOPIC, "ada").needs_manual_grade
+
+
+def test_a_time_of_submission_is_kept(course):
+    folder = course / "submitted" / "ada" / TOPIC
+    (folder / "timestamp.txt").write_text("2026-03-01 12:00:00 UTC")
+    (course / "submitted" / "ben" / TOPIC / "timestamp.txt").write_text("yesterday")
+    grade(course)
+    with opened(course) as book:
+        assert book.find_submission(TOPIC, "ada").timestamp.isoformat() == "2026-03-01T12:00:00"
+        assert book.find_submission(TOPIC, "ben").timestamp is None
+
+
+# --------------------------------------------------------------------------------------------- the lab's side
+
+
+def test_only_what_a_question_allows_is_there(course):
+    lab, questions = read_lab(course, TOPIC)
+    plain = Submission("s", {"iou": "x = 1"}, {}, "", "")
+    with_torch = Submission("s", {"iou": "import torch"}, {}, "", "")
+    assert packages_for(questions["iou"], lab, plain) == ("numpy",)
+    assert packages_for(questions["iou"], lab, with_torch) == ("numpy", "torch")
+    with_scipy = Submission("s", {"iou": "x = 1", "mean_iou": "import scipy"}, {}, "", "")
+    assert packages_for(questions["iou"], lab, with_scipy) == ("numpy", "scipy")
+    assert packages_for(questions["boundary_band"], lab, with_scipy) == ("numpy",)  # which forbids it
+    strict = replace(questions["iou"], forbidden=("torch.nn.functional",))
+    assert packages_for(strict, lab, with_torch) == ("numpy",)
+
+
+def test_a_comparison_that_fails_is_a_wrong_answer_and_not_the_end(course, monkeypatch):
+    from labkit.course.grading import grade as grading
+
+    def broken(question, cases, outputs):
+        raise OverflowError("as if an output were too odd to compare")
+
+    monkeypatch.setattr(grading, "verdict", broken)
+    graded = grade(course)
+    assert [record.points for record in graded.records] == [0.0, 0.0, 0.0]
+    assert "OverflowError" in graded.records[0].results[0].flag
+
+
+@pytest.mark.bad_input
+def test_wrong_labs_and_folders_are_said(course):
+    with pytest.raises(ValueError, match="topic: expected one of"):
+        grade_course("04_oiu", course)
+    with pytest.raises(ValueError, match="released lab"):
+        grade_course("03_gradient", course)
+    with pytest.raises(ValueError, match="submissions: expected a folder"):
+        grade(course, submissions=course / "nowhere")
+    lab, questions = read_lab(course, TOPIC)
+    with pytest.raises(ValueError, match="forbids what its lab's setup cell imports"):
+        packages_for(replace(questions["iou"], forbidden=("numpy.linalg",)), lab, Submission("s", {}, {}, "", ""))
+    kit.write_lab(course, TOPIC, setup="import numpy as np\n1 / 0")
+    with pytest.raises(ValueError, match=r"setup cell does not run.*ZeroDivisionError"):
+        grade(course)
+
+
+def test_the_command_prints_a_table_and_says_by_its_status_what_to_look_at(course):
+    runner = CliRunner()
+    arguments = ["grade", TOPIC, "--course", str(course), "--seed", SECRET, "--workers", "2"]
+    done = runner.invoke(app, arguments)
+    lines = done.stdout.splitlines()
+    assert done.exit_code == 1 and lines[0].split()[0] == "student"
+    assert [line.split()[:7] for line in lines[1:3]] == [["ada", *"22223", "11"], ["ben", *"00000", "0"]]
+    assert "ended or crashed" in lines[3] and "3 students, 3 of them graded now" in lines[4]
+    os.remove(course / "submitted" / "eve" / TOPIC / f"{TOPIC}.ipynb")
+    os.rmdir(course / "submitted" / "eve" / TOPIC)
+    done = runner.invoke(app, arguments)
+    assert done.exit_code == 0 and "2 students, 0 of them graded now" in done.stdout

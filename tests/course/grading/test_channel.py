@@ -1,0 +1,123 @@
+"""Replies: what a worker writes comes back the same, and whatever else comes is refused without harm."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from labkit.course.grading import worker
+from labkit.course.grading.channel import decode
+from labkit.course.questions.judge import Problem
+
+NUMBERS = [dtype for code in "bhilqBHILQ" for dtype in (np.dtype(code),)] + [
+    np.dtype(t) for t in ("?", "f2", "f4", "f8")
+]
+arrays = st.sampled_from(NUMBERS).flatmap(
+    lambda dtype: hnp.arrays(dtype, hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=4))
+)
+
+
+def same(a, b) -> bool:
+    a, b = np.asarray(a), np.asarray(b)
+    return (
+        a.shape == b.shape and a.dtype.kind == b.dtype.kind and a.itemsize == b.itemsize and a.tobytes() == b.tobytes()
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(arrays)
+def test_an_array_comes_back_the_same(array):
+    assert same(decode(worker.encode(array)), array)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(arrays, max_size=4).map(tuple))
+def test_a_tuple_comes_back_the_same(values):
+    got = decode(worker.encode(values))
+    assert isinstance(got, tuple) and len(got) == len(values) and all(map(same, got, values))
+
+
+@settings(max_examples=30, deadline=None)
+@given(arrays)
+def test_layout_and_byte_order_do_not_matter(array):
+    odd = np.asarray(array.T, dtype=array.dtype.newbyteorder(">"), order="F")
+    assert same(decode(worker.encode(odd)), array.T)
+
+
+def test_numbers_and_tensors_come_back_as_numbers_and_arrays():
+    import torch
+
+    assert decode(worker.encode(3)) == 3 and decode(worker.encode(True)) == np.True_
+    assert decode(worker.encode(np.longdouble(0.5))) == 0.5
+    got = decode(worker.encode((torch.arange(3, dtype=torch.float32), 2.5)))
+    assert got[0].tolist() == [0.0, 1.0, 2.0] and got[0].dtype == np.float32 and got[1] == 2.5
+    assert decode(worker.encode(torch.ones(2, requires_grad=True).to_sparse().to_dense())).tolist() == [1.0, 1.0]
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.binary(max_size=80))
+def test_no_bytes_do_harm(data):
+    for reply in (data, b"V" + data, b"E" + data, b"K" + data, b"M" + data, b"D" + data):
+        try:
+            got = decode(reply)
+        except ValueError:
+            continue
+        parts = got if isinstance(got, tuple) else (got,)
+        assert all(part is None or isinstance(part, Problem | np.generic | np.ndarray) for part in parts)
+
+
+@settings(max_examples=60, deadline=None)
+@given(arrays, st.data())
+def test_a_reply_with_a_byte_more_or_less_is_refused(array, data):
+    reply = worker.encode(array)
+    cut = data.draw(st.integers(1, len(reply) - 1))
+    for forged in (reply[:cut], reply + b"\0"):
+        with pytest.raises(ValueError):
+            decode(forged)
+
+
+@pytest.mark.parametrize(
+    "forged",
+    [
+        b"V\xff" + struct.pack("<BB2q", 11, 2, 2**33, 2**31),  # overflows 64 bits
+        b"V\xff" + struct.pack("<BB2q", 11, 2, -1, -1) + bytes(8),
+        b"V\xff" + struct.pack("<BB", 12, 0) + bytes(8),  # no such dtype
+        b"V\xff" + struct.pack("<BB9q", 1, 9, *[1] * 9) + bytes(1),
+        b"V\x11" + struct.pack("<BB", 1, 0) * 17 + bytes(17),
+        b"V",
+        b"",
+        b"X",
+        b"Oh",
+        b"E\0",
+    ],
+)
+def test_forged_claims_are_refused(forged):
+    with pytest.raises(ValueError):
+        decode(forged)
+
+
+def test_truth_values_are_true_or_false():
+    got = decode(b"V\xff" + struct.pack("<BBq", 0, 1, 3) + b"\x02\x00\xff")
+    assert got.dtype == bool and got.view(np.uint8).tolist() == [1, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("reply", "says"),
+    [
+        (b"E" + struct.pack("<I", 3) + b"IndexError", "it raises IndexError"),
+        (b"E" + struct.pack("<I", 3) + b"SecretIs42", "it raises an exception"),
+        (b"E" + struct.pack("<I", 3) + b"print", "it raises an exception"),
+        (b"Kdict", "expected an array or a number, got dict"),
+        (b"KSecretIs42", "expected an array or a number, got something else"),
+        (b"KNoneType", "it returns None: is a `return` missing?"),
+        (b"Dc", "expected real numbers, got complex numbers"),
+        (b"D<b>", "expected real numbers, got records"),
+        (b"Mscipy.ndimage", "there is no module scipy.ndimage where answers are graded"),
+        (b"M<script>", "there is no module that where answers are graded"),
+    ],
+)
+def test_only_known_words_are_repeated(reply, says):
+    assert decode(reply).says == says

@@ -1,0 +1,86 @@
+"""The instructor's commands, as the page has them: from a clone to a released lab, three grades and formgrader."""
+
+import csv
+import json
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+PAGES = [page for page in (ROOT / "README.md", ROOT / "docs/grading.md") if "labkit grade 04_iou\n" in page.read_text()]
+TOKEN = "formgrader-test"
+
+
+def commands(page: Path) -> list[str]:
+    """The lines of the indented block that grades a lab."""
+    blocks = re.findall(r"(?:^    .+\n)+", page.read_text(), re.MULTILINE)
+    block = next(block for block in blocks if "labkit grade 04_iou" in block)
+    return [line.partition("  #")[0].strip() for line in block.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory):
+    """What of a clone the commands need, made and set up already."""
+    folder = tmp_path_factory.mktemp("clone")
+    for name in ("solutions/04_iou", "tests/data/submitted"):
+        shutil.copytree(ROOT / name, folder / name)
+    shutil.copy(ROOT / "nbgrader_config.py", folder)
+    shutil.copy(ROOT / ".gitignore", folder)
+    return folder
+
+
+def test_there_is_such_a_page():
+    assert PAGES
+
+
+def test_the_commands_grade_and_formgrader_shows_it(clone):
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    given = commands(PAGES[0])
+    assert given[0].startswith("make ") and given[-1] == "jupyter lab"
+    for command in given[1:-1]:
+        if command.startswith("export PATH"):
+            continue
+        done = subprocess.run(command, shell=True, cwd=clone, env=environment, capture_output=True, text=True)
+        assert done.returncode == (1 if "labkit grade" in command else 0), done.stderr
+    rows = list(csv.DictReader((clone / "grades/04_iou/grades.csv").open()))
+    points = {s: [float(row["points"]) for row in rows if row["student"] == s] for s in ("ada", "ben", "eve")}
+    assert points == {"ada": [2, 2, 2, 2, 3], "ben": [2, 0, 0, 0, 3], "eve": [2, 0, 2, 0, 0]}
+    shown = formgrader(clone, environment)
+    assert {s["student"]: s["score"] for s in shown} == {"ada": 11.0, "ben": 5.0, "eve": 4.0}
+    assert {s["student"]: s["needs_manual_grade"] for s in shown} == {"ada": True, "ben": True, "eve": True}
+    git = ["git", "-C", str(clone)]
+    subprocess.run([*git, "init", "--quiet"], check=True)
+    status = subprocess.run([*git, "status", "--short"], capture_output=True, text=True, check=True).stdout.split()
+    assert {"submitted/", "grades/", "autograded/", "gradebook.db"}.isdisjoint(status)
+
+
+def formgrader(folder: Path, environment: dict) -> list[dict]:
+    """Start JupyterLab, ask formgrader for the submissions of the lab, and stop it."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    command = ["jupyter", "lab", "--no-browser", "--allow-root", f"--port={port}", f"--IdentityProvider.token={TOKEN}"]
+    server = subprocess.Popen(
+        command, cwd=folder, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    )
+    try:
+        address = f"http://127.0.0.1:{port}/formgrader/api/submissions/04_iou?token={TOKEN}"
+        deadline = time.monotonic() + 200.0
+        while True:
+            try:
+                with urllib.request.urlopen(address, timeout=60) as page:
+                    return json.loads(page.read())
+            except (urllib.error.URLError, ConnectionError):
+                assert server.poll() is None and time.monotonic() < deadline
+                time.sleep(0.5)
+    finally:
+        server.terminate()
+        server.wait(60)

@@ -1,0 +1,185 @@
+"""A student's afternoon in a real browser: JupyterLab in Debian's Chromium, driven by Playwright.
+
+It needs the Debian package `chromium`, and skips without it. `pytest tests/course/test_browser.py --basetemp=DIR`
+leaves its screenshots in DIR.
+"""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+from time import monotonic, sleep
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CHROMIUM = shutil.which("chromium")
+TOKEN = "a-token-of-this-test"
+PATIENCE_MS = 150_000  # a kernel that imports torch on a busy machine takes its time
+
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="needs a browser: Debian's package `chromium`"),
+    pytest.mark.timeout(600),
+]
+
+SETTINGS = {
+    "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
+    "@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"},
+}
+# No dialog that recommends a build, which an extension of another package may ask for.
+SERVER = {"ServerApp": {"tornado_settings": {"page_config_data": {"buildCheck": False, "buildAvailable": False}}}}
+
+
+@pytest.fixture(scope="module")
+def jupyterlab(tmp_path_factory):
+    """JupyterLab on a copy of the course, with settings of its own; gives the URL of the server."""
+    folder = tmp_path_factory.mktemp("course")
+    for name in ("lessons", "labs"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns(".*"))
+    home = tmp_path_factory.mktemp("jupyter")
+    (home / "config/labconfig").mkdir(parents=True)
+    (home / "config/labconfig/default_setting_overrides.json").write_text(json.dumps(SETTINGS))
+    (home / "config/jupyter_server_config.json").write_text(json.dumps(SERVER))
+    places = {"CONFIG": "config", "DATA": "data", "RUNTIME": "runtime"}
+    environment = {key: value for key, value in os.environ.items() if key != "LABKIT_STRICT"}
+    environment |= {f"JUPYTER_{name}_DIR": str(home / place) for name, place in places.items()}
+    environment |= {"IPYTHONDIR": str(home / "ipython"), "JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces")}
+    environment["JUPYTERLAB_SETTINGS_DIR"] = str(home / "settings")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ip=127.0.0.1", f"--port={port}"]
+    command += ["--ServerApp.port_retries=0", f"--IdentityProvider.token={TOKEN}", f"--ServerApp.root_dir={folder}"]
+    log = (home / "log").open("w")
+    server = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
+    url = f"http://127.0.0.1:{port}"
+    try:
+        wait_for(url, server, home / "log")
+        yield url
+    finally:
+        server.terminate()  # it ends its kernels
+        try:
+            server.wait(20)
+        except subprocess.TimeoutExpired:
+            server.kill()
+            server.wait()
+        log.close()
+
+
+def wait_for(url: str, server: subprocess.Popen, log: Path) -> None:
+    """Wait until the server answers."""
+    end = monotonic() + 90
+    while True:
+        try:
+            urllib.request.urlopen(f"{url}/api?token={TOKEN}", timeout=5).close()
+            return
+        except (urllib.error.URLError, ConnectionError, TimeoutError):
+            assert server.poll() is None and monotonic() < end, log.read_text()[-2000:]
+            sleep(0.2)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """One Chromium without a window."""
+    from playwright.sync_api import sync_playwright
+
+    options = ["--no-sandbox", "--disable-dev-shm-usage"] if os.geteuid() == 0 else ["--disable-dev-shm-usage"]
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=options)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser, tmp_path):
+    """A page that remembers the errors of its console in `page.errors`, and leaves a picture of how it ended."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    page.errors = []
+    page.on("console", lambda message: page.errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    yield page
+    page.screenshot(path=tmp_path / "end.png")
+    context.close()
+
+
+def open_notebook(page, url: str, path: str) -> None:
+    """Open a notebook alone, without the side bar, and wait for its kernel."""
+    page.goto(f"{url}/lab/tree/{path}?token={TOKEN}&reset")
+    page.wait_for_selector(".jp-Notebook .jp-CodeCell")
+    page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", state="attached")
+    page.keyboard.press("Control+b")  # the side bar
+    page.wait_for_timeout(500)
+
+
+def menu(page, *entries: str) -> None:
+    """Choose an entry of JupyterLab's menus."""
+    page.click(f".lm-MenuBar-itemLabel:text-is('{entries[0]}')")
+    page.click(f".lm-Menu-itemLabel:text-is('{entries[1]}')")
+
+
+def cell_with(page, text: str):
+    """The code cell whose own text (not its output) holds a text."""
+    return page.locator(".jp-CodeCell").filter(has=page.locator(".jp-InputArea .cm-content", has_text=text)).first
+
+
+def wait_until_idle(page) -> None:
+    """Wait until no cell waits to be run."""
+    page.wait_for_function(
+        "() => ![...document.querySelectorAll('.jp-InputPrompt')].some(prompt => prompt.textContent.includes('*'))"
+        " && document.querySelector('.jp-Notebook-ExecutionIndicator').dataset.status === 'idle'"
+    )
+
+
+def test_a_blank_filled_in_lab_04_gets_its_tick(jupyterlab, page, tmp_path):
+    """Open the lab, write the solution's text into one blank, run all: a tick for it, "not yet" for the others."""
+    solution = nbformat.read(ROOT / "solutions/04_iou/04_iou.ipynb", as_version=4)
+    (answer,) = [c for c in solution.cells if c.metadata.get("nbgrader", {}).get("grade_id") == "iou"]
+    open_notebook(page, jupyterlab, "labs/04_iou/04_iou.ipynb")
+    editor = cell_with(page, "def iou(").locator(".cm-content")
+    editor.click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text("\n".join(line for line in answer.source.splitlines() if "###" not in line))
+    menu(page, "Run", "Run All Cells")
+    tick = page.locator(".jp-OutputArea-output", has_text="✔ iou is right")
+    tick.wait_for()
+    wait_until_idle(page)
+    assert page.locator(".jp-OutputArea-output", has_text="not answered yet").count() >= 2
+    assert page.locator(".jp-OutputArea-output[data-mime-type='application/vnd.jupyter.error']").count() == 0
+    cell_with(page, 'iou = check("04_iou.iou"').evaluate("cell => cell.scrollIntoView({block: 'start'})")
+    page.screenshot(path=tmp_path / "lab_04.png")
+    assert page.errors == []
+
+
+def test_a_slider_moved_in_lesson_02_changes_the_picture(jupyterlab, page, tmp_path):
+    """Run the lesson as far as its first explorer, and press an arrow key on the slider."""
+    lesson = nbformat.read(ROOT / "lessons/02_crf.ipynb", as_version=4)
+    code = [cell for cell in lesson.cells if cell.cell_type == "code"]
+    shown = [" ".join(output.get("data", {}).get("text/plain", "") for output in cell.outputs) for cell in code]
+    at = next(i for i, text in enumerate(shown) if "an explorer: " in text)
+    open_notebook(page, jupyterlab, "lessons/02_crf.ipynb")
+    cell = page.locator(".jp-CodeCell").nth(at)
+    cell.locator(".cm-content").click()
+    menu(page, "Run", "Run All Above Selected Cell")
+    page.keyboard.press("Shift+Enter")
+    cell.locator(".widget-image, .jupyter-widgets img").first.wait_for()
+    wait_until_idle(page)
+    picture = cell.locator(".jupyter-widgets img, img.jupyter-widgets").first
+    handle = cell.locator(".noUi-handle").first
+    handle.scroll_into_view_if_needed()
+    before, source = picture.screenshot(), picture.get_attribute("src")
+    handle.focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_function("([image, old]) => image.src !== old", arg=[picture.element_handle(), source])
+    page.wait_for_timeout(500)
+    assert picture.screenshot() != before
+    page.screenshot(path=tmp_path / "lesson_02.png")
+    assert page.errors == []

@@ -1,0 +1,242 @@
+"""The student's check: what it shows in a terminal and in Jupyter, what it returns; and it never stops a notebook."""
+
+import html.parser
+import re
+import subprocess
+import sys
+
+import nbformat
+import numpy as np
+import pytest
+from nbclient import NotebookClient
+from nbformat.v4 import new_code_cell, new_notebook
+
+import labkit
+from labkit import check
+from labkit.course import checking
+from labkit.course.checking import CheckFailed, Shown
+from labkit.course.questions.question import Misconception, Property, Question
+
+SECRET = 0.7312684519  # a number that only the reference knows
+
+
+def share(n):
+    """Divide by the sum."""
+    return n / n.sum() + SECRET
+
+
+QUESTION = Question(
+    name="00_test.share",
+    reference=share,
+    inputs=lambda rng: (rng.random((2, 3)) + 0.1,),
+    by_hand=((np.array([[1.0, 3.0]]),),),
+    properties=(Property("shares are not over two", lambda args, got: bool(np.max(got) <= 2)),),
+    misconceptions=(Misconception("rows", lambda n: n / n.sum(axis=1, keepdims=True), "Do all of them sum to one?"),),
+)
+
+
+@pytest.fixture(autouse=True)
+def one_question(monkeypatch):
+    """Let the check find the question above, and no environment make it strict."""
+    monkeypatch.delenv("LABKIT_STRICT", raising=False)
+    find = checking.find
+    monkeypatch.setattr(checking, "find", lambda name: QUESTION if name == QUESTION.name else find(name))
+
+
+def blank(n):
+    # your lines
+    raise NotImplementedError
+
+
+def right(n):
+    return n / np.sum(n) + SECRET
+
+
+def transposed(n):
+    total = n.sum()
+    return n.T / total
+
+
+def crash(n):
+    total = n.sum()
+    return n / total[0]
+
+
+def rows(n):
+    return n / n.sum(axis=1, keepdims=True)
+
+
+def loud(n):
+    print("hello\n" * 5000)
+    return right(n)
+
+
+def alters(n):
+    n /= n.sum()
+    return n + SECRET
+
+
+CASES = [
+    (right, "✔ share is right\n  Cases tried: 1 by hand, 4 random."),
+    (blank, "○ share: not answered yet\n  The kit's function takes its place below."),
+    (rows, "✘ share: 2 of 2 values are not right\n  In case by hand 1 of 1: share([[1, 3]]).\n"
+           "  Hint: Do all of them sum to one?"),
+    (transposed, "✘ share: expected shape (1, 2), got (2, 1)\n  In case by hand 1 of 1: share([[1, 3]])."),
+    (lambda n: n + 9, "✘ share: it should hold, but does not: shares are not over two\n"
+                      "  In case by hand 1 of 1: share([[1, 3]])."),
+    (lambda n: n > 0, "✘ share: expected real numbers, got dtype bool\n  In case by hand 1 of 1: share([[1, 3]])."),
+    (alters, "✔ share is right\n  Cases tried: 1 by hand, 4 random.\n"
+             "  Note: it alters its argument n: work on a copy, the caller needs it."),
+    (loud, "✔ share is right\n  Cases tried: 1 by hand, 4 random.\n"
+           "  It prints: hello\n  It prints: hello\n  It prints: hello\n  ..."),
+    (7, "✘ share is not a function\n  It is of type int."),
+    (None, "✘ share is not a function\n  It is of type NoneType."),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("answer, shown", CASES)
+def test_what_is_shown_in_a_terminal(answer, shown, capsys):
+    go_on = check("00_test.share", answer)
+    assert capsys.readouterr().out == shown + "\n"
+    assert go_on is (answer if shown.startswith("✔") else share)
+
+
+def test_a_strict_check_raises_what_it_would_show(monkeypatch):
+    monkeypatch.setenv("LABKIT_STRICT", "1")
+    for answer, shown in CASES:
+        if shown.startswith("✔"):
+            assert check("00_test.share", answer) is answer
+        else:
+            with pytest.raises(CheckFailed, match=re.escape(shown.splitlines()[0])):
+                check("00_test.share", answer)
+
+
+def test_an_exception_shows_the_students_line(capsys):
+    check("00_test.share", crash)
+    first, second, *_ = capsys.readouterr().out.splitlines()
+    assert first.startswith("✘ share: IndexError: invalid index to scalar variable")
+    assert second == f"  line {crash.__code__.co_firstlineno + 2}:  return n / total[0]"
+
+
+def test_whatever_an_answer_raises_or_is_the_notebook_goes_on(capsys):
+    def leave(n):
+        sys.exit(1)
+
+    def stop(n):
+        raise KeyboardInterrupt
+
+    def again(n):
+        return again(n)
+
+    def itself(n):
+        return itself
+
+    for answer in (leave, stop, again, itself, print, np.linalg.inv, type, dict, lambda: 0, lambda *n: n):
+        assert check("00_test.share", answer) is share
+        assert capsys.readouterr().out.startswith("✘ share")
+
+
+def test_an_endless_loop_is_ended(monkeypatch, capsys):
+    monkeypatch.setattr(checking, "LIMIT_S", 0.2)
+
+    def endless(n):
+        while True:
+            n = n + 1
+
+    assert check("00_test.share", endless) is share
+    assert "did not return in time" in capsys.readouterr().out
+
+
+def test_the_kits_function_is_not_taken_for_the_students(capsys):
+    """The check's cell run twice gets its own function the second time, and must not praise it."""
+    go_on = check("00_test.share", blank)
+    assert check("00_test.share", go_on) is share
+    assert "this is the kit's function, not yours" in capsys.readouterr().out
+
+
+def test_an_unknown_question_is_said_and_the_answer_goes_on(capsys):
+    assert check("04_iou.no_such", right) is right
+    assert "expected one of 04_iou." in capsys.readouterr().out
+    assert check("no_topic.iou", right) is right
+
+
+def test_nothing_shown_comes_from_the_reference(capsys, monkeypatch):
+    """Wrong by a little, by a lot, in shape, in kind: its digits are never shown, in text or in HTML."""
+    shown = []
+    monkeypatch.setattr(checking, "conclude", lambda what, *rest: shown.append(what) or share)
+    for answer in (blank, rows, transposed, crash, lambda n: share(n) * 1.01, lambda n: share(n)[0], lambda n: None):
+        check("00_test.share", answer)
+    text = " ".join(repr(what) + what._repr_html_() for what in shown)
+    references = [share(case) for case in (np.array([[1.0, 3.0]]),)]
+    digits = {f"{value:.4g}" for value in np.ravel(references)} | {"0.731"}
+    assert len(shown) == 7 and not [number for number in digits if number in text]
+
+
+# ------------------------------------------------------------------------------------------ in Jupyter
+
+
+class Tags(html.parser.HTMLParser):
+    """Collects the text, and checks that tags are closed in order."""
+
+    def __init__(self, source):
+        super().__init__()
+        self.open, self.text = [], ""
+        self.feed(source)
+
+    def handle_starttag(self, tag, attrs):
+        if tag != "br":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_html_says_the_same_in_colour_and_escapes_what_students_write():
+    shown = Shown("✘", "share: NameError: <b>x</b>", "line 2:  return a < b & c", "Hint: 'why'?")
+    tags = Tags(shown._repr_html_())
+    assert tags.open == []
+    assert tags.text == "✘ share: NameError: <b>x</b>line 2:  return a < b & cHint: 'why'?"
+    colours = {mark: Shown(mark, "x")._repr_html_() for mark in "✔✘○"}
+    assert len(set(re.findall(r"#[0-9a-f]{6}", "".join(colours.values())))) == 3
+
+
+def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
+    """In a real kernel: one display a check, the student's line as it stands in the cell, then the kit's function."""
+    cells = [
+        "from labkit import check\nimport numpy as np",
+        "def iou(n):\n    raise NotImplementedError",
+        "iou = check('04_iou.iou', iou)\nprint(iou(np.eye(2, dtype=int)))",
+        "def helper(n):\n    return n[99]\n",
+        "def iou(n):\n    x = 1\n    return helper(n)",
+        "iou = check('04_iou.iou', iou)",
+        "def iou(n):\n    while True: pass",
+        "import labkit.course.checking; labkit.course.checking.LIMIT_S = 0.3\niou = check('04_iou.iou', iou)",
+        "def iou(n):\n    i = np.diag(n)\n    with np.errstate(invalid='ignore'):\n"
+        "        return i / (n.sum(0) + n.sum(1) - i)",
+        "mine = iou\niou = check('04_iou.iou', iou)\nprint(iou is mine)",
+    ]
+    notebook = new_notebook(cells=[new_code_cell(cell) for cell in cells])
+    NotebookClient(
+        notebook, timeout=60, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
+    outputs = [cell.outputs for cell in notebook.cells]
+    shown = [[o.data["text/plain"] for o in cell if o.output_type == "display_data"] for cell in outputs]
+    assert [len(texts) for texts in shown] == [0, 0, 1, 0, 0, 1, 0, 1, 0, 1]
+    assert shown[2][0].startswith("○ iou: not answered yet")
+    assert "[1. 1.]" in outputs[2][-1].text
+    assert "IndexError" in shown[5][0] and "line 2:  return n[99]" in shown[5][0]
+    assert "did not return in time" in shown[7][0]
+    assert shown[9][0].startswith("✔ iou is right") and outputs[9][-1].text == "True\n"
+    assert "text/html" in outputs[9][0].data
+    assert not [o for cell in outputs for o in cell if o.output_type == "stream" and o.name == "stderr"]
+    nbformat.validate(notebook)
+
+
+def test_importing_labkit_is_cheap():
+    code = "import sys, labkit; print([m for m in ('numpy', 'torch', 'IPython', 'cv2') if m in sys.modules])"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown == "[]\n"
+    assert labkit.check.__doc__

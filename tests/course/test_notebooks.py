@@ -1,0 +1,352 @@
+"""Facts about the notebooks as files: what a lesson and a lab hold, that names and links in them lead somewhere.
+
+That they run, and give the outputs that are committed, is nbval's part of `make test`; a test here spoils an output and
+sees nbval fail.
+"""
+
+import ast
+import base64
+import importlib
+import re
+import shlex
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from labkit.course.checking import describe
+from labkit.course.questions.question import TOPICS, of_topic
+from labkit.course.questions.run import Printed, judge
+from labkit.course.release import mistakes, release
+
+ROOT = Path(__file__).parents[2]
+LESSONS = [ROOT / "lessons" / f"{topic}.ipynb" for topic in TOPICS]
+SOLUTIONS = [ROOT / "solutions" / topic / f"{topic}.ipynb" for topic in TOPICS]
+LABS = [ROOT / "labs" / topic / f"{topic}.ipynb" for topic in TOPICS]
+MAX_LINES, MAX_PNG = 25, 150_000
+# Names that are undefined or unused, statements that do nothing or not what they seem, old NumPy, errors of syntax.
+RULES = "E4,E7,E9,F,W,B,PLE,NPY,UP"
+
+
+def each(paths):
+    """Run a test once a notebook, named by its folder and topic."""
+    return pytest.mark.parametrize("path", paths, ids=[f"{p.relative_to(ROOT).parts[0]}-{p.stem}" for p in paths])
+
+
+@cache
+def notebook(path: Path):
+    """Read a notebook once."""
+    return nbformat.read(path, as_version=4)
+
+
+def code(path: Path) -> list:
+    """The code cells that have something in them."""
+    return [cell for cell in notebook(path).cells if cell.cell_type == "code" and cell.source.strip()]
+
+
+def prose(path: Path) -> str:
+    """All Markdown of a notebook."""
+    return "\n\n".join(cell.source for cell in notebook(path).cells if cell.cell_type == "markdown")
+
+
+def tags(cell) -> set[str]:
+    """The tags of a cell."""
+    return set(cell.metadata.get("tags", []))
+
+
+# ------------------------------------------------------------------------------------------ all notebooks
+
+
+def test_there_is_one_of_each_for_every_topic_and_none_besides():
+    found = {path for kind in ("lessons", "solutions", "labs") for path in (ROOT / kind).rglob("*.ipynb")}
+    found = {path for path in found if ".ipynb_checkpoints" not in path.parts}
+    assert found == {*LESSONS, *SOLUTIONS, *LABS}
+
+
+@each([*LESSONS, *SOLUTIONS, *LABS])
+def test_cells_are_short(path):
+    for cell in code(path):
+        assert len(cell.source.splitlines()) <= MAX_LINES, cell.source[:200]
+
+
+def ruff(paths: list[Path], *options: str) -> str:
+    """What ruff says about the cells of notebooks."""
+    command = [sys.executable, "-m", "ruff", "check", "--isolated", "--no-cache", "--line-length", "120"]
+    command += ["--select", RULES, "--target-version", "py311", "--output-format", "concise", *options]
+    done = subprocess.run([*command, *map(str, paths)], cwd=ROOT, capture_output=True, text=True)
+    return done.stdout if done.returncode else ""
+
+
+def test_cells_are_free_of_lint():
+    assert not ruff([*LESSONS, *SOLUTIONS])
+    assert not ruff(LABS, "--ignore", "F401,F841")  # what the missing answers would have used
+
+
+def test_prose_is_spelled_as_in_the_dictionary(tmp_path):
+    for path in (*LESSONS, *SOLUTIONS):
+        # Formulas, code and targets of links are not words.
+        text = re.sub(r"\$\$.*?\$\$|\$[^$\n]*\$|```.*?```|`[^`\n]*`|\]\([^)]*\)", " ", prose(path), flags=re.DOTALL)
+        (tmp_path / f"{path.parent.name}-{path.stem}.txt").write_text(text)
+    done = subprocess.run([sys.executable, "-m", "codespell_lib", str(tmp_path)], capture_output=True, text=True)
+    assert done.returncode == 0 and not done.stdout, done.stdout + done.stderr
+
+
+@each([*LESSONS, *SOLUTIONS, *LABS])
+def test_links_lead_to_files_and_headings(path):
+    text = prose(path)
+    headings = {re.sub(r"\s+", "-", h.strip()) for h in re.findall(r"^#+ (.+)$", text, re.MULTILINE)}
+    targets = re.findall(r"\]\(([^)\s]+)", text) + re.findall(r"(?:src|href)=[\"']([^\"']+)", text)
+    for target in targets:
+        if target.startswith("#"):
+            assert target[1:] in headings, target
+        elif not re.match(r"https?://|mailto:|attachment:|data:", target):
+            assert (path.parent / target.partition("#")[0]).exists(), target
+
+
+# --------------------------------------------------------------------------------- names that notebooks use
+
+
+def resolve(dotted: str) -> None:
+    """Raise if a dotted name of labkit or data_gen leads nowhere."""
+    parts = dotted.split(".")
+    found = importlib.import_module(parts[0])
+    for i, part in enumerate(parts[1:], start=2):
+        if not hasattr(found, part):
+            found = importlib.import_module(".".join(parts[:i]))
+        else:
+            found = getattr(found, part)
+        if not hasattr(found, "__path__") and not isinstance(found, type(sys)) and not isinstance(found, type):
+            return  # an object: its attributes are its own business
+
+
+def names(source: str) -> set[str]:
+    """Dotted names of labkit and data_gen that a notebook's code uses, its aliases written out."""
+    tree, ours, found = ast.parse(source), {}, set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] in ("labkit", "data_gen"):
+            ours |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.split(".")[0] in ("labkit", "data_gen"):
+                    found.add(alias.name)
+                    root = alias.name.split(".")[0]
+                    ours[alias.asname or root] = alias.name if alias.asname else root
+    found |= {name for name in ours.values() if "." in name}
+    for node in ast.walk(tree):
+        chain, attributes = node, []
+        while isinstance(chain, ast.Attribute):
+            attributes.insert(0, chain.attr)
+            chain = chain.value
+        if attributes and isinstance(chain, ast.Name) and chain.id in ours:
+            found.add(".".join((ours[chain.id], *attributes)))
+    return found
+
+
+@each([*LESSONS, *SOLUTIONS, *LABS])
+def test_every_symbol_that_a_notebook_names_exists(path):
+    source = "\n".join(re.sub(r"^[!%].*$", "pass", cell.source, flags=re.MULTILINE) for cell in code(path))
+    named = names(source) | set(re.findall(r"`((?:labkit|data_gen)(?:\.\w+)+)", prose(path)))
+    assert path in LABS or any(name.startswith("labkit.") for name in named)
+    for name in sorted(named):
+        resolve(name)
+
+
+def test_a_symbol_that_does_not_exist_is_found():
+    source = (
+        "import labkit.course.plots as p\nfrom labkit import metrics\nimport data_gen\nmetrics.iou(1).x\np.no.thing"
+    )
+    assert names(source) == {
+        "labkit.course.plots",
+        "labkit.metrics",
+        "labkit.metrics.iou",
+        "labkit.course.plots.no.thing",
+        "labkit.course.plots.no",
+        "data_gen",
+    }
+    resolve("labkit.metrics.iou")
+    resolve("labkit.frame.RGBDFrame.from_files")
+    for wrong in ("labkit.course.plots.no", "labkit.no", "labkit.frame.RGBDFrame.no", "data_gen.no"):
+        with pytest.raises((ImportError, AttributeError)):
+            resolve(wrong)
+
+
+# --------------------------------------------------------------------------------------------- lessons
+
+
+@each([*LESSONS, *SOLUTIONS])
+def test_it_was_run_from_top_to_bottom_without_an_error(path):
+    assert [cell.execution_count for cell in code(path)] == list(range(1, len(code(path)) + 1))
+    outputs = [output for cell in code(path) for output in cell.outputs]
+    assert not [output.evalue for output in outputs if output.output_type == "error"]
+    said = "".join(output.text for output in outputs if output.get("name") == "stderr")
+    assert not re.search("Warning|Traceback|build time", said), said[:300]
+
+
+def pictures(path: Path) -> list[bytes]:
+    """The PNG pictures among a notebook's outputs."""
+    data = [output.get("data", {}) for cell in code(path) for output in cell.outputs]
+    return [base64.b64decode(d["image/png"]) for d in data if "image/png" in d]
+
+
+@each([*LESSONS, *SOLUTIONS])
+def test_pictures_are_there_and_small(path):
+    found = pictures(path)
+    assert len(found) >= 2
+    for picture in found:
+        assert picture.startswith(b"\x89PNG") and len(picture) < MAX_PNG, f"{len(picture)} bytes"
+
+
+@each(LESSONS)
+def test_a_lesson_has_an_explorer(path):
+    texts = [output.get("data", {}).get("text/plain", "") for cell in code(path) for output in cell.outputs]
+    assert any(text.startswith("an explorer: ") for text in texts)
+    assert "labkit.course.widgets" in "".join(cell.source for cell in code(path))
+
+
+def is_compared(cell) -> bool:
+    """Whether nbval compares something of a cell's output."""
+    ignored = tags(cell) & {"nbval-ignore-output", "nbval-skip"} or "NBVAL_IGNORE_OUTPUT" in cell.source
+    texts = [o for o in cell.outputs if o.get("name") == "stdout" or "text/plain" in o.get("data", {})]
+    return bool(texts) and not ignored and cell.execution_count is not None
+
+
+@each(LESSONS)
+def test_at_least_half_of_the_cells_with_output_are_compared(path):
+    shown = [cell for cell in code(path) if cell.outputs]
+    assert 2 * sum(map(is_compared, shown)) >= len(shown)
+
+
+@each([*LESSONS, *SOLUTIONS])
+def test_compared_outputs_hold_no_address_and_no_time(path):
+    for cell in filter(is_compared, code(path)):
+        text = "".join(output.get("text", output.get("data", {}).get("text/plain", "")) for output in cell.outputs)
+        assert not re.search(r"0x[0-9a-f]{6,}|\bit/s|\d:\d\d<", text), text[:200]
+
+
+@each([*LESSONS, *SOLUTIONS])
+def test_it_says_early_how_many_minutes_it_takes(path):
+    first = "\n".join(cell.source for cell in notebook(path).cells[: 3 if path in LESSONS else 6])
+    assert re.search(r"\d+ (?:to \d+ )?min", first)
+
+
+@each(LESSONS)
+def test_a_lesson_asks_and_leads_on(path):
+    """Predictions with folded answers, references to read, and the way to the lab."""
+    text = prose(path)
+    assert text.count("<details") >= 5 and text.count("<details") == text.count("</details>")
+    assert f"labs/{path.stem}" in text
+    assert re.search(r"read (?:next|on|more)|further reading|to read|references", text, re.IGNORECASE)
+
+
+# ------------------------------------------------------------------------------------------------ labs
+
+
+def graded(path: Path) -> dict:
+    """The cells that have a grade id, by it."""
+    return {c.metadata.nbgrader.grade_id: c for c in notebook(path).cells if "nbgrader" in c.metadata}
+
+
+def answer(path: Path, function: str):
+    """A lab's or a solution's function: its own cell, run after the setup cell, as the grader does."""
+    cells, namespace = graded(path), {"__name__": "__main__"}
+    for name in ("setup", function):
+        exec(compile(cells[name].source, f"<{path.stem} {name}>", "exec"), namespace)
+    return namespace[function]
+
+
+@each(SOLUTIONS)
+def test_a_solution_is_an_assignment(path):
+    assert mistakes(notebook(path), path.stem) == []
+    cells = graded(path).values()
+    written = [c for c in cells if c.cell_type == "markdown" and c.metadata.nbgrader.grade]
+    assert len(written) >= 1 and all(c.metadata.nbgrader.points > 0 for c in written)
+    assert prose(path).count("<details") >= 3 * len(of_topic(path.stem))
+
+
+@each(SOLUTIONS)
+def test_each_blank_is_followed_by_its_own_check(path):
+    for function, question in of_topic(path.stem).items():
+        call = rf"^{function} = check\(\"{re.escape(question.name)}\", {function}\)"
+        assert re.search(call, graded(path)[f"check_{function}"].source, re.MULTILINE)
+        (definition,) = [
+            node
+            for node in ast.parse(graded(path)[function].source).body
+            if isinstance(node, ast.FunctionDef) and node.name == function
+        ]
+        assert len(ast.get_docstring(definition) or "") > 60, function
+
+
+@each(LABS)
+def test_every_blank_fails_its_own_check_and_says_that_it_is_one(path):
+    for function, question in of_topic(path.stem).items():
+        verdict = judge(question, answer(path, function), seed=0)
+        shown = repr(describe(question, verdict, Printed()))
+        assert not verdict.passed and shown.startswith(f"○ {function}: not answered yet")
+
+
+@each(SOLUTIONS)
+def test_every_solution_passes(path):
+    for function, question in of_topic(path.stem).items():
+        for seed in (0, 20_260_102):
+            verdict = judge(question, answer(path, function), seed)
+            assert verdict.passed and not verdict.notes, (function, seed, verdict)
+
+
+def test_labs_and_what_they_come_from_are_as_the_release_makes_them():
+    assert release(ROOT, check=True) == []
+
+
+# ------------------------------------------------------------------------------------------------ nbval
+
+
+def nbval_options(folder: str) -> list[str]:
+    """The options with which `make test` runs the notebooks of a folder."""
+    planned = subprocess.run(["make", "-n", "-o", ".venv/installed", "test"], cwd=ROOT, capture_output=True, text=True)
+    (line,) = [line for line in planned.stdout.splitlines() if "--nbval" in line and folder in line.split()]
+    words = shlex.split(line)
+    return [words[i] for i in range(len(words)) if words[i].startswith("--nbval") or words[i - 1].endswith("-timeout")]
+
+
+def test_make_test_compares_lessons_and_solutions_and_runs_labs():
+    for folder in ("lessons", "solutions"):
+        assert {"--nbval", "--nbval-current-env"} <= set(nbval_options(folder))
+    assert {"--nbval-lax", "--nbval-current-env"} <= set(nbval_options("labs"))
+
+
+def nbval(path: Path) -> subprocess.CompletedProcess:
+    """Run nbval on a notebook as `make test` does on lessons."""
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:xdist",
+        *nbval_options("lessons"),
+    ]
+    return subprocess.run([*command, path.name], cwd=path.parent, capture_output=True, text=True)
+
+
+def test_nbval_fails_when_a_compared_output_changes(tmp_path):
+    """On the beginning of a lesson, to its first compared printed output: as it is, and with one digit changed."""
+    lesson = nbformat.from_dict(notebook(ROOT / "lessons" / "04_iou.ipynb"))
+    printing = [
+        i
+        for i, cell in enumerate(lesson.cells)
+        if cell.cell_type == "code" and is_compared(cell) and re.search(r"\d", cell.outputs[0].get("text", ""))
+    ]
+    lesson.cells = lesson.cells[: printing[0] + 1]
+    path = tmp_path / "lesson.ipynb"
+    nbformat.write(lesson, path)
+    done = nbval(path)
+    assert done.returncode == 0, done.stdout
+    output = lesson.cells[-1].outputs[0]
+    output.text = re.sub(r"\d", lambda digit: str((int(digit[0]) + 1) % 10), output.text, count=1)
+    nbformat.write(lesson, path)
+    done = nbval(path)
+    assert done.returncode == 1 and "1 failed" in done.stdout, done.stdout

@@ -1,0 +1,292 @@
+"""Releasing: the labs that students get, the same bytes each time, nothing volatile in them, all or nothing."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+
+from labkit.apps import cli
+from labkit.course import release as module
+from labkit.course.questions.question import of_topic
+from labkit.course.release import mistakes, read, release, tidy, to_bytes
+
+SOLUTION = '''def double(x):
+    """Twice x, an array."""
+    ### BEGIN SOLUTION
+    return 2 * x
+    ### END SOLUTION'''
+
+
+def graded(cell, grade_id, *, grade=False, solution=False, locked=False, points=None):
+    """Mark a cell as nbgrader's formgrader would."""
+    data = {"grade": grade, "solution": solution, "locked": locked, "task": False, "schema_version": 3}
+    cell.metadata["nbgrader"] = data | {"grade_id": grade_id} | ({} if points is None else {"points": points})
+    return cell
+
+
+def solution_notebook(source=SOLUTION, function="double", points=2):
+    """A solution with one answer, as authors leave it: run, with times, widgets and the version of Python."""
+    run = {"execution": {"iopub.execute_input": "2026-01-01T00:00:00Z"}, "tags": ["nbval-ignore-output"]}
+    view = {"application/vnd.jupyter.widget-view+json": {"model_id": "ab"}, "text/plain": "a slider"}
+    outputs = [new_output("display_data", view, metadata={"isolated": True}), new_output("stream", text="6\n")]
+    cells = [
+        new_markdown_cell("# Double"),
+        graded(new_code_cell("import numpy as np", execution_count=1), "setup", locked=True),
+        graded(new_code_cell(source, execution_count=2), function, solution=True),
+        graded(new_code_cell("print(6)"), f"check_{function}", grade=True, locked=True, points=points),
+        new_code_cell("show()", execution_count=3, metadata=run, outputs=outputs),
+        new_code_cell("show()", execution_count=4),
+        graded(new_markdown_cell("Because it is."), "why", grade=True, solution=True, points=3),
+    ]
+    metadata = {"language_info": {"name": "python", "version": "3.11.2"}, "widgets": {"state": {}}}
+    return new_notebook(cells=cells, metadata=metadata)
+
+
+@pytest.fixture
+def course(tmp_path):
+    """A course of two labs and a lesson, none of the kit's topics."""
+    for topic in ("90_one", "91_two"):
+        folder = tmp_path / "solutions" / topic
+        folder.mkdir(parents=True)
+        nbformat.write(solution_notebook(), folder / f"{topic}.ipynb")
+    (tmp_path / "solutions/90_one/table.csv").write_text("1,2\n")
+    (tmp_path / "lessons").mkdir()
+    nbformat.write(solution_notebook(), tmp_path / "lessons/90_one.ipynb")
+    return tmp_path
+
+
+def snapshot(folder: Path) -> dict[str, bytes]:
+    """All files of a folder."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def spoil(path: Path, old: str, new: str) -> None:
+    """Change a file's text."""
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+# --------------------------------------------------------------------------------------------- the lab
+
+
+def test_a_lab_has_blanks_that_raise_and_nothing_of_the_solution(course):
+    release(course)
+    lab = read(course / "labs/90_one/90_one.ipynb")
+    by_id = {cell.metadata.nbgrader.grade_id: cell for cell in lab.cells if "nbgrader" in cell.metadata}
+    blank = SOLUTION[: SOLUTION.index("### BEGIN")] + "# your lines\n    raise NotImplementedError"
+    assert by_id["double"].source == blank
+    assert by_id["why"].source == "*Your answer.*"
+    assert "2 * x" not in str(lab) and "Because" not in str(lab)
+    assert all(not cell.get("outputs") and cell.get("execution_count") is None for cell in lab.cells)
+    assert (course / "labs/90_one/table.csv").read_text() == "1,2\n"
+
+
+def test_a_lab_is_an_assignment_to_nbgrader(course):
+    """Locked cells cannot be edited, none can be deleted, and the checksums are nbgrader's own."""
+    from nbgrader.utils import compute_checksum
+    from nbgrader.validator import Validator
+
+    release(course)
+    path = course / "labs/90_one/90_one.ipynb"
+    lab = read(path)
+    cells = {cell.metadata.nbgrader.grade_id: cell for cell in lab.cells if "nbgrader" in cell.metadata}
+    assert {name for name, cell in cells.items() if cell.metadata.get("editable", True)} == {"double", "why"}
+    assert not any(cell.metadata.get("deletable", True) for cell in cells.values())
+    for cell in cells.values():
+        assert cell.metadata.nbgrader.checksum == compute_checksum(cell)
+    assert cells["check_double"].metadata.nbgrader.points == 2 and cells["why"].metadata.nbgrader.points == 3
+    changed = Validator()._get_changed_cells(lab)
+    assert changed == []
+
+
+def test_cells_of_a_lab_are_found_again_in_its_solution(course):
+    release(course)
+    lab, solution = (read(course / f"{kind}/90_one/90_one.ipynb") for kind in ("labs", "solutions"))
+    ids = [cell.id for cell in solution.cells]
+    assert [cell.id for cell in lab.cells] == ids and len(set(ids)) == len(ids)
+    assert ids[1:4] == ["setup", "double", "check_double"] and ids[5] == f"{ids[4]}-2"
+
+
+# -------------------------------------------------------------------------------------------- the same
+
+
+def test_the_same_bytes_every_time_whoever_ran_the_notebooks(course):
+    first = release(course)
+    names = [str(path.relative_to(course)) for path in first]
+    assert names == [
+        "lessons/90_one.ipynb",
+        "solutions/90_one/90_one.ipynb",
+        "solutions/91_two/91_two.ipynb",
+        "labs/90_one/90_one.ipynb",
+        "labs/90_one/table.csv",
+        "labs/91_two/91_two.ipynb",
+    ]
+    before = snapshot(course)
+    assert release(course) == [] and release(course, check=True) == []
+    again = read(course / "solutions/90_one/90_one.ipynb")
+    for number, cell in enumerate(again.cells):
+        cell["id"] = f"random-{number}"
+        cell.metadata["execution"] = {"iopub.status.busy": "2027-01-01T00:00:00Z"}
+    again.metadata.language_info["version"] = "3.11.9"
+    nbformat.write(again, course / "solutions/90_one/90_one.ipynb")
+    assert release(course) == [course / "solutions/90_one/90_one.ipynb"]
+    assert snapshot(course) == before
+
+
+def test_tidying_keeps_outputs_tags_and_counts():
+    tidied = tidy(solution_notebook())
+    cell = tidied.cells[4]
+    assert cell.outputs[0].data == {"text/plain": "a slider"} and cell.outputs[0].metadata == {}
+    assert cell.outputs[1].text == "6\n" and cell.execution_count == 3
+    assert cell.metadata == {"tags": ["nbval-ignore-output"]}
+    assert tidied.metadata.language_info == {"name": "python"} and "widgets" not in tidied.metadata
+    assert to_bytes(tidy(tidied)) == to_bytes(tidied)
+
+
+def test_tidying_leaves_its_argument_alone():
+    notebook = solution_notebook()
+    before = str(notebook)
+    tidy(notebook)
+    assert str(notebook) == before
+
+
+@pytest.mark.parametrize(
+    "path, old, new",
+    [
+        ("labs/90_one/90_one.ipynb", "raise NotImplementedError", "return 2 * x"),
+        ("labs/90_one/table.csv", "1,2", "1,3"),
+        ("solutions/91_two/91_two.ipynb", "2 * x", "x + x + 0"),
+        ("lessons/90_one.ipynb", '"tags"', '"ExecuteTime": 3, "tags"'),
+    ],
+)
+def test_drift_is_named_and_left_as_it_is_by_check(course, path, old, new, monkeypatch, capsys):
+    release(course)
+    spoil(course / path, old, new)
+    before = snapshot(course)
+    monkeypatch.setattr(sys, "argv", ["labkit", "release", "--check", "--course", str(course)])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    drift = [line.split(":")[0] for line in capsys.readouterr().out.splitlines()]
+    if path == "solutions/91_two/91_two.ipynb":
+        assert stop.value.code == 0  # another right solution gives the same lab
+    else:
+        assert stop.value.code == 1 and drift == [str(course / path)]
+    assert snapshot(course) == before
+
+
+def test_what_belongs_to_no_solution_is_removed(course):
+    release(course)
+    (course / "labs/89_gone").mkdir()
+    (course / "labs/89_gone/89_gone.ipynb").touch()
+    (course / "labs/90_one/mine.txt").touch()
+    gone = [course / "labs/90_one/mine.txt", course / "labs/89_gone/89_gone.ipynb"]
+    assert release(course, check=True) == gone and release(course, ["91_two"]) == []
+    assert release(course) == gone
+    assert sorted(path.name for path in (course / "labs").iterdir()) == ["90_one", "91_two"]
+
+
+def test_only_the_topics_that_are_asked_for(course):
+    release(course, ["91_two"])
+    assert [path.name for path in (course / "labs").iterdir()] == ["91_two"]
+    with pytest.raises(ValueError, match=r"topics: expected some of 90_one, 91_two, got 92_three"):
+        release(course, ["92_three"])
+    with pytest.raises(ValueError, match="course: expected a folder with solutions"):
+        release(course / "labs")
+
+
+# --------------------------------------------------------------------------------------- all or nothing
+
+
+@pytest.mark.parametrize("text", ["not a notebook", '{"cells": []}'])
+def test_a_broken_solution_changes_nothing(course, text):
+    release(course)
+    spoil(course / "solutions/90_one/90_one.ipynb", "Twice", "Two times")
+    (course / "solutions/91_two/91_two.ipynb").write_text(text)
+    before = snapshot(course)
+    with pytest.raises(ValueError, match="91_two"):
+        release(course)
+    assert snapshot(course) == before
+
+
+def test_a_failure_while_folders_are_replaced_puts_them_back(course, monkeypatch):
+    release(course)
+    for topic in ("90_one", "91_two"):
+        spoil(course / f"solutions/{topic}/{topic}.ipynb", "Twice", "Two times")
+    before = snapshot(course)
+    rename, done = os.rename, []
+
+    def fails_once(a, b):
+        done.append(b)
+        if len(done) == 4:
+            raise OSError(28, "No space left on device")
+        rename(a, b)
+
+    monkeypatch.setattr(module.os, "rename", fails_once)
+    with pytest.raises(OSError, match="No space"):
+        release(course)
+    assert snapshot(course) == before and len(done) > 4
+
+
+def test_nbgraders_own_complaint_is_passed_on(course):
+    path = course / "solutions/90_one/90_one.ipynb"
+    notebook = read(path)
+    notebook.cells.append(new_code_cell("### BEGIN SOLUTION\nx = 1\n### END SOLUTION"))
+    nbformat.write(notebook, path)
+    with pytest.raises(ValueError, match=r"nbgrader could not make the lab.*olution"):
+        release(course)
+    assert not (course / "labs").exists()
+
+
+# ------------------------------------------------------------------------------- what an assignment must be
+
+
+def test_an_assignment_without_mistakes():
+    assert mistakes(solution_notebook(), "90_one") == []
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"source": SOLUTION.replace("double", "twice")}, "cell double defines no function double"),
+        ({"source": "def double(x:"}, "cell double defines no function double"),
+        ({"source": "def double(x):\n    return 2 * x"}, "cell double marks no solution"),
+        ({"function": "setup"}, "grade id setup occurs twice"),
+    ],
+)
+def test_mistakes_of_answer_cells(changes, said):
+    assert said in mistakes(solution_notebook(**changes), "90_one")
+
+
+def test_mistakes_of_other_cells():
+    notebook = solution_notebook()
+    del notebook.cells[3], notebook.cells[1]
+    assert mistakes(notebook, "90_one") == [
+        "its first graded cell is not a locked `setup`",
+        "double has no tests cell check_double",
+    ]
+    del notebook.cells[1]
+    notebook.cells.insert(0, graded(new_code_cell("1"), "check_double", grade=True, locked=True, points=1))
+    assert "check_double tests no answer" in mistakes(notebook, "90_one")
+
+
+def test_a_topic_of_the_kit_answers_all_its_questions_for_their_points():
+    questions = of_topic("04_iou")
+    iou = questions["iou"]
+    wrong_points = solution_notebook(SOLUTION.replace("double", "iou"), "iou", points=iou.points + 1)
+    said = mistakes(wrong_points, "04_iou")
+    assert f"check_iou has {iou.points + 1} points, its question {iou.points}" in said
+    assert {f"no cell answers 04_iou.{name}" for name in questions if name != "iou"} <= set(said)
+    assert "there is no question 04_iou.double" in mistakes(solution_notebook(), "04_iou")
+
+
+def test_the_command_runs_by_itself(course):
+    done = subprocess.run(
+        [sys.executable, "-m", "labkit.apps.cli", "release", "90_one"], cwd=course, capture_output=True
+    )
+    assert done.returncode == 0 and b"changed labs/90_one/90_one.ipynb" in done.stdout, done.stderr
+    assert done.stderr == b""

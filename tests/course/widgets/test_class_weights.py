@@ -1,0 +1,98 @@
+"""The explorers of 05_class_weights: boundaries and scores against sampling and counting, and controls that redraw."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from labkit.course.widgets import class_weights
+from labkit.frame import RGBDFrame
+from labkit.labels import TARGET
+from labkit.losses import softmax, weighted_optimum
+
+
+def drawn(explorer):
+    """Draw an explorer's picture as it stands on a figure that can be asked."""
+    figure = Figure(explorer.size)
+    explorer.draw(figure, **explorer.values)
+    return figure
+
+
+@pytest.mark.parametrize(("distance", "share", "weight"), [(2.0, 0.02, 1.0), (2.0, 0.02, 49.0), (1.0, 0.3, 0.5)])
+def test_scores_of_the_gaussians_are_those_of_drawn_pixels(distance, share, weight):
+    rng = np.random.default_rng(0)
+    y = rng.random(400_000) < share
+    x = rng.normal(size=y.size) + distance * y
+    p = np.stack([(1 - share) * np.exp(-(x**2) / 2), share * np.exp(-((x - distance) ** 2) / 2)], axis=-1)
+    p /= p.sum(axis=-1, keepdims=True)
+    said = weighted_optimum(p, np.array([1.0, weight])).argmax(axis=-1) == 1
+    boundary, precision, recall, overlap = class_weights.gaussian_scores(distance, share, np.array([weight]))
+    np.testing.assert_array_equal(said, x > boundary)
+    both = (said & y).sum()
+    counted = [both / said.sum(), both / y.sum(), both / (said | y).sum()]
+    np.testing.assert_allclose([precision[0], recall[0], overlap[0]], counted, atol=0.03)
+
+
+def test_a_heavier_class_moves_the_boundary_away_from_itself_and_pays_for_recall_with_precision():
+    boundary, precision, recall, overlap = class_weights.gaussian_scores(2.0, 0.02, 2.0**class_weights.EXPONENTS)
+    assert (np.diff(boundary) < 0).all() and (np.diff(recall) > 0).all() and (np.diff(precision) < 0).all()
+    assert 0 < overlap.argmax() < overlap.size - 1
+
+
+def test_each_control_of_the_gaussians_changes_the_picture():
+    explorer = class_weights.two_gaussians()
+    assert drawn(explorer).axes[0].get_title() == "boundary at 2.95"
+    for name, value in (("exponent", 5.5), ("distance", 3.0), ("share", 0.1)):
+        before = explorer.png
+        explorer.controls[name].value = value
+        assert explorer.png != before, name
+    assert drawn(explorer).axes[0].get_title() == "boundary at 0.96"
+
+
+@pytest.fixture
+def scenes():
+    """Two frames with random probabilities, different in size."""
+    rng, out = np.random.default_rng(0), {}
+    for name, (H, W) in {"first": (12, 17), "second": (15, 9)}.items():
+        y = rng.integers(0, 4, (H, W)).astype(np.uint8)
+        rgb, depth = rng.integers(0, 256, (H, W, 3)).astype(np.uint8), np.ones((H, W), np.float32)
+        frame = RGBDFrame(rgb, depth, np.diag([9.0, 9.0, 1.0]), np.eye(4), labels=y)
+        out[name] = frame, softmax(rng.normal(size=(H, W, 4)) + np.eye(4)[y])
+    return out
+
+
+def test_weighing_a_networks_answers_only_adds_target_pixels(scenes):
+    frame, p = scenes["first"]
+    masks = [class_weights.reweighted(p, exponent) == TARGET for exponent in (-2.0, 0.0, 1.0, 5.0)]
+    np.testing.assert_array_equal(masks[1], p.argmax(axis=-1) == TARGET)
+    for small, large in pairwise(masks):
+        assert (large >= small).all() and large.sum() > small.sum()
+    truth = frame.labels == TARGET
+    for exponent, mask in zip((-2.0, 0.0, 1.0, 5.0), masks, strict=True):
+        both = (mask & truth).sum()
+        expected = both / mask.sum(), both / truth.sum(), both / (mask | truth).sum()
+        assert class_weights.target_scores(frame.labels, p, exponent) == pytest.approx(expected)
+
+
+def test_the_controls_of_the_masks_change_picture_and_scores(scenes):
+    explorer = class_weights.trained_masks(scenes)
+    first = explorer.png
+    explorer.controls["exponent"].value = 3.0
+    second = explorer.png
+    mask, scores = drawn(explorer).axes
+    assert mask.get_title().startswith("target weighs 8;")
+    precision, recall, overlap = class_weights.target_scores(scenes["first"][0].labels, scenes["first"][1], 3.0)
+    assert scores.get_title() == f"precision {precision:.2f}, recall {recall:.2f}, IoU {overlap:.2f}"
+    explorer.controls["name"].value = "second"
+    assert len({first, second, explorer.png}) == 3
+
+
+@pytest.mark.bad_input
+def test_the_masks_need_frames_with_labels(scenes):
+    with pytest.raises(ValueError, match=r"^frames: expected at least one"):
+        class_weights.trained_masks({})
+    frame, p = scenes["first"]
+    bare = RGBDFrame(frame.rgb, frame.depth, frame.K, frame.T_base_cam)
+    with pytest.raises(ValueError, match=r"^frames: expected frames with labels, got 'x' without"):
+        class_weights.trained_masks({"x": (bare, p)})

@@ -1,0 +1,306 @@
+"""Scenes and datasets: reproducible, as described, and safe against kills, damage and full disks."""
+
+import errno
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import data_gen
+from data_gen import dataset
+from data_gen.families import FAMILIES
+from data_gen.sensor import DepthSensor
+from data_gen.statistics import statistics
+from data_gen.torch_dataset import TorchFrames
+from labkit.frame import RGBDFrame
+from labkit.labels import OBSTACLE, TARGET
+from labkit.sim.shapes import object_mesh
+from labkit.sim.world import World
+from labkit.support.files import write_atomically
+
+SIZE = (80, 60)
+
+
+def digest(folder: Path) -> dict[str, str]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    out = tmp_path_factory.mktemp("data") / "undisturbed"
+    data_gen.generate(out, range(6), "test", SIZE, progress=False)
+    return out
+
+
+# Scenes -------------------------------------------------------------------------------------------------------------
+
+
+def test_same_seed_same_scene_and_other_seed_or_config_another():
+    scene = data_gen.sample_scene(4, "test")
+    assert data_gen.sample_scene(4, "test") == scene
+    assert data_gen.sample_scene(5, "test") != scene
+    assert data_gen.sample_scene(4, "train").objects != scene.objects
+
+
+def test_same_scene_same_bytes_in_another_process():
+    code = (
+        "import data_gen, hashlib; f = data_gen.render(data_gen.sample_scene(9, 'hard'), (80, 60));"
+        "print(hashlib.sha256(f.rgb.tobytes() + f.depth.tobytes() + f.labels.tobytes()).hexdigest())"
+    )
+    digests = {subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout.split()[-1]}
+    data_gen.render(data_gen.sample_scene(1, "test"), SIZE)  # here it is not the first scene of its process
+    f = data_gen.render(data_gen.sample_scene(9, "hard"), SIZE)
+    digests.add(hashlib.sha256(f.rgb.tobytes() + f.depth.tobytes() + f.labels.tobytes()).hexdigest().encode())
+    assert len(digests) == 1
+
+
+def test_no_family_is_both_target_and_obstacle_and_colours_do_not_tell():
+    colours = {TARGET: [], OBSTACLE: []}
+    roles = {}
+    for seed in range(150):
+        for thing in data_gen.sample_scene(seed, "test").objects:
+            colours[thing.class_id].append(thing.colour)
+            roles.setdefault(thing.family, set()).add(thing.class_id)
+    assert all(len(role) == 1 for role in roles.values()) and set(roles) == set(FAMILIES)
+    means = {role: np.mean(values, axis=0) for role, values in colours.items()}
+    assert np.abs(means[TARGET] - means[OBSTACLE]).max() < 0.06
+
+
+def test_hard_has_shapes_textures_and_viewpoints_that_train_lacks():
+    def shapes(config):
+        things = [t for seed in range(60) for t in data_gen.sample_scene(seed, config).objects]
+        return {t.family: [] for t in things} | {
+            family: [(t.urdf, t.scale, [p.kind for p in t.parts]) for t in things if t.family == family]
+            for family in {t.family for t in things}
+        }
+
+    scenes = {config: [data_gen.sample_scene(seed, config) for seed in range(60)] for config in ("train", "hard")}
+    kinds = {config: {s.table.texture.kind for s in scenes[config]} for config in scenes}
+    assert not kinds["train"] & kinds["hard"]
+    height = {c: [np.arcsin(-s.camera.T_base_cam[2][2]) for s in scenes[c]] for c in scenes}
+    low, high = min(height["train"]), max(height["train"])
+    assert all(not low <= h <= high for h in height["hard"])
+    urdfs = {c: {t.urdf for s in scenes[c] for t in s.objects if t.family == "blob"} for c in scenes}
+    assert not urdfs["train"] & urdfs["hard"]
+    # A duck is one model: hard ones have sizes that training ducks never have.
+    ducks = {c: [scale for _, scale, _ in shapes(c)["duck"]] for c in scenes}
+    assert all(not min(ducks["train"]) <= s <= max(ducks["train"]) for s in ducks["hard"])
+
+
+def test_every_target_can_be_held():
+    """Each target is narrower than the open gripper somewhere: its least extent in the plane, or a rim's."""
+    for seed in range(60):
+        for thing in data_gen.sample_scene(seed, "test").objects:
+            if thing.class_id == TARGET and thing.family not in ("ring", "mug"):
+                extents = np.sort(np.ptp(object_mesh(thing).vertices, axis=0))
+                assert extents[0] < 0.065, thing.family
+            assert 0.05 <= thing.mass <= 0.5 and thing.friction <= 1.0
+
+
+def test_statistics_of_test_are_as_promised():
+    s = statistics(range(900_000, 900_060), "test", (160, 120))
+    assert sum(share >= 0.10 for share in s.families.values()) >= 5
+    assert s.not_boxes >= 0.60
+    assert s.obstacles >= 5.0
+    assert s.occluded >= 0.25
+    near, far = s.camera
+    assert near >= 0.6 and far <= 1.2
+    assert s.target_pixels <= 0.02
+
+
+# Datasets -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_dataset_reads_back_as_the_frames_that_were_rendered(undisturbed):
+    frames = data_gen.load(undisturbed)
+    assert len(frames) == 6 and len(frames[1:3]) == 2
+    for index in (0, -1):
+        spec = data_gen.sample_scene(range(6)[index], "test")
+        with World(spec) as world:
+            true, poses = world.render(SIZE), world.poses()
+        frame = frames[index]
+        assert np.array_equal(frame.rgb, true.rgb)
+        assert np.array_equal(frame.labels, true.labels) and np.array_equal(frame.instances, true.instances)
+        assert np.abs(frame.depth - true.depth).max() <= 5.1e-5, "half a unit of the 16-bit file"
+        assert np.allclose(frame.K, true.K) and np.allclose(frame.T_base_cam, true.T_base_cam)
+        for entry in frames.objects(index):  # BOP: model to camera, millimetres
+            T = np.eye(4)
+            T[:3, :3] = np.reshape(entry["cam_R_m2c"], (3, 3))
+            T[:3, 3] = np.array(entry["cam_t_m2c"]) / 1000.0
+            assert np.allclose(true.T_base_cam @ T, poses[entry["name"]], atol=1e-9)
+
+
+def test_scene_camera_is_in_bops_convention(undisturbed):
+    camera = json.loads((undisturbed / "scene_camera.json").read_text())["2"]
+    spec = data_gen.sample_scene(2, "test")
+    centre = np.array(spec.camera.T_base_cam)[:3, 3]
+    R, t = np.reshape(camera["cam_R_w2c"], (3, 3)), np.array(camera["cam_t_w2c"])
+    assert np.allclose(R @ (1000.0 * centre) + t, 0.0, atol=1e-6), "the camera's centre is its frame's origin"
+
+
+def test_an_index_beyond_the_end_is_an_index_error(undisturbed):
+    with pytest.raises(IndexError):
+        data_gen.load(undisturbed)[6]
+
+
+def test_an_executor_gives_the_same_bytes(undisturbed, tmp_path):
+    with ThreadPoolExecutor(2) as executor:
+        data_gen.generate(tmp_path / "pool", range(6), "test", SIZE, executor, progress=False)
+    assert digest(tmp_path / "pool") == digest(undisturbed)
+
+
+def test_killed_at_any_moment_and_run_again_it_gives_the_same_bytes(undisturbed, tmp_path):
+    out = tmp_path / "killed"
+    command = [sys.executable, "-m", "data_gen", str(out), "--scenes", "6", "--config", "test", "--size", "80x60"]
+    for frames_before_the_kill in (1, 3):
+        process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        deadline = time.monotonic() + 60.0
+        while len(list(out.glob("rgb/0*.png"))) < frames_before_the_kill and time.monotonic() < deadline:
+            time.sleep(0.005)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert not (out / "dataset.json").exists()
+        with pytest.raises(FileNotFoundError, match="not finished"):
+            data_gen.load(out)
+    subprocess.run(command, check=True, capture_output=True)
+    found = {name: value for name, value in digest(out).items() if not name.endswith(".tmp")}
+    assert found == digest(undisturbed)
+
+
+def test_a_finished_dataset_is_left_alone(undisturbed):
+    before = {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*.png")}
+    data_gen.generate(undisturbed, range(6), "test", SIZE, progress=False)
+    assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*.png")} == before
+
+
+def test_verify_names_what_is_damaged_and_what_is_missing(tmp_path):
+    out = tmp_path / "data"
+    data_gen.generate(out, range(2), "test", SIZE, progress=False)
+    assert data_gen.verify(out) == []
+    (out / "depth" / "000001.png").write_bytes(b"not a picture")
+    (out / "rgb" / "000000.png").unlink()
+    assert sorted(data_gen.verify(out)) == ["depth/000001.png: damaged", "rgb/000000.png: missing"]
+    run = subprocess.run([sys.executable, "-m", "data_gen", str(out), "--verify"], capture_output=True, text=True)
+    assert run.returncode == 1 and "rgb/000000.png: missing" in run.stdout
+
+
+def test_depth_noise_is_off_unless_asked_for_and_spoils_depth_alone(tmp_path):
+    data_gen.generate(tmp_path / "noisy", range(1), "test", SIZE, sensor=DepthSensor(), progress=False)
+    noisy = data_gen.load(tmp_path / "noisy")[0]
+    exact = data_gen.render(data_gen.sample_scene(0, "test"), SIZE)
+    assert np.array_equal(noisy.rgb, exact.rgb)
+    assert (noisy.depth == 0).sum() > (exact.depth == 0).sum()
+
+
+def test_the_sensors_noise_grows_with_the_square_of_depth():
+    sensor = DepthSensor(noise=0.002, step=0.0, loss=0.0, edge_loss=0.0)
+    K, rgb = np.diag([50.0, 50.0, 1.0]), np.zeros((200, 200, 3), np.uint8)
+    spread = []
+    for d in (1.0, 2.0):
+        frame = RGBDFrame(rgb, np.full((200, 200), d, np.float32), K, np.eye(4))
+        spread.append(sensor.apply(frame, np.random.default_rng(0)).depth.std())
+    assert np.isclose(spread[0], 0.002, rtol=0.05) and np.isclose(spread[1] / spread[0], 4.0, rtol=0.05)
+
+
+def test_the_sensor_loses_pixels_at_edges():
+    depth = np.ones((100, 100), np.float32)
+    depth[:, 50:] = 1.5
+    frame = RGBDFrame(np.zeros((100, 100, 3), np.uint8), depth, np.diag([50.0, 50.0, 1.0]), np.eye(4))
+    seen = DepthSensor(noise=0.0, step=0.0, edge_loss=1.0, loss=0.0).apply(frame, np.random.default_rng(0)).depth
+    assert (seen[:, 49:51] == 0).all() and (seen[:, :49] > 0).all() and (seen[:, 51:] > 0).all()
+
+
+def test_the_torch_dataset_gives_images_and_labels(undisturbed):
+    frames = data_gen.load(undisturbed)
+    pairs = TorchFrames(frames)
+    rgb, labels = pairs[3]
+    assert len(pairs) == 6 and np.array_equal(rgb, frames[3].rgb) and np.array_equal(labels, frames[3].labels)
+
+
+# Bad input ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda out: data_gen.sample_scene(-1, "test"), "seed"),
+        (lambda out: data_gen.sample_scene(0, "easy"), "config"),
+        (lambda out: data_gen.generate(out, [], "test"), "seeds"),
+        (lambda out: data_gen.generate(out, [0], "easy"), "config"),
+        (lambda out: data_gen.generate(out, [0], "test", (0, 10)), "size"),
+    ],
+)
+def test_wrong_arguments_are_named_and_nothing_is_written(call, name, tmp_path):
+    with pytest.raises(ValueError, match=rf"^{name}:"):
+        call(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.bad_input
+def test_another_dataset_is_never_overwritten(undisturbed, tmp_path):
+    before = digest(undisturbed)
+    with pytest.raises(ValueError, match=r"^out: .*other seeds"):
+        data_gen.generate(undisturbed, range(7), "test", SIZE, progress=False)
+    assert digest(undisturbed) == before
+    (tmp_path / "diary.txt").write_text("dear diary")
+    with pytest.raises(ValueError, match=r"^out: .*other files"):
+        data_gen.generate(tmp_path, range(1), "test", SIZE, progress=False)
+
+
+@pytest.mark.bad_input
+def test_datasets_that_cannot_be_read_are_named(undisturbed, tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"^path: .*no dataset"):
+        data_gen.load(tmp_path)
+    description = json.loads((undisturbed / "dataset.json").read_text())
+    (tmp_path / "dataset.json").write_text(json.dumps({**description, "version": dataset.VERSION + 1}))
+    with pytest.raises(ValueError, match=r"^path: .*newer .*update"):
+        data_gen.load(tmp_path)
+    (tmp_path / "dataset.json").write_text("{")
+    with pytest.raises(ValueError, match=r"^path: .*damaged"):
+        data_gen.load(tmp_path)
+
+
+@pytest.mark.bad_input
+def test_a_full_disk_is_said_and_leaves_no_half_file(tmp_path, monkeypatch):
+    path = tmp_path / "frame.png"
+    path.write_bytes(b"old")
+
+    def full(self, data):
+        with open(self, "wb") as file:
+            file.write(data[:2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="could not write") as caught:
+        write_atomically(path, b"new")
+    assert caught.value.errno == errno.ENOSPC and caught.value.filename == str(path)
+    assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["frame.png"]
+
+
+@pytest.mark.bad_input
+def test_the_command_says_a_full_disk_in_one_line_and_goes_on_later(tmp_path):
+    """The system itself refuses: no file of this process may grow beyond 2 kB."""
+    out = tmp_path / "out"
+    arguments = ["data_gen", str(out), "--scenes", "2", "--config", "test", "--size", "80x60"]
+    code = (
+        "import resource, runpy, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        f"import data_gen.dataset; data_gen.render(data_gen.sample_scene(0, 'test'), (80, 60)); sys.argv = {arguments};"
+        "data_gen.render(data_gen.sample_scene(1, 'test'), (80, 60));"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)); runpy.run_module('data_gen', run_name='__main__')"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.returncode == 1
+    assert run.stderr.strip().splitlines()[-1].startswith("data_gen: ") and "could not write" in run.stderr
+    assert not list(out.rglob("*.tmp"))
+    subprocess.run([sys.executable, "-m", *arguments], check=True, capture_output=True)
+    assert data_gen.verify(out) == []

@@ -1,0 +1,206 @@
+"""The world against geometry that it does not know: planes, meshes, and other worlds."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from meshes import distance_to_mesh
+
+from data_gen import sample_scene
+from labkit.geometry import back_project_to_base, project
+from labkit.labels import BACKGROUND, OBSTACLE, SURFACE, TARGET
+from labkit.sim import textures
+from labkit.sim.shapes import object_mesh, part_mesh
+from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec, Table, Texture
+from labkit.sim.world import World, intrinsics, metres
+
+
+def thing(name="block", class_id=TARGET, **changes):
+    good = {"position": (0.5, 0.0, 0.022), "parts": (Part("box", (0.04, 0.05, 0.04)),)}
+    return ObjectSpec(name=name, family=name, class_id=class_id, **{**good, **changes})
+
+
+def scene(*objects, camera=None, **rest):
+    camera = camera or Camera.looking_at((0.5, 0.0, 0.0), 0.7, 0.5, 0.8)
+    return SceneSpec(objects=tuple(objects), camera=camera, **{"robot": False, **rest})
+
+
+def points_of(frame, mask):
+    return back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[mask].astype(float)
+
+
+@pytest.mark.parametrize("size", [(320, 240), (640, 480), (201, 161)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_rendered_plane_is_a_plane(size, seed):
+    """Intrinsics are right to 0.05 mm: a tilted table, with any roll, stays flat and at its height."""
+    rng = np.random.default_rng(seed)
+    camera = Camera.looking_at(
+        (0.5, 0.0, 0.0), rng.uniform(0.5, 0.8), rng.uniform(-3, 3), rng.uniform(0.6, 1.2), rng.uniform(-3, 3), fov_y=0.6
+    )
+    with World(scene(camera=camera, table=Table(size=(1.0, 1.4, 0.05), z=0.013))) as world:
+        frame = world.render(size)
+        shifted = dataclasses.replace(frame, K=frame.K + np.array([[0, 0, -0.5], [0, 0, 0.5], [0, 0, 0]]))
+    mask = frame.labels == SURFACE
+    assert mask.mean() > 0.5
+    error = np.abs(points_of(frame, mask)[:, 2] - 0.013)
+    assert error.max() < 5e-5
+    assert np.abs(points_of(shifted, mask)[:, 2] - 0.013).max() > 5e-4, "centres at (W - 1) / 2 would not do"
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        thing(),
+        thing(parts=(Part("cylinder", (0.02, 0.06)), Part("sphere", (0.025,), (0.0, 0.0, 0.03)))),
+        thing(parts=(), urdf="objects/mug.urdf", scale=0.7, position=(0.5, 0.0, 0.001)),
+        thing(parts=(), urdf="duck_vhacd.urdf", scale=0.8, orientation=(0.707, 0.0, 0.0, 0.707)),
+        thing(parts=(), urdf="random_urdfs/007/007.urdf", scale=0.9, position=(0.5, 0.0, 0.05)),
+        thing(parts=(), urdf="lego/lego.urdf", position=(0.5, 0.0, 0.02)),
+    ],
+    ids=["box", "parts", "mug", "duck", "random", "lego"],
+)
+def test_rendered_points_lie_on_the_visual_mesh_at_its_true_pose(shown):
+    with World(scene(shown)) as world:
+        frame = world.render((320, 240))
+        T_base_object = world.pose(shown.name)
+    points = points_of(frame, frame.labels == TARGET)[::3]
+    assert len(points) > 50
+    mesh = object_mesh(shown)
+    in_object_frame = (points - T_base_object[:3, 3]) @ T_base_object[:3, :3]
+    assert distance_to_mesh(in_object_frame, mesh.vertices, mesh.faces).max() < 1e-3
+
+
+def test_points_on_the_table_lie_on_the_table():
+    table = Table(centre=(0.55, 0.1), size=(0.6, 0.8, 0.04), z=-0.02)
+    with World(scene(thing(position=(0.5, 0.0, 0.002)), table=table)) as world:
+        frame = world.render()
+    points = points_of(frame, frame.labels == SURFACE)
+    box = part_mesh(Part("box", table.size, (*table.centre, table.z - 0.02)))
+    assert distance_to_mesh(points[::50], box.vertices, box.faces).max() < 1e-3
+
+
+def test_a_pose_is_of_the_mesh_not_of_the_centre_of_mass():
+    uneven = thing(parts=(Part("box", (0.02, 0.02, 0.02)), Part("box", (0.06, 0.06, 0.02), (0.0, 0.0, -0.02))))
+    lifted = dataclasses.replace(uneven, position=(0.5, 0.1, 0.3), orientation=(0.0, 0.0, 0.6, 0.8))
+    with World(scene(lifted), settle_seconds=0.0) as world:
+        T = world.pose("block")
+    assert np.allclose(T[:3, 3], (0.5, 0.1, 0.3), atol=1e-9)
+    assert np.allclose(T[:3, 0], (0.8**2 - 0.6**2, 2 * 0.6 * 0.8, 0.0))
+
+
+def test_labels_and_instances_say_what_is_seen():
+    spec = scene(thing("a"), thing("b", OBSTACLE, position=(0.5, 0.15, 0.022)), robot=True)
+    wide = dataclasses.replace(spec.camera, fov_y=1.4)
+    with World(spec) as world:
+        frame = world.render((320, 240), wide)
+        middle = {name: world.centre(name) for name in "ab"}
+    assert set(np.unique(frame.labels)) == {BACKGROUND, SURFACE, TARGET, OBSTACLE}
+    T_cam_base = np.linalg.inv(frame.T_base_cam)
+    for number, (name, label) in enumerate([("a", TARGET), ("b", OBSTACLE)], start=1):
+        u, v = project((T_cam_base[:3, :3] @ middle[name] + T_cam_base[:3, 3])[None], frame.K)
+        pixel = round(float(v[0])), round(float(u[0]))
+        assert (frame.labels[pixel], frame.instances[pixel]) == (label, number)
+    u, v = project((T_cam_base[:3, :3] @ (0.0, 0.0, 0.1) + T_cam_base[:3, 3])[None], frame.K)
+    assert frame.labels[round(float(v[0])), round(float(u[0]))] == BACKGROUND, "the robot is background"
+
+
+def test_a_silhouette_is_what_an_object_would_cover_alone():
+    behind = thing("behind", position=(0.46, -0.02, 0.022))
+    before = thing("before", OBSTACLE, position=(0.52, 0.01, 0.042), parts=(Part("box", (0.03, 0.08, 0.08)),))
+    with World(scene(behind, before)) as world:
+        seen = world.render().instances == 1
+        whole = world.silhouette("behind")
+        again = world.render().instances == 1
+    with World(scene(behind)) as alone:
+        expected = alone.render().instances == 1
+    assert seen.sum() < whole.sum() and np.array_equal(seen, again)
+    assert np.mean(whole != expected) < 1e-3
+
+
+def test_worlds_do_not_disturb_one_another():
+    spec = sample_scene(3, "test")
+    with World(spec) as world:
+        alone = [world.render().rgb.tobytes(), [pose.tobytes() for pose in world.poses().values()]]
+        world.step(50)
+        later = [pose.tobytes() for pose in world.poses().values()]
+    with World(spec) as first, World(sample_scene(4, "test")) as second:
+        second.step(100)
+        assert first.render().rgb.tobytes() == alone[0]
+        assert [pose.tobytes() for pose in first.poses().values()] == alone[1]
+        second.render()
+        first.step(25)
+        second.close()
+        first.step(25)
+        assert [pose.tobytes() for pose in first.poses().values()] == later
+
+
+def test_objects_come_to_rest_on_the_table():
+    spec = sample_scene(11, "test")
+    with World(spec) as world:
+        before = world.poses()
+        world.step(120)
+        after = world.poses()
+    for name in before:
+        assert np.linalg.norm(after[name][:3, 3] - before[name][:3, 3]) < 2e-3
+        assert before[name][2, 3] > spec.table.z - 0.01
+
+
+def test_the_depth_buffer_becomes_metres():
+    near, far = 0.1, 6.0
+    d = np.array([[0.1, 0.6, 3.0, 6.0]])
+    buffer = far * (d - near) / (d * (far - near))  # the perspective division, solved for the buffer's value
+    assert np.allclose(metres(buffer, near, far), d)
+
+
+def test_field_of_view_is_vertical():
+    K = intrinsics(0.8, 640, 480)
+    assert np.isclose(2.0 * np.arctan(240.0 / K[1, 1]), 0.8) and K[0, 0] == K[1, 1]
+
+
+def test_a_scene_survives_json():
+    spec = sample_scene(5, "hard")
+    assert SceneSpec.from_json(spec.to_json()) == spec
+
+
+def test_importing_labkit_needs_no_pybullet():
+    code = "import sys, labkit.pipeline, labkit.apps.evaluation, labkit.sim.spec; sys.exit('pybullet' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: thing(mass=0.0), "mass"),
+        (lambda: thing(class_id=1), "class_id"),
+        (lambda: thing(parts=()), "urdf"),
+        (lambda: thing(urdf="duck_vhacd.urdf"), "parts"),
+        (lambda: scene(thing(), thing()), "objects"),
+        (lambda: part_mesh(Part("cube", (1.0, 1.0, 1.0))), "part.kind"),
+        (lambda: part_mesh(Part("box", (1.0, 1.0))), "part.size"),
+        (lambda: part_mesh(Part("box", (1.0, 1.0, 0.0))), "part.size"),
+        (lambda: part_mesh(Part("hull", (0.0,) * 9)), "part.size"),
+        (lambda: textures.paint(Texture("tartan")), "texture.kind"),
+    ],
+)
+def test_wrong_scenes_are_named(call, says):
+    with pytest.raises(ValueError, match=says):
+        call()
+
+
+@pytest.mark.bad_input
+def test_wrong_requests_to_a_world_are_named():
+    with World(scene(thing())) as world:
+        with pytest.raises(ValueError, match=r"^size:"):
+            world.render((0, 240))
+        with pytest.raises(ValueError, match=r"^name:"):
+            world.pose("nobody")
+    world.close()
+
+
+def test_importing_the_simulator_says_nothing():
+    """PyBullet's greeting would stand in every notebook."""
+    done = subprocess.run([sys.executable, "-c", "import labkit.sim.panda"], capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")

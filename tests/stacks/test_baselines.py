@@ -1,0 +1,349 @@
+"""The other stacks' methods, each against an independent one: OpenCV, SciPy, scikit-learn, NumPy, brute force."""
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from matplotlib.figure import Figure
+from scipy import ndimage
+from sklearn.cluster import KMeans
+
+import data_gen
+from labkit.geometry import backproject_to_base
+from labkit.labels import CLASSES, OBSTACLE, SURFACE, TARGET
+from labkit.pipeline import Pipeline
+from labkit.stacks import regions
+from labkit.stacks.blocks import Block, Diagram, perception_diagram
+from labkit.stacks.engines import open_engine
+from labkit.stacks.matlab import cloud_of_mask, montage, semanticseg
+from labkit.stacks.small_fcn import SmallFCN, train_small_fcn
+from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, segment_file, things_on_table
+
+
+@pytest.fixture(scope="module")
+def frames():
+    """Two scenes with different tables, small."""
+    return [data_gen.render(data_gen.sample_scene(seed, "train"), (160, 120)) for seed in (630_000, 630_003)]
+
+
+def iou_of(a, b):
+    return np.count_nonzero(a & b) / np.count_nonzero(a | b)
+
+
+# ------------------------------------------------------------------------------------ HSV thresholds (Java)
+
+
+def test_a_range_without_red_is_opencvs_in_range(frames):
+    rgb = frames[0].rgb
+    hsv = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)
+    for low, high in (((5, 50, 50), (20, 255, 255)), ((0, 0, 90), (179, 120, 200)), ((60, 3, 3), (60, 250, 250))):
+        assert np.array_equal(hsv_mask(rgb, HSVRange(low, high)), cv2.inRange(hsv, low, high) > 0)
+
+
+def test_a_range_round_red_is_all_hues_but_those_between():
+    hues = np.arange(180, dtype=np.uint8)
+    hsv = np.stack([hues, np.full(180, 255, np.uint8), np.full(180, 255, np.uint8)], axis=1)[None]
+    rgb = cv2.cvtColor(hsv, cv2.COLOR_HSV2RGB)
+    seen = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[0, :, 0]
+    inside = hsv_mask(rgb, HSVRange((170, 0, 0), (9, 255, 255)))[0]
+    assert np.array_equal(inside, (seen >= 170) | (seen <= 9))
+
+
+def test_the_listings_work_on_files(frames, tmp_path):
+    rgb = frames[0].rgb
+    cv2.imwrite(str(tmp_path / "scene.png"), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+    mask = segment_file(tmp_path / "scene.png", tmp_path / "mask_table.png")
+    written = cv2.imread(str(tmp_path / "mask_table.png"), cv2.IMREAD_UNCHANGED)
+    assert written.dtype == np.uint8 and set(np.unique(written)) <= {0, 255}
+    assert np.array_equal(written > 0, mask) and np.array_equal(mask, hsv_mask(rgb, BROWN))
+
+
+def test_fitting_finds_the_colours_that_made_the_mask(frames):
+    for true in (HSVRange((20, 40, 60), (80, 199, 219)), HSVRange((150, 0, 40), (12, 255, 255))):
+        images = [np.random.default_rng(i).integers(0, 256, (60, 80, 3), dtype=np.uint8) for i in range(2)]
+        masks = [hsv_mask(rgb, true) for rgb in images]
+        found = fit_hsv(images, masks)
+        for rgb, mask in zip(images, masks, strict=True):
+            assert iou_of(hsv_mask(rgb, found), mask) > 0.98
+        assert found.wraps == true.wraps
+
+
+def test_no_single_channel_of_the_fit_can_be_better(frames):
+    """Brute force over all intervals of one channel, the two others as fitted."""
+    rgb, mask = frames[0].rgb[::2, ::2], frames[0].labels[::2, ::2] == SURFACE
+    found = fit_hsv([rgb], [mask])
+    best = iou_of(hsv_mask(rgb, found), mask)
+    for channel, top, step in ((0, 180, 3), (1, 256, 4), (2, 256, 4)):
+        for low in range(0, top, step):
+            for high in range(step - 1, top, step):
+                if channel > 0 and low > high:
+                    continue
+                lower, upper = list(found.lower), list(found.upper)
+                lower[channel], upper[channel] = low, high
+                inside = hsv_mask(rgb, HSVRange(tuple(lower), tuple(upper)))
+                assert not inside.any() or iou_of(inside, mask) <= best + 1e-12
+
+
+def test_where_it_breaks_another_table(frames):
+    """Thresholds know one table's colour: fitted on one, they do not find the other."""
+    first, second = frames
+    fitted = fit_hsv([first.rgb], [first.labels == SURFACE])
+    assert iou_of(hsv_mask(first.rgb, fitted), first.labels == SURFACE) > 0.75
+    assert iou_of(hsv_mask(second.rgb, fitted), second.labels == SURFACE) < 0.3
+
+
+def test_things_on_the_table_are_found_but_not_told_apart(frames):
+    y = frames[0].labels
+    things = things_on_table(y == SURFACE)
+    on_table = (y == TARGET) | (y == OBSTACLE)
+    assert iou_of(things, on_table) > 0.6
+    assert things[y == TARGET].mean() > 0.7
+    assert not things_on_table(np.zeros((5, 6), bool)).any()
+
+
+# ----------------------------------------------------------------------------- regions (Mathematica)
+
+
+def test_kmeans_ends_where_lloyds_algorithm_ends():
+    rng = np.random.default_rng(3)
+    X = np.concatenate([rng.normal(c, 1.0, (200, 3)) for c in ((0, 0, 0), (6, 0, 0), (0, 7, 2), (5, 5, 5))])
+    means, labels = regions.kmeans(X, 4, seed=1)
+    reference = KMeans(4, init=means, n_init=1, algorithm="lloyd").fit(X)
+    assert np.allclose(reference.cluster_centers_, means, atol=1e-9), "a fixed point of scikit-learn's too"
+    assert np.array_equal(reference.labels_, labels)
+    free = KMeans(4, n_init=10, random_state=0).fit(X)
+    inertia = ((X - means[labels]) ** 2).sum()
+    assert inertia <= 1.001 * free.inertia_
+
+
+def test_kmeans_gives_every_cluster_a_point_and_is_seeded():
+    X = np.repeat(np.array([[0.0, 1.0], [0.0, 2.0], [9.0, 9.0]]), [500, 1, 1], axis=0)
+    for seed in range(8):
+        means, labels = regions.kmeans(X, 3, seed)
+        assert sorted(np.bincount(labels)) == [1, 1, 500]
+        assert np.array_equal(regions.kmeans(X, 3, seed)[0], means)
+
+
+def test_an_image_of_k_colours_falls_apart_into_them():
+    colours = np.array([[200, 30, 30], [30, 30, 200], [240, 240, 240]], np.uint8)
+    true = np.repeat(np.repeat(np.array([[0, 1, 1], [0, 2, 1]]), 40, axis=0), 30, axis=1)
+    found = regions.segment_kmeans(colours[true], 3)
+    assert found.dtype == np.uint8 and (np.diff(np.bincount(found.ravel())) <= 0).all(), "largest first"
+    assert all(len(np.unique(found[true == c])) == 1 for c in range(3)) and len(np.unique(found)) == 3
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_components_are_scipys(connectivity):
+    image = np.random.default_rng(5).integers(0, 3, (23, 31))
+    pieces = regions.components(image, connectivity)
+    structure = ndimage.generate_binary_structure(2, connectivity // 4)
+    total = 0
+    for value in np.unique(image):
+        reference, n = ndimage.label(image == value, structure)
+        pairs = np.unique(np.stack([reference[image == value], pieces[image == value]]), axis=1)
+        assert len(pairs[0]) == n == len(np.unique(pairs[1])), "one piece for one piece"
+        total += n
+    first = [np.flatnonzero(pieces.ravel() == i)[0] for i in range(1, total + 1)]
+    assert pieces.max() == total and first == sorted(first), "numbered in reading order"
+
+
+def test_measurements_are_scipys_and_numpys():
+    image = np.random.default_rng(6).integers(0, 2, (20, 27))
+    pieces = ndimage.label(np.kron(image, np.ones((3, 2), int)))[0]
+    found = regions.measure(pieces)
+    numbers = np.arange(1, pieces.max() + 1)
+    assert np.array_equal(found.area, ndimage.sum_labels(np.ones_like(pieces), pieces, numbers))
+    middles = ndimage.center_of_mass(np.ones_like(pieces), pieces, numbers)
+    assert np.allclose(found.centroid[:, ::-1], middles)
+    for i, (rows, columns) in enumerate(ndimage.find_objects(pieces)):
+        assert found.box[i].tolist() == [columns.start, rows.start, columns.stop - 1, rows.stop - 1]
+        assert np.isclose(found.extent[i], np.mean(pieces[rows, columns] == i + 1))
+        border = rows.start == 0 or columns.start == 0 or rows.stop == 60 or columns.stop == 54
+        assert found.at_border[i] == border
+        v, u = np.nonzero(pieces == i + 1)
+        C = np.cov(np.stack([u, v]), bias=True) + np.eye(2) / 12 if len(u) > 1 else np.eye(2) / 12
+        low, high = np.linalg.eigvalsh(C)
+        assert np.isclose(found.elongation[i], np.sqrt(high / low))
+
+
+def test_the_region_that_looks_most_like_the_wanted_ones_is_chosen():
+    wanted = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        mask = np.zeros((60, 80), bool)
+        h, w = rng.integers(8, 12), rng.integers(14, 20)
+        mask[20 : 20 + h, 30 : 30 + w] = True
+        wanted.append(mask)
+    typical = regions.learn_typical(wanted)
+    image = np.zeros((60, 80), int)
+    image[5:15, 10:27] = 2  # as wanted
+    image[30:58, 40:78] = 1  # too large
+    image[40:43, 5:30] = 3  # too thin
+    pieces = regions.components(image)
+    m = regions.measure(pieces)
+    chosen = regions.choose_region(m, typical, ~m.at_border)
+    assert chosen == pieces[10, 15]
+    assert regions.choose_region(m, typical, np.zeros(len(m.area), bool)) == 0
+    without = ~m.at_border & (np.arange(1, len(m.area) + 1) != chosen)
+    assert regions.choose_region(m, typical, without) not in (0, chosen)
+
+
+def test_pieces_are_painted_apart():
+    pieces = np.arange(12).reshape(3, 4)
+    painted = regions.colorize_regions(pieces).reshape(12, 3).astype(int)
+    apart = np.linalg.norm(painted[:, None] - painted[None], axis=2) + 1000 * np.eye(12)
+    assert (painted[0] == 0).all() and apart.min() > 20
+    assert np.linalg.norm(np.diff(painted, axis=0), axis=1).min() > 80
+
+
+def test_the_small_fcn_is_the_listings_and_learns(frames):
+    model = SmallFCN()
+    kinds = [type(layer).__name__ for layer in model.layers]
+    assert kinds == ["Conv2d", "ReLU", "Conv2d", "ReLU", "Conv2d"]
+    assert sum(p.numel() for p in model.parameters()) == (27 + 1) * 16 + (16 * 9 + 1) * 32 + (32 + 1) * 4 == 5220
+    x = torch.rand(1, 3, 21, 21, requires_grad=True)
+    model(x)[0, :, 10, 10].sum().backward()
+    v, u = np.nonzero(x.grad[0].abs().sum(dim=0).numpy())
+    assert (v.min(), v.max(), u.min(), u.max()) == (8, 12, 8, 12), "a pixel sees 5x5 pixels"
+    images, labels = [f.rgb for f in frames], [f.labels for f in frames]
+    trained, losses = train_small_fcn(images, labels, steps=60, crop=64)
+    assert np.mean(losses[-10:]) < 0.75 * np.mean(losses[:10]) and not trained.training
+    again, _ = train_small_fcn(images, labels, steps=60, crop=64)
+    assert all(torch.equal(a, b) for a, b in zip(trained.parameters(), again.parameters(), strict=True))
+    right = np.mean(Pipeline(trained, mirror=False).run(frames[0]).labels == frames[0].labels)
+    assert right > np.mean(Pipeline(SmallFCN(), mirror=False).run(frames[0]).labels == frames[0].labels)
+
+
+def test_errata_a_decoder_for_one_class_an_image_is_not_one_for_a_class_a_pixel():
+    """The listing's NetDecoder[{"Class", ...}] takes a vector of 4 numbers; its last layer gives 4 images."""
+    z = SmallFCN()(torch.zeros(1, 3, 24, 32))
+    assert z.shape == (1, 4, 24, 32) and z[0].numel() != len(CLASSES)
+
+
+# ----------------------------------------------------------------------------- MATLAB and Simulink
+
+
+def test_labels_and_scores_of_an_engine(frames):
+    engine = open_engine("onnxruntime", SmallFCN())
+    labels, scores = semanticseg(frames[0].rgb, engine)
+    p = engine(frames[0].rgb)
+    assert np.array_equal(labels, np.argmax(p, axis=2)) and labels.dtype == np.uint8
+    assert np.allclose(np.take_along_axis(p, labels[..., None].astype(int), axis=2)[..., 0], scores)
+
+
+def test_a_montage_is_the_image_beside_its_mask(frames):
+    rgb, mask = frames[0].rgb, frames[0].labels == SURFACE
+    both = montage(rgb, mask)
+    assert np.array_equal(both[:, :160], rgb)
+    assert np.array_equal(both[:, 160:], 255 * np.repeat(mask[..., None], 3, axis=2).astype(np.uint8))
+
+
+def test_the_cloud_of_a_mask_is_the_kits_column_by_column(frames):
+    frame = frames[0]
+    depth = frame.depth.copy()
+    depth[::3, ::2] = 0.0
+    depth[1::5] = np.nan
+    mask = frame.labels == TARGET
+    cloud = cloud_of_mask(mask, depth, frame.K, frame.T_base_cam)
+    expected = backproject_to_base(frame.labels, depth, frame.K, frame.T_base_cam, TARGET)
+    u = [(i, j) for j in range(160) for i in range(120) if mask[i, j] and depth[i, j] > 0]
+    rows = {pixel: n for n, pixel in enumerate((i, j) for i in range(120) for j in range(160) if (i, j) in set(u))}
+    assert len(cloud) == len(expected) == len(u) > 50
+    assert np.allclose(cloud, expected[[rows[pixel] for pixel in u]], atol=1e-6)
+
+
+def test_errata_a_png_holds_no_single_precision_metres(frames, tmp_path):
+    """The listing reads "depth in meters stored as single" from a PNG: what comes back has lost the metres."""
+    depth = np.full((4, 5), 0.734, np.float32)
+    path = str(tmp_path / "depth.png")
+    try:
+        assert cv2.imwrite(path, depth)
+    except cv2.error:
+        return
+    assert np.abs(cv2.imread(path, cv2.IMREAD_UNCHANGED).astype(float) - depth).min() > 0.2
+
+
+def test_a_diagram_runs_its_blocks_in_the_order_of_their_signals():
+    order = []
+
+    def block(name, inputs, outputs, function):
+        return Block(name, lambda *x: (order.append(name), function(*x))[1], inputs, outputs)
+
+    late = block("late", ("c", "b"), ("d",), lambda c, b: c - b)
+    both = block("both", ("a",), ("b", "c"), lambda a: (a + 1, a * 10))
+    signals = Diagram([late, both], inputs=("a",)).run(a=3)
+    assert order == ["both", "late"] and signals == {"a": 3, "b": 4, "c": 30, "d": 26}
+
+
+def test_simulinks_diagram_does_what_the_pipeline_does():
+    spec = data_gen.sample_scene(600_002, "test")
+    frame = data_gen.render(spec)
+    expected = Pipeline(np.asarray, spec.table.z).run(frame, labels=frame.labels)
+    diagram = perception_diagram(lambda rgb: frame.labels, lambda grasps, scene: len(grasps.grasps), spec.table.z)
+    signals = diagram.run(rgb=frame.rgb, depth=frame.depth, K=frame.K, T_base_cam=frame.T_base_cam)
+    assert signals["outcome"] > 0
+    assert np.array_equal(signals["points"], expected.points, equal_nan=True)
+    assert len(signals["target"]) == len(expected.clouds)
+    assert all(np.array_equal(a, b) for a, b in zip(signals["target"], expected.clouds, strict=True))
+    assert diagram.columns().keys() == set(diagram.blocks) and max(diagram.columns().values()) == 4
+    best, reference = signals["grasps"].grasps[0], expected.plan.grasps[0]
+    assert np.allclose(best.T_base_grasp[:3, 3], reference.T_base_grasp[:3, 3], atol=0.01)
+
+
+def test_a_diagram_draws_every_block_signal_and_wire():
+    diagram = perception_diagram(len, len)
+    axes = Figure().subplots()
+    diagram.draw(axes)
+    texts = [text.get_text().replace("\n", " ") for text in axes.texts]
+    for block in diagram.blocks:
+        assert texts.count(block.name) == 1
+        assert all(texts.count(signal) == 1 for signal in block.inputs)
+    wires = sum(len(block.inputs) for block in diagram.blocks)
+    assert sum(text.get_text() == "" for text in axes.texts) == wires
+
+
+# ----------------------------------------------------------------------------------------------- bad input
+
+
+@pytest.mark.parametrize(
+    "blocks, says",
+    [
+        ([Block("p", abs, ("x",), ("y",))], "nobody gives 'x', which 'p' needs"),
+        ([Block("p", abs, ("a",), ("b",)), Block("q", abs, ("a",), ("b",))], "one giver of the signal 'b'"),
+        ([Block("p", abs, ("a",), ("a",))], "one giver of the signal 'a'"),
+        ([Block("p", max, ("a", "c"), ("b",)), Block("q", abs, ("b",), ("c",))], "no loop, got .*p.* -> "),
+    ],
+)
+def test_a_diagram_that_cannot_run(blocks, says):
+    with pytest.raises(ValueError, match=says):
+        Diagram(blocks, inputs=("a",))
+
+
+@pytest.mark.bad_input
+def test_what_does_not_fit_is_named():
+    rgb, mask = np.zeros((4, 5, 3), np.uint8), np.zeros((4, 5), bool)
+    diagram = Diagram([Block("p", lambda a: (a, a, a), ("a",), ("b", "c"))], inputs=("a",))
+    cases = [
+        (lambda: HSVRange((0, 0, 0), (180, 255, 255)), "upper: expected hue 0..179"),
+        (lambda: HSVRange((0, 9, 0), (9, 8, 255)), "lower: expected saturation and value at most"),
+        (lambda: hsv_mask(rgb.astype(float), BROWN), "rgb: expected uint8"),
+        (lambda: fit_hsv([rgb], [mask]), "masks: expected some true pixels"),
+        (lambda: fit_hsv([rgb], [mask[:3]]), "masks: expected the size of images"),
+        (lambda: things_on_table(rgb), "table: expected shape"),
+        (lambda: regions.kmeans(np.ones((9, 2)), 2), "k: expected 1 to 1"),
+        (lambda: regions.kmeans(np.full((9, 2), np.nan), 2), "X: expected finite"),
+        (lambda: regions.components(mask, 6), "connectivity: expected 4 or 8, got 6"),
+        (lambda: regions.measure(mask - 1.0), "pieces: expected integers"),
+        (lambda: regions.measure(2 * (np.arange(20).reshape(4, 5) > 3)), "none of 1"),
+        (lambda: regions.learn_typical([mask]), "masks: expected at least five"),
+        (lambda: montage(rgb, mask[:, :3]), "mask: expected the size of rgb"),
+        (lambda: semanticseg(rgb, lambda rgb: rgb[0]), "net: expected shape"),
+        (lambda: cloud_of_mask(mask, np.ones((4, 5)), np.eye(3).T, np.ones((4, 4))), "T_base_cam"),
+        (lambda: train_small_fcn([], []), "labels: expected one for each"),
+        (lambda: train_small_fcn([rgb], [np.full((4, 5), 7)]), "labels: expected labels 0 to 3"),
+        (lambda: diagram.run(b=1), "signals: expected a, got b"),
+        (lambda: diagram.run(a=1), "p: expected 2 outputs, got 3"),
+    ]
+    for call, says in cases:
+        with pytest.raises(ValueError, match=says):
+            call()
