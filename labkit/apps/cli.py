@@ -175,7 +175,7 @@ def node(
     ] = False,
 ) -> None:
     """Run the segmentation node: on a simulated scene, on a bag, or on ROS."""
-    from labkit.node import command
+    from labkit.apps import node_command as command
 
     if (sim, ros, bag is not None).count(True) != 1:
         raise ValueError("node: expected one of --sim, --ros and --bag")

@@ -7,19 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_crf import random_crf
 
 from labkit.crf import PottsCRF, log_partition, marginals, refine, solve, unary_from_probabilities
 from labkit.crf.energy import OFFSETS
 from labkit.crf.integers import quantise
-
-
-def random_crf(seed, H, W, C, connectivity=4, lam=1.0, forbidden=0.0) -> PottsCRF:
-    rng = np.random.default_rng(seed)
-    unary = rng.normal(0.0, 1.0, (H, W, C))
-    hit = rng.random((H, W, C)) < forbidden
-    hit[..., rng.integers(C)] = False  # one class stays allowed everywhere
-    unary[hit] = np.inf
-    return PottsCRF.from_image(unary, rng.random((H, W, 3)), lam, 0.4, 1.0, connectivity)
 
 
 def energy_by_loop(unary, image, lam, sigma_I, sigma_p, connectivity, y):

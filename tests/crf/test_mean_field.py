@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 import pytest
+from random_crf import random_crf
 from scipy.special import logsumexp, softmax
-from test_crf_energy import random_crf
 
 from labkit.crf import PottsCRF, dense_crf, log_partition, marginals
 from labkit.crf.dense import GaussianFilter

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_crf import random_crf
 from scipy.ndimage import gaussian_filter
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import maximum_flow
-from test_crf_energy import random_crf
 
 from labkit.crf import METHODS, MapResult, PottsCRF, solve
 from labkit.crf.energy import pair_slices

@@ -8,6 +8,7 @@ from labkit.course.questions.judge import plain
 from labkit.course.questions.question import of_topic
 from labkit.course.questions.t07_hand import cloud
 from labkit.grasp.measure_kernels import turn
+from labkit.grasp.planner import HAND_MARGIN, TIP_CLEARANCE
 
 QUESTIONS = of_topic("07_grasp")
 HAND = grasp.Gripper()
@@ -45,8 +46,8 @@ def test_yaw_height_and_pose_together_are_the_kits_grasp_by_the_principal_axis()
     for P in clouds():
         for table_z in (P[:, 2].min() - 0.02, P[:, 2].min() + 0.001):
             mu, Sigma = reference("centroid_and_covariance")(P)
-            palm = HAND.palm_above_tips - grasp.HAND_MARGIN
-            z = reference("grasp_height")(P, table_z, palm, HAND.tips_below_grasp, grasp.TIP_CLEARANCE)
+            palm = HAND.palm_above_tips - HAND_MARGIN
+            z = reference("grasp_height")(P, table_z, palm, HAND.tips_below_grasp, TIP_CLEARANCE)
             T = reference("grasp_pose")(np.array([mu[0], mu[1], z]), reference("closing_yaw")(Sigma))
             kits = grasp.principal_axis_grasp(P, table_z).T_base_grasp
             same = QUESTIONS["grasp_pose"].canonical
