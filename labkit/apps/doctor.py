@@ -40,6 +40,7 @@ def examine(folder=".") -> list[Finding]:
         ("disk", lambda: check_disk(folder)),
         ("cores", check_cores),
         ("GPU", check_gpu),
+        ("sandbox", check_sandbox),
     ]
     return [finding for name, check in checks for finding in run_check(name, check)]
 
@@ -154,6 +155,18 @@ def check_gpu() -> list[Finding]:
     if torch.cuda.is_available():
         return [Finding("GPU", OK, f"{torch.cuda.get_device_name()}, PyTorch {torch.__version__}")]
     return [Finding("GPU", NOTE, f"none for PyTorch {torch.__version__}: networks run on the CPU")]
+
+
+def check_sandbox() -> list[Finding]:
+    """The sandbox that `labkit grade` runs submissions in; students need none."""
+    from labkit.course.grading import bwrap
+
+    try:
+        path = bwrap.executable()
+    except bwrap.NoSandbox as missing:
+        return [Finding("sandbox", NOTE, f"none for `labkit grade`: {missing.cause}", missing.mend)]
+    version = ".".join(map(str, bwrap.version_of(path)))
+    return [Finding("sandbox", OK, f"bubblewrap {version}, {path}")]
 
 
 def report(findings: list[Finding]) -> str:

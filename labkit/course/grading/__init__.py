@@ -2,6 +2,7 @@
 
 reading    a released lab and the submissions of it, read as data of strangers
 sandbox    what a worker sees and may use: bubblewrap, `seccomp`, limits
+bwrap      which bubblewrap there is, and why it does not work where it does not
 worker     the program in the sandbox: takes cells and arguments, sends numbers back
 channel    the other end: sends, waits until a deadline, and takes nothing but numbers
 grade      one submission: every question, whatever happens in the others

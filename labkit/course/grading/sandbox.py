@@ -9,7 +9,6 @@ import functools
 import itertools
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,7 +17,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from labkit.course.grading import seccomp, worker
+from labkit.course.grading import bwrap, seccomp, worker
 from labkit.course.grading.channel import Worker, WorkerLost
 from labkit.support.packages import requirements
 
@@ -54,7 +53,7 @@ class Limits:
 def start(packages: Sequence[str], limits: Limits, unsafe: bool = False) -> Worker:
     """Start a worker that has loaded some packages, and has no others. unsafe: as a plain process.
 
-    Raises ValueError if no sandbox can be made here.
+    Raises ValueError if no sandbox can be made here, or if the packages do not load in it.
     """
     options = {
         "uid": None if unsafe or os.getuid() else FIRST_UID + next(counter) % UIDS,
@@ -88,42 +87,16 @@ def start(packages: Sequence[str], limits: Limits, unsafe: bool = False) -> Work
 
 
 def probe(packages: Sequence[str], limits: Limits) -> None:
-    """Start a worker to see whether the sandbox works here; raises ValueError that says what is missing."""
-    if shutil.which("bwrap") is None:
-        raise ValueError(
-            "sandbox: bubblewrap (`bwrap`) is not installed; on Debian and Ubuntu it is the package `bubblewrap`, on "
-            "macOS and Windows there is none. --unsafe-no-sandbox grades without it: submissions may then do anything"
-        )
-    reading, writing = os.pipe()
-    os.write(writing, seccomp.program())
-    os.close(writing)
-    try:
-        command = [*bubblewrap(tuple(packages), limits.tmp_mb << 20, reading)[:-1], "-c", ""]
-        done = subprocess.run(command, pass_fds=(reading,), capture_output=True, text=True, timeout=limits.start_s)
-    finally:
-        os.close(reading)
-    if done.returncode:
-        said = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
-        raise ValueError(f"sandbox: bubblewrap 0.7 or later is needed, and a kernel that lets it: {said}")
+    """Start a worker to see whether the sandbox works here; raises bwrap.NoSandbox, a ValueError with a remedy."""
+    bwrap.executable()
     start(packages, limits).close()
 
 
 def bubblewrap(packages: tuple[str, ...], tmp_bytes: int, filter_fd: int) -> list[str]:
     """The command line up to the worker's file; its options follow."""
     python, shown = shown_files(packages)
-    command = ["bwrap", "--unshare-pid", "--unshare-net", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try"]
-    # Root keeps what it needs to become another user; anybody else gets a namespace with nobody but themselves.
-    command += ["--cap-drop", "ALL"]
-    command += ["--unshare-user"] if os.getuid() else ["--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID"]
-    command += [
-        "--die-with-parent",
-        "--new-session",
-        "--clearenv",
-        "--hostname",
-        "sandbox",
-        "--seccomp",
-        str(filter_fd),
-    ]
+    command = [bwrap.executable(), *bwrap.namespaces(), "--clearenv", "--hostname", "sandbox"]
+    command += ["--seccomp", str(filter_fd)]
     for name, value in ENVIRONMENT.items():
         command += ["--setenv", name, value]
     made = set()

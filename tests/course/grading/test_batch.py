@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from labkit.apps.cli import app
-from labkit.course.grading import sandbox
+from labkit.course.grading import bwrap
 from labkit.course.grading.batch import read_record, record_path, secret_for
 from labkit.course.grading.grade import packages_for
 from labkit.course.grading.gradebook import opened
@@ -202,8 +202,9 @@ def test_without_a_sandbox_every_file_says_so(course):
 
 
 def test_without_bubblewrap_nothing_is_graded(course, monkeypatch):
-    monkeypatch.setattr(sandbox.shutil, "which", lambda name: None)
-    with pytest.raises(ValueError, match="bubblewrap"):
+    monkeypatch.setattr(bwrap, "candidates", dict)
+    monkeypatch.setattr(bwrap, "executable", bwrap.executable.__wrapped__)
+    with pytest.raises(ValueError, match=r"bubblewrap.*not installed.*--unsafe-no-sandbox"):
         grade(course)
     assert not (course / "grades" / TOPIC / "grades.csv").exists()
 
