@@ -51,13 +51,17 @@ class Explorer:
         """The picture as it stands, a PNG file's bytes."""
         return bytes(self.picture.value)
 
-    def redraw(self) -> None:
-        """Draw the picture for the controls' values."""
+    def figure(self) -> Figure:
+        """Draw the picture for the controls' values, and give the figure, whose axes can be looked into."""
         figure = Figure(self.size, dpi=self.dpi, layout="constrained")
         FigureCanvasAgg(figure)
         self.draw(figure, **self.values)
+        return figure
+
+    def redraw(self) -> None:
+        """Show the picture for the controls' values."""
         file = io.BytesIO()
-        figure.savefig(file, format="png")
+        self.figure().savefig(file, format="png")
         self.picture.value = file.getvalue()
 
     def _repr_mimebundle_(self, include=None, exclude=None):

@@ -15,15 +15,6 @@ from labkit.metrics import confusion_matrix, iou
 from labkit.stacks.threshold import HSVRange, hsv_mask
 
 
-def wiped(left: UInt8[np.ndarray, "H W 3"], right: UInt8[np.ndarray, "H W 3"], at: int) -> UInt8[np.ndarray, "H W 3"]:
-    """Show one picture left of column `at` and the other from there on.
-
-    >>> wiped(np.zeros((1, 3, 3), np.uint8), np.ones((1, 3, 3), np.uint8), 2)[0, :, 0].tolist()
-    [0, 0, 1]
-    """
-    return np.concatenate([left[:, :at], right[:, at:]], axis=1)
-
-
 def wipe(
     rgb: UInt8[np.ndarray, "H W 3"],
     masks: Mapping[str, Integer[np.ndarray, "H W"]],
@@ -40,7 +31,7 @@ def wipe(
 
     def draw(figure: Figure, at: int, left: str, right: str) -> None:
         axes = figure.subplots()
-        axes.imshow(wiped(painted[left], painted[right], at))
+        axes.imshow(np.concatenate([painted[left][:, :at], painted[right][:, at:]], axis=1))
         axes.axvline(at - 0.5, color="white", lw=1.5)
         axes.set_title(f"{left} {scores[left]:.2f}   |   {scores[right]:.2f} {right}     (IoU of the target)")
         axes.axis("off")

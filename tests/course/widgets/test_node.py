@@ -35,24 +35,20 @@ def test_a_slower_network_means_older_answers_and_more_superseded_frames():
     assert ages == sorted(ages) and ages[2] > 200
 
 
-def test_the_lag_explorer_says_what_the_age_costs():
-    shown, said = widgets.lag_explorer(), []
-    draw = shown.draw
-
-    def listening(figure, **values):
-        draw(figure, **values)
-        said.append([axes.get_title() for axes in figure.axes])
-
-    shown.draw = listening
-    first = shown.png
-    shown.controls["network"].value = 20
-    assert shown.png != first
-    shown.controls["speed"].value = 0
-    shown.controls["speed"].value = 300
-    shown.controls["network"].value = 300
-    assert "28 ms old" in said[0][0] and "error 2.8 mm: the jaws still fit" in said[0][1]
-    assert "error 0.0 mm" in said[1][1] and "error 8.4 mm" in said[2][1]
-    assert "a finger hits it" in said[3][1]
+@pytest.mark.parametrize(
+    "network, speed, said",
+    [
+        (20, 100, "error 2.8 mm: the jaws still fit"),
+        (20, 0, "error 0.0 mm"),
+        (20, 300, "8.4 mm"),
+        (300, 300, "hits it"),
+    ],
+)
+def test_the_lag_explorer_says_what_the_age_costs(network, speed, said):
+    shown = widgets.lag_explorer()
+    shown.controls["network"].value, shown.controls["speed"].value = network, speed
+    line, above = shown.figure().axes
+    assert said in above.get_title() and (network != 20 or "28 ms old" in line.get_title())
 
 
 def test_pairs_appear_with_slop_and_none_is_wider():
@@ -62,12 +58,3 @@ def test_pairs_appear_with_slop_and_none_is_wider():
     assert all(abs(i - j) <= 3_000 for i, j in widgets.synchronised(a, b, 3_000))
     pairs = np.array(widgets.synchronised(a, b, 12_000))
     assert len(np.unique(pairs[:, 0])) == len(pairs) == len(np.unique(pairs[:, 1]))
-
-
-def test_the_sync_explorer_redraws():
-    shown = widgets.sync_explorer()
-    pictures = {shown.png}
-    for name, value in (("slop", 0.0), ("jitter", 25.0), ("lost", 0.5), ("slop", 30.0)):
-        shown.controls[name].value = value
-        pictures.add(shown.png)
-    assert len(pictures) >= 4

@@ -3,19 +3,11 @@
 import cv2
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from labkit.course.widgets import stacks
 from labkit.labels import overlay
 from labkit.stacks.engines import labels_of_scores
 from labkit.stacks.threshold import HSVRange, hsv_mask
-
-
-def shown(explorer):
-    """Draw an explorer's picture again, to look into it."""
-    figure = Figure()
-    explorer.draw(figure, **explorer.values)
-    return figure.axes
 
 
 @pytest.fixture
@@ -31,21 +23,12 @@ def test_the_wipe_shows_one_stack_at_each_side(frame):
     explorer = stacks.wipe(rgb, masks, masks["a"])
     explorer.controls["at"].value = 10
     explorer.controls["right"].value = "c"
-    (axes,) = shown(explorer)
+    (axes,) = explorer.figure().axes
     picture = np.asarray(axes.images[0].get_array())
     np.testing.assert_array_equal(picture[:, :10], overlay(rgb, masks["a"], 0.65)[:, :10])
     np.testing.assert_array_equal(picture[:, 10:], overlay(rgb, masks["c"], 0.65)[:, 10:])
     both = np.sum((masks["a"] == 2) & (masks["c"] == 2)) / np.sum((masks["a"] == 2) | (masks["c"] == 2))
     assert axes.get_title().startswith(f"a 1.00   |   {both:.2f} c")
-
-
-def test_every_control_of_the_wipe_changes_the_picture(frame):
-    explorer = stacks.wipe(*frame, frame[1]["b"])
-    seen = {explorer.png}
-    for name, value in (("at", 3), ("left", "c"), ("right", "a")):
-        explorer.controls[name].value = value
-        seen.add(explorer.png)
-    assert len(seen) == 4
 
 
 @pytest.mark.parametrize("first, last", [(20, 90), (150, 30)])
@@ -55,7 +38,7 @@ def test_the_range_darkens_what_is_outside_and_scores_the_rest(frame, first, las
     explorer = stacks.colour_range(rgb, table)
     for name, value in (("first", first), ("last", last), ("saturation", 30), ("value", (40, 230))):
         explorer.controls[name].value = value
-    picture, hues = shown(explorer)
+    picture, hues = explorer.figure().axes
     inside = hsv_mask(rgb, HSVRange((first, 30, 40), (last, 255, 230)))
     np.testing.assert_array_equal(np.asarray(picture.images[0].get_array())[inside], rgb[inside])
     assert picture.get_title().endswith(f"{np.sum(inside & table) / np.sum(inside | table):.3f}")
@@ -66,7 +49,7 @@ def test_the_range_darkens_what_is_outside_and_scores_the_rest(frame, first, las
 def test_the_hues_are_counted(frame):
     rgb, masks = frame
     table = masks["a"] == 1
-    _, hues = shown(stacks.colour_range(rgb, table))
+    _, hues = stacks.colour_range(rgb, table).figure().axes
     hue = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[..., 0]
     curve = hues.lines[0].get_ydata() ** 2
     assert np.allclose(curve / curve.sum(), np.bincount(hue[table], minlength=180) / table.sum())
@@ -89,9 +72,9 @@ def test_the_right_layout_gives_the_right_label_and_the_other_does_not():
         for u in range(3):
             explorer.controls["v"].value, explorer.controls["u"].value = v, u
             explorer.controls["layout"].value = "NCHW"
-            (axes,) = shown(explorer)
+            (axes,) = explorer.figure().axes
             assert axes.get_title().endswith(f"label {labels[v, u]}")
             explorer.controls["layout"].value = "NHWC"
-            wrong += not shown(explorer)[0].get_title().endswith(f"label {labels[v, u]}")
-            assert sum(patch.get_linewidth() == 3 for patch in shown(explorer)[0].patches) == 3
+            wrong += not explorer.figure().axes[0].get_title().endswith(f"label {labels[v, u]}")
+            assert sum(patch.get_linewidth() == 3 for patch in explorer.figure().axes[0].patches) == 3
     assert wrong >= 3
