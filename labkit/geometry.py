@@ -306,6 +306,71 @@ def _determined_axes(count: int, variances, gap, rounding: float) -> tuple[tuple
     return (False, False, False), "the variances are equal in all directions: no axis is determined"
 
 
+# --------------------------------------------------------------------------------------------------- the table's plane
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A plane and what speaks for it: the height of a point P over it is normal @ P + offset, metres.
+
+    normal: unit vector (3,). offset: metres. inliers: bool (N,), which points lie on it. residual: their root mean
+    square height, metres.
+    """
+
+    normal: Float[np.ndarray, "3"]
+    offset: float
+    inliers: Bool[np.ndarray, "N"]
+    residual: float
+
+    def __repr__(self) -> str:
+        return f"Plane({self.inliers.sum()} of {self.inliers.size} points, {1000.0 * self.residual:.2f} mm)"
+
+
+def fit_plane(
+    P: Float[np.ndarray, "N 3"], tolerance: Scalar = 0.008, tries: int = 400, seed: int = 0, viewer=(0.0, 0.0, 0.0)
+) -> Plane:
+    """Find the plane on which most points of a cloud lie: a table, seen with everything that stands on it.
+
+    RANSAC (Fischler and Bolles, 1981): of `tries` planes through three random points the one with most points within
+    `tolerance` metres wins; then least squares over these points, and over those that it finds. The normal points to the
+    side of `viewer`, the camera's place. Raises ValueError if the cloud holds NaN, fewer than three points, or only
+    points on a line. Topic 06.
+
+    >>> x, y = np.meshgrid(np.arange(10.0), np.arange(8.0))
+    >>> table = np.stack([x, y, np.full_like(x, 2.0)], axis=-1).reshape(-1, 3)
+    >>> fit_plane(np.vstack([table, [[3.0, 3.0, 1.0]]]))
+    Plane(80 of 81 points, 0.00 mm)
+    """
+    P = _check_cloud("P", P).astype(np.float64)
+    _check_reach("tolerance", tolerance, P)
+    _check_count("tries", tries, 1)
+    if len(P) < 3:
+        raise ValueError(f"P: expected at least three points, got {len(P)}")
+    rng = np.random.default_rng(seed)
+    some = P[rng.permutation(len(P))[:3000]]  # enough to tell which of two planes holds more points
+    a, b, c = some[rng.integers(len(some), size=(3, tries))]
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    spread = np.linalg.norm(b - a, axis=1) * np.linalg.norm(c - a, axis=1)
+    usable = lengths > 1e-6 * spread + 1e-12  # not three points of a line
+    if not usable.any():
+        raise ValueError("P: expected points that span a plane, got points on a line")
+    normals = normals[usable] / lengths[usable, None]
+    offsets = -(normals * a[usable]).sum(axis=1)
+    votes = [np.count_nonzero(np.abs(some @ n + d) < tolerance) for n, d in zip(normals, offsets, strict=True)]
+    best = int(np.argmax(votes))
+    inliers = np.abs(P @ normals[best] + offsets[best]) < tolerance
+    for _ in range(3):
+        centroid, covariance = centroid_and_covariance(P[inliers])
+        normal = np.linalg.eigh(covariance)[1][:, 0]  # of the smallest variance
+        heights = (P - centroid) @ normal
+        inliers = np.abs(heights) < tolerance
+    offset = -float(normal @ centroid)
+    if normal @ np.asarray(viewer, np.float64) + offset < 0.0:
+        normal, offset = -normal, -offset
+    return Plane(normal, offset, inliers, float(np.sqrt(np.mean(heights[inliers] ** 2))))
+
+
 # ------------------------------------------------------------------------------------- outliers and separate objects
 
 

@@ -584,3 +584,38 @@ BAD = [
 def test_bad_input_is_an_error_that_names_the_argument(name, call):
     with pytest.raises(ValueError, match=rf"^{name}: expected "):
         call()
+
+
+# --------------------------------------------------------------------------------------------------- the table's plane
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_fitted_plane_is_the_tables_among_things_and_noise(seed):
+    """Half of the points stand on the table or float; the plane is within the standard error of the true one."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    u = np.cross(normal, [1.0, 0.0, 0.0])
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
+    a, b = rng.uniform(-0.5, 0.5, (2, 4000))
+    table = 0.8 * normal + a[:, None] * u + b[:, None] * v + rng.normal(0.0, 0.002, (4000, 1)) * normal
+    things = 0.8 * normal + rng.uniform(-0.5, 0.5, (4000, 2)) @ [u, v] + rng.uniform(-0.3, -0.03, (4000, 1)) * normal
+    plane = geometry.fit_plane(np.vstack([table, things]).astype(np.float32))
+    assert np.degrees(np.arccos(min(1.0, -plane.normal @ normal))) < 0.05, "towards the viewer, who is on the near side"
+    assert abs(plane.offset - 0.8) < 0.0005
+    assert plane.inliers[:4000].mean() > 0.999 and plane.inliers[4000:].mean() < 0.05
+    assert plane.residual == pytest.approx(0.002, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("P", "message"),
+    [
+        (np.zeros((2, 3)), "three points"),
+        (np.outer(np.arange(20.0), [1.0, 2.0, 3.0]), "on a line"),
+        (np.full((5, 3), np.nan), "P"),
+    ],
+)
+def test_what_spans_no_plane_is_refused(P, message):
+    with pytest.raises(ValueError, match=message):
+        geometry.fit_plane(P)
