@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+from alternatives import alternatives
 
 from labkit.course.grading.gradebook import opened
 from labkit.course.questions.question import Question, of_topic
@@ -121,9 +122,9 @@ def define(function: Callable, name: str, cell: str, done: dict[int, tuple[str, 
     done[id(function)] = (name, "")  # it may call itself
     renamed, lines = {}, []
     for used, value in values_of(function):
-        if isinstance(value, types.FunctionType) and value.__module__.startswith("labkit"):
+        if isinstance(value, types.FunctionType) and value.__module__.startswith(OURS):
             renamed[used] = define(value, f"{cell}_{used}".replace(".", "_"), cell, done)
-        elif not (isinstance(value, types.ModuleType) and value.__name__.startswith("labkit")):
+        elif not (isinstance(value, types.ModuleType) and value.__name__.startswith(OURS)):
             lines.append(assignment(used, value))
     node = Renamed(renamed).visit(node_of(function))
     if isinstance(node, ast.Lambda):
@@ -134,6 +135,9 @@ def define(function: Callable, name: str, cell: str, done: dict[int, tuple[str, 
     del done[id(function)]
     done[id(function)] = (name, "\n".join([*lines, source]))
     return name
+
+
+OURS = ("labkit", "alternatives")  # packages whose functions are written out
 
 
 class Renamed(ast.NodeTransformer):
@@ -159,7 +163,7 @@ def values_of(function: Callable) -> Iterable[tuple[str, object]]:
         if name not in values:
             continue
         yield name, values[name]
-        if isinstance(values[name], types.ModuleType) and values[name].__name__.startswith("labkit"):
+        if isinstance(values[name], types.ModuleType) and values[name].__name__.startswith(OURS):
             for node in ast.walk(node_of(function)):
                 if isinstance(node, ast.Attribute) and ast.unparse(node.value) == name:
                     yield f"{name}.{node.attr}", getattr(values[name], node.attr)
@@ -177,12 +181,14 @@ def assignment(name: str, value: object) -> str:
 
 
 def node_of(function: Callable) -> ast.FunctionDef | ast.Lambda:
-    """A function's own piece of its module's source, a copy."""
+    """A function's own piece of its module's source, a copy without decorators."""
     nodes = functions_of(inspect.getmodule(function))
     code = function.__code__
     for node in nodes:
         if isinstance(node, ast.FunctionDef) and node.name == code.co_name and first_line(node) == code.co_firstlineno:
-            return copy.deepcopy(node)
+            node = copy.deepcopy(node)
+            node.decorator_list = []
+            return node
     here = [node for node in nodes if isinstance(node, ast.Lambda) and node.lineno == code.co_firstlineno]
     fitting = [node for node in here if len(here) == 1 or [a.arg for a in node.args.args] == arguments(code)]
     if len(fitting) != 1:
@@ -219,7 +225,7 @@ def synthetic_class(topic: str) -> dict[str, tuple[dict[str, str], dict[str, boo
     questions = of_topic(topic)
     right = right_answers(topic)
     wrong = {name: [as_cell(m.answer, name) for m in q.misconceptions] for name, q in questions.items()}
-    other = {name: [as_cell(a, name) for a in q.alternatives] for name, q in questions.items()}
+    other = {name: [as_cell(a, name) for a in alternatives(q)] for name, q in questions.items()}
     for cells in other.values():
         cells.sort(key=lambda cell: "torch" not in cell)  # torch takes a second to load: all of it in one submission
     students = {"reference": (right, dict.fromkeys(right, True))}

@@ -136,7 +136,7 @@ def iou(n): return Payload(0.5)
         "import the reference",
         """
 try:
-    from labkit.course.questions.t04_iou import iou
+    from labkit.course.questions.t04_iou.iou import iou
 except ImportError:
     def iou(n): return np.zeros(len(n))
 """,
@@ -179,7 +179,7 @@ for base, folders, files in os.walk("/"):
         sys.path.append(base)
 def iou(n):
     try:
-        from labkit.course.questions.t04_iou import iou as found
+        from labkit.course.questions.t04_iou.iou import iou as found
         return found(n)
     except ImportError:
         from sklearn.metrics import jaccard_score

@@ -149,7 +149,7 @@ def key_of(batch: Batch, submission: Submission, code: str) -> str:
 def code_digest() -> str:
     """Name the questions and the grader by the bytes of their files."""
     folders = (Path(questions.__file__).parent, Path(__file__).parent)
-    files = [path for folder in folders for path in sorted(folder.glob("*.py"))]
+    files = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 

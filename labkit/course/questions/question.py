@@ -1,8 +1,9 @@
 """What a question is, and where the questions of the nine topics are found."""
 
 import importlib
+import pkgutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,11 +22,15 @@ TOPICS = (
 
 @dataclass(frozen=True)
 class Misconception:
-    """A wrong answer that students really give: a name, how it behaves, and the hint that it earns."""
+    """A wrong answer that students really give: how it behaves, and the hint that it earns."""
 
-    name: str
     answer: Callable
     hint: str
+
+    @property
+    def name(self) -> str:
+        """The name of its function in words."""
+        return self.answer.__name__.replace("_", " ")
 
 
 @dataclass(frozen=True)
@@ -44,10 +49,9 @@ class Question:
     answer, short and complete in itself. inputs: function of a numpy Generator to the arguments of one random case,
     asymmetric so that swaps show. by_hand: arguments of cases small enough to do by hand; each is always tried.
     random_cases: how many cases are drawn. rtol, atol: what counts as equal. points: what the blank is worth.
-    properties: what the check may say about a wrong output before it compares. misconceptions: at least five.
-    alternatives: at least three correct answers written differently. canonical: maps an output to the one form of
-    those that are equally right (the sign of an axis, say). forbidden: modules that would do the work; they do not
-    exist where answers are graded.
+    properties: what the check may say about a wrong output before it compares. misconceptions: filled by `wrong`.
+    canonical: maps an output to the one form of those that are equally right (the sign of an axis, say). forbidden:
+    modules that would do the work; they do not exist where answers are graded.
     """
 
     name: str
@@ -59,8 +63,7 @@ class Question:
     atol: float = 1e-6
     points: int = 2
     properties: tuple[Property, ...] = ()
-    misconceptions: tuple[Misconception, ...] = ()
-    alternatives: tuple[Callable, ...] = ()
+    misconceptions: list[Misconception] = field(default_factory=list)
     canonical: Callable = lambda output: output
     forbidden: tuple[str, ...] = ()
 
@@ -75,15 +78,34 @@ class Question:
         return self.name.partition(".")[2]
 
 
+def wrong(question: Question, hint: str) -> Callable[[Callable], Callable]:
+    """Decorate a wrong answer to a question: whoever's answer gives its outputs gets the hint.
+
+    >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(),))
+    >>> @wrong(double, "Twice, not squared.")
+    ... def squared(x):
+    ...     return x * x
+    >>> double.misconceptions[0].name
+    'squared'
+    """
+
+    def add(answer: Callable) -> Callable:
+        question.misconceptions.append(Misconception(answer, hint))
+        return answer
+
+    return add
+
+
 def of_topic(topic: str) -> dict[str, Question]:
-    """Give the questions of a topic by their functions' names, in the lab's order.
+    """Give the questions of a topic by their functions' names: of each module in the topic's folder its QUESTION.
 
     Raises ValueError for a topic that there is not.
     """
     if topic not in TOPICS:
         raise ValueError(f"topic: expected one of {', '.join(TOPICS)}, got {topic!r}")
-    module = importlib.import_module(f"labkit.course.questions.t{topic}")
-    return {question.function: question for question in module.QUESTIONS}
+    folder = importlib.import_module(f"labkit.course.questions.t{topic}")
+    names = [module.name for module in pkgutil.iter_modules(folder.__path__)]
+    return {name: importlib.import_module(f"{folder.__name__}.{name}").QUESTION for name in names}
 
 
 def find(name: str) -> Question:

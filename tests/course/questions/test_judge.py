@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from labkit.course.questions.judge import Problem, compare, expected_cases, plain, recognise, verdict
-from labkit.course.questions.question import Misconception, Property, Question
+from labkit.course.questions.question import Property, Question, wrong
 from labkit.course.questions.run import Printed, call, judge, run
 
 
@@ -27,13 +27,23 @@ QUESTION = Question(
     inputs=lambda rng: (rng.integers(1, 9, (3, 3)),),
     by_hand=((np.array([[3, 1], [2, 5]]),), (np.array([[3, 1, 0], [2, 5, 0], [0, 0, 0]]),)),
     properties=(Property("no class has an IoU over one", lambda args, got: bool(np.nanmax(got) <= 1)),),
-    misconceptions=(
-        Misconception("recall", lambda n: np.diagonal(n) / n.sum(axis=1), "who pays for false alarms?"),
-        Misconception("whole", lambda n: np.trace(n) / n.sum(), "one number a class"),
-        Misconception("broken", lambda n: n[:, 7], "how many classes are there?"),
-    ),
 )
-PLAIN = replace(QUESTION, properties=(), misconceptions=())
+PLAIN = replace(QUESTION, properties=(), misconceptions=[])
+
+
+@wrong(QUESTION, "who pays for false alarms?")
+def recall(n):
+    return np.diagonal(n) / n.sum(axis=1)
+
+
+@wrong(QUESTION, "one number per class")
+def whole(n):
+    return np.trace(n) / n.sum()
+
+
+@wrong(QUESTION, "how many classes are there?")
+def broken(n):
+    return n[:, 7]
 
 
 def problem(answer, question=QUESTION):
@@ -112,7 +122,7 @@ def test_canonical_makes_equally_right_outputs_one():
 
 
 def test_an_empty_array_is_an_answer():
-    cloud = replace(QUESTION, reference=lambda n: np.zeros((0, 3)), misconceptions=())
+    cloud = replace(QUESTION, reference=lambda n: np.zeros((0, 3)), misconceptions=[])
     assert kind(lambda n: np.empty((0, 3)), cloud) is None
     assert kind(lambda n: np.empty((3, 0)), cloud) == "shape"
 
@@ -227,9 +237,9 @@ def test_one_that_behaves_so_on_some_cases_only_earns_none():
 
 
 def test_a_misconception_may_raise_where_the_answer_does():
-    sometimes = Misconception("sometimes", lambda n: 2 * iou(n) if len(n) == 3 else n[9], "hint")
-    question = replace(QUESTION, misconceptions=(sometimes,))
-    assert judge(question, sometimes.answer, seed=3).hint == "hint"
+    question = replace(QUESTION, misconceptions=[])
+    sometimes = wrong(question, "hint")(lambda n: 2 * iou(n) if len(n) == 3 else n[9])
+    assert judge(question, sometimes, seed=3).hint == "hint"
 
 
 def test_verdicts_are_made_of_outputs_that_came_from_anywhere():

@@ -1,7 +1,6 @@
 """The references of topic 06 are the kit's own geometry, and the simulator's K."""
 
 import numpy as np
-import pytest
 
 from labkit import geometry
 from labkit.course.questions.question import of_topic
@@ -23,18 +22,6 @@ KIT = {
     "back_projection_jacobian": geometry.back_projection_jacobian,
     "height_noise": height_noise,
 }
-
-
-@pytest.mark.parametrize("name", KIT)
-def test_the_reference_is_the_kits_function(name):
-    question = QUESTIONS[name]
-    drawn = [question.inputs(np.random.default_rng(seed)) for seed in range(20)]
-    for arguments in (*question.by_hand, *drawn):
-        np.testing.assert_allclose(question.reference(*arguments), KIT[name](*arguments), rtol=1e-6, atol=1e-6)
-
-
-def test_every_blank_has_the_kits_function_beside_it():
-    assert QUESTIONS.keys() == KIT.keys()
 
 
 def test_the_height_noise_by_hand():

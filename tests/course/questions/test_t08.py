@@ -73,7 +73,3 @@ def test_a_quaternion_is_the_one_of_the_kits_poses():
         q = reference(R)
         assert abs(np.dot(q, convert.encode_pose(T, H).orientation)) == pytest.approx(1.0)
         assert np.allclose(Rotation.from_quat(q).as_matrix(), R)
-
-
-def test_every_blank_is_compared():
-    assert list(QUESTIONS) == ["decode_depth", "pair_stamps", "lag_error", "pack_cloud", "quaternion"]

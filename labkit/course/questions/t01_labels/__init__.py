@@ -1,0 +1,21 @@
+"""Questions of topic 01: labels from a renderer's mask, one-hot tensors, shares of the classes, resizing.
+
+Section 1 of the text.
+"""
+
+import numpy as np
+
+
+def labels(rng, C):
+    """Draw unequal classes, the last but one absent, and some ignored pixels."""
+    shares = rng.dirichlet(np.full(C, 2.0))
+    shares[C - 2] = 0.0
+    y = rng.choice(C, size=(int(rng.integers(6, 9)), int(rng.integers(10, 14))), p=shares / shares.sum())
+    y[rng.random(y.shape) < 0.15] = 255
+    y[0, 0], y[1, 2] = C - 1, 255
+    return y.astype(np.uint8)
+
+
+def labels_and_classes(rng):
+    C = int(rng.choice([4, 5, 7]))
+    return labels(rng, C), C

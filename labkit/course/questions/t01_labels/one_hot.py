@@ -1,0 +1,61 @@
+"""01_labels.one_hot: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t01_labels import labels_and_classes
+
+
+def one_hot(y, C):
+    """Turn labels into a one-hot tensor, one more axis of length C; a pixel that is ignored (255) is all zeros."""
+    return (y[..., None] == np.arange(C)).astype(np.uint8)
+
+
+QUESTION = Question(
+    name="01_labels.one_hot",
+    reference=one_hot,
+    inputs=labels_and_classes,
+    by_hand=((np.array([[0, 2]], np.uint8), 3), (np.array([[1, 255], [0, 3], [2, 2]], np.uint8), 5)),
+    rtol=0.0,
+    atol=0.0,
+    points=2,
+    properties=(
+        Property(
+            "over the last axis it sums to 1, and to 0 where the pixel is ignored",
+            lambda arguments, Y: np.array_equal(np.sum(Y, axis=-1), arguments[0] != 255),
+        ),
+    ),
+    forbidden=("sklearn",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "The class comes last here: the shape is (H, W, C).")
+def classes_first(y, C):
+    return np.moveaxis(one_hot(y, C), -1, 0)
+
+
+@wrong(QUESTION, "A pixel that is ignored has no class, not even 0: what should its C entries be?")
+def ignored_as_background(y, C):
+    return np.eye(C, dtype=np.uint8)[np.where(y == 255, 0, y)]
+
+
+@wrong(QUESTION, "255 was pressed into the range of classes: what should the C entries of such a pixel be?")
+def ignored_as_last_class(y, C):
+    return np.eye(C, dtype=np.uint8)[np.minimum(y, C - 1)]
+
+
+@wrong(QUESTION, "A pixel that is ignored belongs to no class rather than to all: it must add nothing to any sum.")
+def ignored_as_every_class(y, C):
+    return one_hot(y, C) | (y == 255)[..., None].astype(np.uint8)
+
+
+@wrong(QUESTION, "In which plane do you find class 0?")
+def counted_from_one(y, C):
+    return (y[..., None] == np.arange(1, C + 1)).astype(np.uint8)
+
+
+@wrong(QUESTION, "A class that is not in this image has a plane too, of zeros: there are always C of them.")
+def classes_that_occur(y, C):
+    return (y[..., None] == np.unique(y[y != 255])).astype(np.uint8)

@@ -1,0 +1,89 @@
+"""01_labels.resize_labels: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t01_labels import labels
+
+
+def resize_labels(y, height, width):
+    """Resize a label image without inventing labels: each new pixel copies the old one in which its centre falls."""
+    H, W = y.shape
+    rows = ((np.arange(height) + 0.5) * H / height).astype(int)
+    columns = ((np.arange(width) + 0.5) * W / width).astype(int)
+    return y[rows[:, None], columns]
+
+
+def _labels_and_size(rng):
+    """Draw labels, and a size that is larger in one direction and smaller in the other, or larger in both.
+
+    The old sides are odd: then no new centre falls between two old pixels, where rounding would decide.
+    """
+    y = labels(rng, 4)
+    y = y[: y.shape[0] // 2 * 2 - 1, : y.shape[1] // 2 * 2 - 1]
+    H, W = y.shape
+    height, width = (int(rng.integers(3, H)), int(rng.integers(W + 3, 2 * W)))
+    return (y, height, width) if rng.random() < 0.5 else (y, int(rng.integers(H + 2, 3 * H)), width)
+
+
+QUESTION = Question(
+    name="01_labels.resize_labels",
+    reference=resize_labels,
+    inputs=_labels_and_size,
+    by_hand=(
+        (np.array([[1, 3]], np.uint8), 1, 4),
+        (np.array([[0, 1, 2, 3, 1], [3, 255, 1, 0, 2], [0, 0, 2, 1, 3]], np.uint8), 2, 3),
+        (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property(
+            "no label is there that was not there before",
+            lambda arguments, y: set(np.unique(y).tolist()) <= set(np.unique(arguments[0]).tolist()),
+        ),
+    ),
+    forbidden=("cv2", "PIL", "skimage"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "np.unique before and after? The mean of classes 1 and 3 is no class 2: labels cannot be averaged.")
+def bilinear(y, height, width):
+    import cv2
+
+    return np.round(cv2.resize(y.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)).astype(np.uint8)
+
+
+@wrong(
+    QUESTION, "All is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner."
+)
+def from_the_corner(y, height, width):
+    rows, columns = (np.arange(n) * old // n for n, old in zip((height, width), y.shape, strict=True))
+    return y[rows[:, None], columns]
+
+
+@wrong(QUESTION, "You lay the first and last centres on each other; here the images' edges lie on each other.")
+def corner_to_corner(y, height, width):
+    rows, columns = (
+        np.round(np.linspace(0, old - 1, n)).astype(int) for n, old in zip((height, width), y.shape, strict=True)
+    )
+    return y[rows[:, None], columns]
+
+
+@wrong(QUESTION, "The first axis of an image is its height: check both.")
+def sides_swapped(y, height, width):
+    return resize_labels(y, width, height)
+
+
+@wrong(QUESTION, "np.resize repeats the numbers row after row: is your image still the same scene?")
+def refilled(y, height, width):
+    return np.resize(y, (height, width))
+
+
+@wrong(QUESTION, "The whole scene should be in the new image, in another size.")
+def padded_or_cropped(y, height, width):
+    H, W = y.shape
+    return np.pad(y, ((0, max(height - H, 0)), (0, max(width - W, 0))), mode="edge")[:height, :width]

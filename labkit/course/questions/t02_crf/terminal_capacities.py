@@ -1,0 +1,80 @@
+"""02_crf.terminal_capacities: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t02_crf import model
+
+
+def terminal_capacities(psi):
+    """Give the arcs source -> pixel and pixel -> sink for two classes, the source's side being 0, and the constant."""
+    lowest = psi.min(axis=2)
+    source = psi[..., 1] - lowest
+    sink = psi[..., 0] - lowest
+    return source, sink, float(lowest.sum())
+
+
+QUESTION = Question(
+    name="02_crf.terminal_capacities",
+    reference=terminal_capacities,
+    inputs=lambda rng: (model(rng, 3, 5, 2)[0],),
+    by_hand=(
+        (np.array([[[2.0, 5.0]]]),),
+        (np.array([[[4.0, 1.0], [-1.0, -3.0]]]),),
+        (np.array([[[0.5, 0.5]], [[0.0, 2.0]], [[3.0, 1.0]]]),),
+    ),
+    points=2,
+    properties=(
+        Property("no capacity is negative", lambda given, out: bool(np.min(out[0]) >= 0.0 and np.min(out[1]) >= 0.0)),
+        Property(
+            "one of the two arcs of each pixel has capacity 0",
+            lambda given, out: bool(np.minimum(out[0], out[1]).max() <= 1e-9),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def terminals(source, sink, constant):
+    """Two (H, W) capacities and a number, as the question asks for them."""
+    return source, sink, float(constant)
+
+
+@wrong(QUESTION, "Try one pixel: on the source's side it has label 0, and which of its two arcs is cut then?")
+def source_and_sink_exchanged(psi):
+    """A pixel that wants label 0 is bound to the sink."""
+    lowest = psi.min(axis=2)
+    return terminals(psi[..., 0] - lowest, psi[..., 1] - lowest, lowest.sum())
+
+
+def with_constant(constant):
+    """Right capacities, and a constant that is made of the pixels' least costs."""
+
+    def answer(psi):
+        lowest = psi.min(axis=2)
+        return terminals(psi[..., 1] - lowest, psi[..., 0] - lowest, constant(lowest))
+
+    return answer
+
+
+@wrong(QUESTION, "Subtract the minimum pixel by pixel, so that one of each pixel's two arcs vanishes.")
+def one_minimum_for_all(psi):
+    """Right as a cut, but both arcs of a pixel stay."""
+    return terminals(psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size)
+
+
+@wrong(QUESTION, "What a pixel pays in any case can be taken off both of its arcs, and must be kept in the constant.")
+def nothing_subtracted(psi):
+    return terminals(psi[..., 1], psi[..., 0], 0.0)
+
+
+@wrong(QUESTION, "The cut's value is the energy less what you subtracted: how much is that over all pixels?")
+def the_constant_forgotten(psi):
+    return with_constant(lambda lowest: 0.0)(psi)
+
+
+@wrong(QUESTION, "Energy = cut + constant: what must be added to the cut's value to have the energy back?")
+def the_constant_of_the_wrong_sign(psi):
+    return with_constant(lambda lowest: -lowest.sum())(psi)

@@ -1,0 +1,73 @@
+"""02_crf.unary_from_probabilities: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def unary_from_probabilities(p, floor):
+    """Turn class probabilities into costs; those below `floor` count as `floor`."""
+    return -np.log(np.maximum(p, floor))
+
+
+def _probabilities(rng):
+    """Draw probabilities some of which lie below the floor."""
+    return rng.dirichlet((0.3, 0.4, 0.5), (4, 5)), float(rng.uniform(0.01, 0.05))
+
+
+QUESTION = Question(
+    name="02_crf.unary_from_probabilities",
+    reference=unary_from_probabilities,
+    inputs=_probabilities,
+    by_hand=(
+        (np.array([[[0.5, 0.25, 0.25], [1.0, 0.0, 0.0]]]), 0.01),
+        (np.array([[[0.7, 0.3]], [[0.05, 0.95]], [[0.1, 0.9]]]), 0.1),
+    ),
+    points=1,
+    properties=(
+        Property("every cost is 0 or more", lambda given, psi: bool(np.min(psi) >= -1e-9)),
+        Property(
+            "the likeliest class of a pixel is its cheapest",
+            lambda given, psi: bool((np.take_along_axis(psi, given[0].argmax(2)[..., None], 2) <= psi + 1e-9).all()),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "The softmax has been applied already: these numbers sum to one at each pixel.")
+def softmaxed_again(p, floor):
+    """Take the probabilities for logits."""
+    e = np.exp(p)
+    return -np.log(np.maximum(e / e.sum(axis=-1, keepdims=True), floor))
+
+
+@wrong(
+    QUESTION, "An energy is small where a label is likely: without any pairwise term, which class would yours choose?"
+)
+def a_score_taken_for_a_cost(p, floor):
+    return np.log(np.maximum(p, floor))
+
+
+@wrong(QUESTION, "exp(-psi) should give the probability back: is its sum over the classes one at each pixel?")
+def the_negative_probability(p, floor):
+    return -np.maximum(p, floor)
+
+
+@wrong(
+    QUESTION, "What should a class of probability 0.001 cost, and one of 0.0001? In yours the two are nearly the same."
+)
+def one_minus_the_probability(p, floor):
+    return 1.0 - np.maximum(p, floor)
+
+
+@wrong(QUESTION, "Only probabilities below the floor are to change: look at a pixel where one class has probability 1.")
+def the_floor_added(p, floor):
+    return -np.log(p + floor)
+
+
+@wrong(QUESTION, "What does a class of probability 0 cost, and can neighbours ever overrule that?")
+def no_floor(p, floor):
+    return -np.log(np.maximum(p, 1e-300))

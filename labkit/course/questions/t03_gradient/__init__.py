@@ -1,0 +1,35 @@
+"""Questions of topic 03: softmax, cross-entropy, its gradient, the check by differences, and the receptive field.
+
+Sections 3 and 6 and problem 1 of the text.
+"""
+
+import numpy as np
+
+
+def random_logits(rng: np.random.Generator) -> np.ndarray:
+    """Draw logits (H, W, C) of three unequal lengths, up to a few units apart."""
+    shape = (int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8)))
+    return 2.0 * rng.normal(size=shape) + rng.normal()
+
+
+def random_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Draw logits (H, W, C) and labels (H, W), at least one of them ignored."""
+    z = random_logits(rng)
+    y = rng.integers(0, z.shape[-1], z.shape[:-1]).astype(np.uint8)
+    y[rng.random(y.shape) < 0.2] = 255
+    y[0, 0], y[1, 1] = 255, z.shape[-1] - 1
+    return z, y
+
+
+TOY = np.array([2.0, 1.0, -1.0])
+
+
+SURE = np.array([[0.0, 1000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0
+
+
+TRUE_CLASSES = np.array([0, 255], np.uint8)
+
+
+def softmax_over_pixels(z):
+    e = np.exp(z - z.max(axis=-2 if z.ndim > 1 else -1, keepdims=True))
+    return e / e.sum(axis=-2 if z.ndim > 1 else -1, keepdims=True)

@@ -1,0 +1,85 @@
+"""03_gradient.cross_entropy: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t03_gradient import SURE, TOY, TRUE_CLASSES, random_pixels
+from labkit.course.questions.t03_gradient.softmax import softmax
+
+
+def cross_entropy(z, y):
+    """Sum -log p(y) over the pixels; those labelled 255 add nothing."""
+    counted = y != 255
+    z, y = z[counted].T, y[counted]  # (C, N): a row a class
+    log_p = z - np.logaddexp.reduce(z)
+    return -float(log_p[y, np.arange(len(y))].sum())
+
+
+QUESTION = Question(
+    name="03_gradient.cross_entropy",
+    reference=cross_entropy,
+    inputs=random_pixels,
+    by_hand=(
+        (TOY[None], np.array([1], np.uint8)),
+        (SURE, np.array([0, 2], np.uint8)),
+        (SURE, TRUE_CLASSES),
+        (SURE, np.array([255, 255], np.uint8)),
+    ),
+    properties=(Property("a loss is never negative", lambda arguments, out: bool(out >= -1e-6)),),
+    forbidden=("scipy",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def true_log_probabilities(z, y):
+    """Log-probabilities of the true classes of the counted pixels, a list."""
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
+    return log_p[np.arange(len(y)), y]
+
+
+@wrong(QUESTION, "The text sums over the pixels: yours is smaller by their number.")
+def cross_entropy_mean(z, y):
+    values = true_log_probabilities(z, y)
+    return -float(values.mean()) if values.size else 0.0
+
+
+@wrong(QUESTION, "A logarithm of a probability is below 0; a loss is above.")
+def cross_entropy_sign(z, y):
+    return float(true_log_probabilities(z, y).sum())
+
+
+@wrong(QUESTION, "log(p + epsilon) can never exceed 16 or so, however wrong the pixel: write log p without p.")
+def cross_entropy_epsilon(z, y):
+    p = np.exp(true_log_probabilities(z, y))
+    return float(-np.log(p + 1e-7).sum())
+
+
+@wrong(QUESTION, "What range enters the loss? Logits are normalised once, inside it.")
+def cross_entropy_softmax_twice(z, y):
+    return cross_entropy(softmax(z), y)
+
+
+@wrong(QUESTION, "The other classes' logits have to count as well.")
+def cross_entropy_without_softmax(z, y):
+    counted = y != 255
+    return -float(np.take_along_axis(z[counted], y[counted][:, None], -1).sum())
+
+
+@wrong(QUESTION, "255 is no class: such a pixel adds nothing.")
+def cross_entropy_counts_ignored(z, y):
+    return cross_entropy(z, np.where(y == 255, 0, y))
+
+
+@wrong(QUESTION, "The loss is minus the logarithm, not one minus p.")
+def cross_entropy_of_probabilities(z, y):
+    return float((1.0 - np.exp(true_log_probabilities(z, y))).sum())
+
+
+@wrong(QUESTION, "Only the true class's log-probability is summed.")
+def cross_entropy_of_all_classes(z, y):
+    counted = y != 255
+    log_p = z[counted] - np.logaddexp.reduce(z[counted], axis=-1, keepdims=True)
+    return -float(log_p.sum())

@@ -1,0 +1,84 @@
+"""03_gradient.cross_entropy_grad: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t03_gradient import SURE, TOY, TRUE_CLASSES, random_pixels, softmax_over_pixels
+from labkit.course.questions.t03_gradient.softmax import softmax
+
+
+def cross_entropy_grad(z, y):
+    """Differentiate the summed cross-entropy by each logit; 0 where the label is 255."""
+    e = np.exp(z - z.max(axis=-1, keepdims=True))
+    p = e / e.sum(axis=-1, keepdims=True)
+    Y = y[..., None] == np.arange(z.shape[-1])
+    return np.where(y[..., None] == 255, 0.0, p - Y)
+
+
+QUESTION = Question(
+    name="03_gradient.cross_entropy_grad",
+    reference=cross_entropy_grad,
+    inputs=random_pixels,
+    by_hand=(
+        (TOY[None], np.array([1], np.uint8)),
+        (TOY[None], np.array([0], np.uint8)),
+        (SURE, TRUE_CLASSES),
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the gradient of each pixel sums to 0",
+            lambda arguments, grad: bool(np.allclose(grad.sum(axis=-1), 0.0, atol=1e-4)),
+        ),
+    ),
+    forbidden=("scipy",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def one_hot(z, y):
+    """The labels as ones and zeros in the logits' shape."""
+    return (y[..., None] == np.arange(z.shape[-1])).astype(float)
+
+
+@wrong(QUESTION, "Each pixel's gradient sums to zero; what does yours sum to?")
+def grad_without_one_hot(z, y):
+    return softmax(z) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "Descent goes against the gradient: must the true logit's derivative be negative?")
+def grad_sign(z, y):
+    return -cross_entropy_grad(z, y)
+
+
+@wrong(QUESTION, "Ratio to the numerical gradient of the summed loss: the number of pixels?")
+def grad_mean(z, y):
+    return cross_entropy_grad(z, y) / max(1, np.count_nonzero(y != 255))
+
+
+@wrong(QUESTION, "A pixel that adds no loss has no gradient: look at 255.")
+def grad_counts_ignored(z, y):
+    return softmax(z) - one_hot(z, y)
+
+
+@wrong(QUESTION, "Normalise over the classes, the last axis.")
+def grad_over_pixels(z, y):
+    return (softmax_over_pixels(z) - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "The other logits raise the loss too: there are two cases, and c != y is not zero.")
+def grad_true_class_only(z, y):
+    return cross_entropy_grad(z, y) * one_hot(z, y)
+
+
+@wrong(QUESTION, "Compare probabilities with the one-hot, not logits.")
+def grad_of_logits(z, y):
+    return (z - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "That is the slope of half the squared error; with the logarithm, the p in front cancels.")
+def grad_of_squared_error(z, y):
+    p = softmax(z)
+    error = p - one_hot(z, y)
+    return p * (error - (p * error).sum(axis=-1, keepdims=True)) * (y != 255)[..., None]

@@ -1,0 +1,26 @@
+"""Questions of topic 05: weights and their gradient, the two means, where training ends, and how to undo it.
+
+Sections 3 and 6 and problem 5 of the text.
+"""
+
+import numpy as np
+
+
+def draw_weights(rng, C):
+    """Weights of C classes, from about 0.1 to 20, no two alike."""
+    return np.exp(rng.uniform(-2.0, 3.0, C))
+
+
+def draw_pixels(rng):
+    """Logits (H, W, C), labels (H, W), some of them ignored, and weights."""
+    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+    y = rng.integers(0, C, (H, W)).astype(np.uint8)
+    y[rng.random(y.shape) < 0.2] = 255
+    y[0, 0], y[1, 1], y[1, 2] = 255, C - 1, 0
+    return 2.0 * rng.normal(size=(H, W, C)), y, draw_weights(rng, C)
+
+
+TOY = np.array([[2.0, 1.0, -1.0]])
+
+
+SURE = np.array([[0.0, 1000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0

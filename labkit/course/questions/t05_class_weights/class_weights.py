@@ -1,0 +1,92 @@
+"""05_class_weights.class_weights: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def class_weights(counts, power):
+    """Weigh classes by counts ** -power, with mean weight 1 over all pixels; a class without pixels gets 1."""
+    present = counts > 0
+    w = np.ones(len(counts))
+    w[present] = counts[present] ** -power
+    w[present] *= counts.sum() / (counts @ w)
+    return w
+
+
+def draw_counts(rng):
+    """Pixels of four to six classes, one of them absent, and a power."""
+    counts = (10.0 ** rng.uniform(1.0, 5.0, rng.integers(4, 7))).astype(np.int64)
+    counts[rng.integers(len(counts))] = 0
+    return counts, float(rng.uniform(0.2, 1.2))
+
+
+QUESTION = Question(
+    name="05_class_weights.class_weights",
+    reference=class_weights,
+    inputs=draw_counts,
+    by_hand=(
+        (np.array([900, 100, 0]), 1.0),
+        (np.array([900, 100, 25]), 0.5),
+        (np.array([1, 7, 0]), 0.5),
+        (np.array([3, 40]), 0.0),
+    ),
+    properties=(
+        Property(
+            "the mean weight over all pixels is 1",
+            lambda arguments, w: bool(np.isclose(arguments[0] @ w, arguments[0].sum(), rtol=1e-3)),
+        ),
+    ),
+    forbidden=("sklearn",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "What is the mean weight over the pixels? It should be 1.")
+def weights_not_scaled(counts, power):
+    present = counts > 0
+    w = np.ones(len(counts))
+    w[present] = counts[present] ** -power
+    return w
+
+
+@wrong(QUESTION, "Not the weights are to sum to one: their mean over pixels is 1.")
+def weights_summing_to_one(counts, power):
+    w = weights_not_scaled(counts, power)
+    w[counts > 0] /= w[counts > 0].sum()
+    return w
+
+
+@wrong(QUESTION, "A frequent class has more pixels: take the mean over pixels, not over classes.")
+def weights_of_mean_one_over_classes(counts, power):
+    w = weights_not_scaled(counts, power)
+    w[counts > 0] /= w[counts > 0].mean()
+    return w
+
+
+@wrong(QUESTION, "Which class should weigh more, the rare or the frequent?")
+def weights_of_frequency(counts, power):
+    return class_weights(counts, -power)
+
+
+@wrong(QUESTION, "For power 0 all weights are 1: does yours use the power?")
+def weights_always_inverse(counts, power):
+    return class_weights(counts, 1.0)
+
+
+@wrong(QUESTION, "A class without pixels gets 1, whatever the power.")
+def weights_of_absent_classes(counts, power):
+    w = np.maximum(counts, 1) ** -power
+    return w * counts.sum() / (counts @ w)
+
+
+@wrong(QUESTION, "What becomes of 0 to a negative power? Leave such classes out.")
+def weights_with_infinity(counts, power):
+    w = counts.astype(float) ** -power
+    return w * counts.sum() / np.nansum(counts * w)
+
+
+@wrong(QUESTION, "A weight must be above 0: a class without pixels gets 1, the mean.")
+def weights_zero_for_absent(counts, power):
+    return np.where(counts > 0, class_weights(counts, power), 0.0)

@@ -1,0 +1,77 @@
+"""05_class_weights.two_means: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Question, wrong
+from labkit.course.questions.t05_class_weights import SURE, TOY, draw_pixels
+
+
+def two_means(z, y, w):
+    """Divide the weighted loss by the number of counted pixels, and by the sum of their weights, as PyTorch does."""
+    counted = y != 255
+    z, y = z[counted].T, y[counted]  # (C, N): a row a class
+    log_p = z - np.logaddexp.reduce(z)
+    loss = -(w[y] @ log_p[y, np.arange(len(y))])
+    return float(loss / len(y)), float(loss / w[y].sum())
+
+
+QUESTION = Question(
+    name="05_class_weights.two_means",
+    reference=two_means,
+    inputs=draw_pixels,
+    by_hand=(
+        (TOY, np.array([1], np.uint8), np.array([1.0, 10.0, 3.0])),
+        (SURE, np.array([0, 255], np.uint8), np.array([2.0, 5.0, 0.5])),
+    ),
+    forbidden=("scipy",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def losses_and_weights(z, y, w):
+    """Loss and weight of each counted pixel."""
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
+    return -log_p[np.arange(len(y)), y], w[y]
+
+
+@wrong(QUESTION, "The number of pixels first, then the sum of their weights.")
+def means_swapped(z, y, w):
+    return two_means(z, y, w)[::-1]
+
+
+@wrong(QUESTION, "Let one pixel of weight 10 be the whole batch: its second mean is as if it had no weight.")
+def means_the_same(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float((loss * weight).mean()), float((loss * weight).mean())
+
+
+@wrong(QUESTION, "A pixel that adds no loss is not one of those that you divide by.")
+def means_over_all_pixels(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float((loss * weight).sum() / y.size), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "The sum of weights runs over the pixels: a class with a thousand pixels counts a thousand times.")
+def means_over_weights_of_classes(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float((loss * weight).mean()), float((loss * weight).sum() / w.sum())
+
+
+@wrong(QUESTION, "Each pixel's loss is multiplied by its weight before the sum.")
+def means_not_weighted(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float(loss.mean()), float(loss.sum() / weight.sum())
+
+
+@wrong(QUESTION, "The first is a mean too: by how many pixels?")
+def means_are_sums(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float((loss * weight).sum()), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "Leave out the pixels labelled 255.")
+def means_of_ignored_too(z, y, w):
+    return two_means(z, np.where(y == 255, 0, y), w)

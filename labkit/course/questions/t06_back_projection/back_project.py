@@ -1,0 +1,106 @@
+"""06_back_projection.back_project: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t06_back_projection import K_of, camera
+
+
+def back_project(depth, K):
+    """Turn a depth image into an image of camera-frame points, d K^-1 (u, v, 1); NaN where there is no reading."""
+    H, W = depth.shape
+    v, u = np.mgrid[0:H, 0:W]
+    rays = np.stack([u, v, np.ones((H, W))], axis=-1) @ np.linalg.inv(K).T
+    return np.where(depth > 0.0, depth, np.nan)[..., None] * rays
+
+
+def _depth_image(rng):
+    """Draw depths of 0.3 to 2 m, some without a reading in either spelling, 0 and NaN; H != W."""
+    H, W = int(rng.integers(6, 10)), int(rng.integers(11, 16))
+    depth = rng.uniform(0.3, 2.0, (H, W)).astype(np.float32)
+    depth[rng.random((H, W)) < 0.15] = 0.0
+    depth[rng.random((H, W)) < 0.1] = np.nan
+    return depth, camera(rng, H, W)
+
+
+QUESTION = Question(
+    name="06_back_projection.back_project",
+    reference=back_project,
+    inputs=_depth_image,
+    by_hand=(
+        (np.array([[0.5, 0.0, 0.5]]), np.array([[2.0, 0.0, 1.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]])),
+        (
+            np.array([[2.0, np.nan], [1.0, 4.0], [0.0, 2.0]]),
+            np.array([[4.0, 0.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]),
+        ),
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the third coordinate, z, is the depth itself",
+            lambda arguments, P: np.allclose(
+                P[..., 2], np.where(arguments[0] > 0, arguments[0], np.nan), equal_nan=True
+            ),
+        ),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def rays(shape, K, offset=0.0):
+    """Give q(u, v) for every pixel of an image; offset is added to both pixel coordinates."""
+    v, u = np.mgrid[: shape[0], : shape[1]] + offset
+    return np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(shape)])
+
+
+def holes(depth):
+    return np.where(depth > 0.0, depth, np.nan)[..., None]
+
+
+@wrong(
+    QUESTION, "Your cloud is mirrored and sheared: u counts columns, v counts rows, and the array is indexed [v, u]."
+)
+def u_is_the_row(depth, K):
+    u, v = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
+    return holes(depth) * q
+
+
+@wrong(
+    QUESTION, "A wall seen head-on has one depth, and it must come out flat: is z the depth, or the length of the ray?"
+)
+def length_of_the_ray(depth, K):
+    q = rays(depth.shape, K)
+    return holes(depth) * q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "You are off by half a pixel: in this kit the first pixel's centre is at u = v = 0.")
+def centres_at_halves(depth, K):
+    return holes(depth) * rays(depth.shape, K, 0.5)
+
+
+@wrong(QUESTION, "0 and NaN mean that nothing was read: such a pixel has no point, and (0, 0, 0) is one.")
+def holes_at_the_camera(depth, K):
+    return np.nan_to_num(holes(depth)) * rays(depth.shape, K)
+
+
+@wrong(QUESTION, "K takes a point to a pixel; which way do you want to go?")
+def K_not_inverted(depth, K):
+    v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    return holes(depth) * (np.dstack([u, v, np.ones(depth.shape)]) @ K.T)
+
+
+@wrong(QUESTION, "x is right and y is not: which entry of K belongs to the rows?")
+def one_focal_length(depth, K):
+    return back_project(depth, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]))
+
+
+@wrong(QUESTION, "Your cloud lies behind the camera: here x points right, y down and z forward.")
+def opengl_axes(depth, K):
+    return back_project(depth, K) * (1.0, -1.0, -1.0)
+
+
+@wrong(QUESTION, "The numbers are right and stand in the wrong places: reshape does not move an axis.")
+def reshaped(depth, K):
+    return np.moveaxis(back_project(depth, K), -1, 0).reshape(*depth.shape, 3)

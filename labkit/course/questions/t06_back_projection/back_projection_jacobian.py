@@ -1,0 +1,71 @@
+"""06_back_projection.back_projection_jacobian: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t06_back_projection import K_SMALL, columns, pixel, straight_ahead
+
+
+def back_projection_jacobian(u, v, d, K):
+    """Differentiate P_cam(u, v, d) = d K^-1 (u, v, 1): the columns are dP/du, dP/dv and dP/dd."""
+    K_inv = np.linalg.inv(K)
+    return np.column_stack([d * K_inv[:, 0], d * K_inv[:, 1], K_inv @ (u, v, 1.0)])
+
+
+QUESTION = Question(
+    name="06_back_projection.back_projection_jacobian",
+    reference=back_projection_jacobian,
+    inputs=pixel,
+    by_hand=((2.0, 1.0, 0.5, K_SMALL), (1.0, 0.0, 3.0, K_SMALL)),
+    points=3,
+    properties=(
+        Property(
+            "times d, the last column is the point itself",
+            lambda arguments, J: np.allclose(
+                arguments[2] * np.asarray(J)[:, 2],
+                arguments[2] * np.linalg.solve(arguments[3], np.array([*arguments[:2], 1.0])),
+                rtol=1e-3,
+            ),
+        ),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "The columns' order is u, v, d: which of yours is the ray?")
+def depth_first(u, v, d, K):
+    du, dv, dd = columns(u, v, d, K)
+    return np.stack([dd, du, dv], axis=1)
+
+
+@wrong(QUESTION, "One pixel to the right: is that the same step in metres at 0.5 m as at 2 m?")
+def without_depth(u, v, d, K):
+    return np.stack([*columns(u, v, 1.0, K)[:2], columns(u, v, d, K)[2]], axis=1)
+
+
+@wrong(QUESTION, "That is the point. P is linear in d: what stands beside d?")
+def depth_times_ray(u, v, d, K):
+    du, dv, dd = columns(u, v, d, K)
+    return np.stack([du, dv, d * dd], axis=1)
+
+
+@wrong(QUESTION, "Depth is measured along z: how much does z change when d grows by 1?")
+def unit_ray(u, v, d, K):
+    du, dv, dd = columns(u, v, d, K)
+    return np.stack([du, dv, dd / np.linalg.norm(dd)], axis=1)
+
+
+@wrong(QUESTION, "In which direction does K lead, and in which does P?")
+def times_K(u, v, d, K):
+    return np.column_stack([d * K[:, 0], d * K[:, 1], K @ (u, v, 1.0)])
+
+
+@wrong(QUESTION, "Each column is one derivative, of all three coordinates; you have it in a row.")
+def transposed(*arguments):
+    return back_projection_jacobian(*arguments).T
+
+
+@wrong(QUESTION, "Only on the optical axis does depth move a point along z alone; where is this pixel?")
+def ray_straight_ahead(u, v, d, K):
+    return straight_ahead(u, v, d, K)

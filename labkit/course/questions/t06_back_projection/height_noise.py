@@ -1,0 +1,91 @@
+"""06_back_projection.height_noise: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Question, wrong
+from labkit.course.questions.t06_back_projection import K_SMALL, pixel, pose, straight_ahead
+from labkit.course.questions.t06_back_projection.back_projection_jacobian import back_projection_jacobian
+
+
+def height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    """Standard deviation of a point's height in the base frame, to first order, for independent noise of u, v and d."""
+    K_inv = np.linalg.inv(K)
+    J = np.column_stack([d * K_inv[:, 0], d * K_inv[:, 1], K_inv @ (u, v, 1.0)])
+    return np.linalg.norm(T_base_cam[2, :3] @ J * (sigma_pixel, sigma_pixel, sigma_depth))
+
+
+def _noisy_pixel(rng):
+    return *pixel(rng), pose(rng), float(rng.uniform(0.5, 3.0)), float(rng.uniform(0.003, 0.02))
+
+
+# Looks down from 2 m: its z is the base frame's -z, its x the base frame's -y.
+_LOOKS_DOWN = np.array([[0.0, -1.0, 0.0, 1.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+# Looks along the base frame's x axis, level.
+_LOOKS_LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]])
+
+
+QUESTION = Question(
+    name="06_back_projection.height_noise",
+    reference=height_noise,
+    inputs=_noisy_pixel,
+    by_hand=(
+        (2.0, 1.0, 0.5, K_SMALL, _LOOKS_DOWN, 0.5, 0.01),  # only depth matters: 0.01
+        (2.0, 1.0, 0.5, K_SMALL, _LOOKS_LEVEL, 0.5, 0.01),  # a pixel down is 0.125 m: hypot(0.0625, 0.0025)
+        (3.0, 2.0, 1.0, K_SMALL, _LOOKS_LEVEL, 0.0, 0.02),  # depth alone, off the axis: 0.5 * 0.02
+    ),
+    rtol=1e-4,
+    atol=1e-9,
+    points=3,
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    """Give how far u, v and d each move the height, one standard deviation."""
+    J = back_projection_jacobian(u, v, d, K)
+    return T_base_cam[2, :3] @ J * np.array([sigma_pixel, sigma_pixel, sigma_depth])
+
+
+@wrong(QUESTION, "Check the unit: square metres, or metres?")
+def variance(*arguments):
+    return np.sum(shares(*arguments) ** 2)
+
+
+@wrong(QUESTION, "Independent errors rarely point the same way: what adds up is not the standard deviations.")
+def stds_added(*arguments):
+    return np.sum(np.abs(shares(*arguments)))
+
+
+@wrong(QUESTION, "Two errors of independent signs do not cancel: square before you add.")
+def signed_stds_added(*arguments):
+    return np.abs(np.sum(shares(*arguments)))
+
+
+@wrong(QUESTION, "Height is the base frame's z: turn the camera and it changes. Where does T_base_cam come in?")
+def along_the_camera(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    return shares(u, v, d, K, np.eye(4), sigma_pixel, sigma_depth)[2]
+
+
+@wrong(QUESTION, "z of the base frame is one number of R P + t: does a row or a column of R make it?")
+def column_of_the_rotation(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    return np.linalg.norm(shares(u, v, d, K, T_base_cam.T, sigma_pixel, sigma_depth))
+
+
+@wrong(QUESTION, "With sigma_depth = 0 you get no noise at all: what of u and v?")
+def depth_only(*arguments):
+    return np.abs(shares(*arguments)[2])
+
+
+@wrong(QUESTION, "An error of depth moves the point along its ray, and off the optical axis that is not the z axis.")
+def ray_straight_ahead(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = straight_ahead(u, v, d, K)
+    return np.linalg.norm(T_base_cam[2, :3] @ J * np.array([sigma_pixel, sigma_pixel, sigma_depth]))
+
+
+@wrong(QUESTION, "You have the whole error of the point; only its component along the base frame's z is asked for.")
+def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = back_projection_jacobian(u, v, d, K)
+    return np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth))

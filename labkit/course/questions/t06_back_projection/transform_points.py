@@ -1,0 +1,76 @@
+"""06_back_projection.transform_points: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t06_back_projection import pose
+
+
+def transform_points(T, P):
+    """Apply a rigid transform to points, P -> R P + t."""
+    return P @ T[:3, :3].T + T[:3, 3]
+
+
+def _pose_and_points(rng):
+    P = rng.normal(size=(int(rng.integers(4, 7)), int(rng.integers(8, 11)), 3))
+    P[1, 2] = np.nan
+    return pose(rng), P
+
+
+QUESTION = Question(
+    name="06_back_projection.transform_points",
+    reference=transform_points,
+    inputs=_pose_and_points,
+    by_hand=(
+        (np.array([[0.0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]), np.array([[1.0, 0.0, 0.0]])),
+        (
+            np.array([[0.0, -1, 0, 0.5], [-1, 0, 0, 0], [0, 0, -1, 2], [0, 0, 0, 1]]),
+            np.array([[[0.0, 0, 0], [0, 0, 2]]]),
+        ),
+    ),
+    points=2,
+    properties=(
+        Property(
+            "distances between points stay as they are",
+            lambda arguments, P: np.allclose(
+                np.linalg.norm(np.diff(P, axis=-2), axis=-1),
+                np.linalg.norm(np.diff(arguments[1], axis=-2), axis=-1),
+                rtol=1e-3,
+                equal_nan=True,
+            ),
+        ),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "Points in rows stand left of the matrix: compare one row of your result with R @ p for that point.")
+def rotation_transposed(T, P):
+    return P @ T[:3, :3] + T[:3, 3]
+
+
+@wrong(QUESTION, "Where does the camera's own position (0, 0, 0) land?")
+def no_translation(T, P):
+    return P @ T[:3, :3].T
+
+
+@wrong(QUESTION, "Rotate first, then translate: what does T (0, 0, 0, 1) give?")
+def translated_first(T, P):
+    return (P + T[:3, 3]) @ T[:3, :3].T
+
+
+@wrong(QUESTION, "You went from base to camera coordinates, as a view matrix does: where must (0, 0, 0) land?")
+def inverse(T, P):
+    return (P - T[:3, 3]) @ T[:3, :3]
+
+
+@wrong(QUESTION, "The last row of T is 0 0 0 1, and the translation stands in the last column: which did you read?")
+def row_major(T, P):
+    """Read T as if its rows were its columns: the rotation is turned round and the translation is lost."""
+    return P @ T[:3, :3] + T[3, :3]
+
+
+@wrong(QUESTION, "Check the sign: (0, 0, 0) must land on t.")
+def translation_subtracted(T, P):
+    return P @ T[:3, :3].T - T[:3, 3]

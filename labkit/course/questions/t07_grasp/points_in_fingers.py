@@ -1,0 +1,122 @@
+"""07_grasp.points_in_fingers: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t07_grasp.grasp_pose import grasp_pose
+
+
+def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
+    """Count the points of the base frame that lie where the two open fingers would be."""
+    x, y, z = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    out = np.abs(y) - width / 2
+    return int(np.count_nonzero((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)))
+
+
+def _scene_round_a_grasp(rng):
+    """Draw a grasp that leans, and points all round it, with more on one side than on the other."""
+    T = grasp_pose(rng.uniform([0.4, -0.3, 0.02], [0.6, 0.3, 0.1]), float(rng.uniform(0.2, 1.3)))
+    lean = rng.uniform(0.3, 0.6)
+    c, s = np.cos(lean), np.sin(lean)
+    T[:3, :3] = T[:3, :3] @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (400, 3))
+    P = in_grasp @ T[:3, :3].T + T[:3, 3]
+    width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
+    return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
+
+
+_FACING_X = np.array([[0.0, 1.0, 0.0, 2.0], [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0, 0.5], [0.0, 0.0, 0.0, 1.0]])
+
+
+# Beside the jaws along the base's x: at the pad and a finger's thickness outside it (both count), just inside the pad,
+# beyond the finger, beside it, below the tips, at the tips (counts), high above (counts), and in the other finger.
+_ROUND_IT = np.array(
+    [
+        [2.5, 1.0, 0.5],
+        [2.75, 1.0, 0.5],
+        [2.25, 1.0, 0.5],
+        [3.0, 1.0, 0.5],
+        [2.625, 1.5, 0.5],
+        [2.625, 1.0, 0.125],
+        [2.625, 1.0, 0.25],
+        [2.625, 1.25, 1.5],
+        [1.375, 0.75, 0.5],
+    ]
+)
+
+
+QUESTION = Question(
+    name="07_grasp.points_in_fingers",
+    reference=points_in_fingers,
+    inputs=_scene_round_a_grasp,
+    by_hand=(
+        (_ROUND_IT, _FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (_ROUND_IT[:1], _FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (_ROUND_IT[2:6], _FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.zeros((0, 3)), _FACING_X, 1.0, 0.25, 0.25, 0.25),
+    ),
+    random_cases=5,
+    points=3,
+    properties=(
+        Property(
+            "there are not more points in the fingers than there are points",
+            lambda arguments, count: 0 <= count <= len(arguments[0]),
+        ),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def in_boxes(x, y, z, width, half, thickness, tips):
+    out = np.abs(y) - width / 2
+    return int(np.count_nonzero((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)))
+
+
+def moved(P, T):
+    return (P @ T[:3, :3].T + T[:3, 3]).T
+
+
+@wrong(QUESTION, "The points are in the base frame: which transform takes base coordinates to the grasp frame?")
+def transform_not_inverted(P, T_base_grasp, *boxes):
+    return in_boxes(*moved(P, T_base_grasp), *boxes)
+
+
+@wrong(QUESTION, "You moved the points but did not turn them: the fingers stand at a yaw.")
+def translated_only(P, T_base_grasp, *boxes):
+    return in_boxes(*(P - T_base_grasp[:3, 3]).T, *boxes)
+
+
+@wrong(QUESTION, "What lies lower than the tips is in nobody's way. The frame's z points down.")
+def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
+
+
+@wrong(QUESTION, "You count what is under the tips: the grasp frame's z points down, so above is smaller z.")
+def below_the_tips_alone(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, -z, width, half, thickness, -tips)
+
+
+@wrong(QUESTION, "There are two fingers, at y and at -y.")
+def one_finger(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, np.maximum(y, 0.0), z, width, half, thickness, tips)
+
+
+@wrong(QUESTION, "What stands between the pads is what you want to hold: it is not in the way.")
+def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    inside = (np.abs(x) <= half) & (np.abs(y) <= width / 2 + thickness) & (z <= tips)
+    return int(inside.sum())
+
+
+@wrong(QUESTION, "`width` is from pad to pad: how far is a pad from the middle?")
+def pads_at_the_whole_width(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, 2.0 * width, half, thickness, tips)
+
+
+@wrong(QUESTION, "The jaws close along the frame's y; along x they have the fingers' breadth.")
+def closing_axis_taken_for_x(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(y, x, z, width, half, thickness, tips)

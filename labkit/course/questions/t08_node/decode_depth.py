@@ -1,0 +1,101 @@
+"""08_node.decode_depth: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def decode_depth(data, height, width, step, is_bigendian):
+    """Read metres from the bytes of a 16UC1 image message; NaN where the sensor saw nothing."""
+    rows = data.reshape(height, step)[:, : 2 * width].reshape(height, width, 2).astype(float)
+    first, second = rows[..., 0], rows[..., 1]
+    millimetres = 256 * first + second if is_bigendian else first + 256 * second
+    return np.where(millimetres > 0, millimetres / 1000, np.nan)
+
+
+def _depth_message(rng, padding=None, is_bigendian=None):
+    """An image of up to 65 m with holes, in either byte order, with padding that is no number of pixels."""
+    height, width = int(rng.integers(2, 6)), int(rng.integers(6, 10))
+    padding = int(rng.choice([0, 3, 4, 7])) if padding is None else padding
+    is_bigendian = int(rng.integers(2)) if is_bigendian is None else is_bigendian
+    numbers = rng.integers(1, 65536, (height, width))
+    numbers[rng.random((height, width)) < 0.2] = 0
+    rows = numbers.astype(">u2" if is_bigendian else "<u2").view(np.uint8).reshape(height, 2 * width)
+    filler = rng.integers(1, 256, (height, padding), dtype=np.uint8)
+    return np.hstack([rows, filler]).ravel(), height, width, 2 * width + padding, is_bigendian
+
+
+QUESTION = Question(
+    name="08_node.decode_depth",
+    reference=decode_depth,
+    inputs=_depth_message,
+    by_hand=(
+        (np.array([1, 2, 0, 0], np.uint8), 1, 2, 4, 0),
+        (np.array([1, 2, 0, 0], np.uint8), 1, 2, 4, 1),
+        (np.array([0, 1, 9, 9, 232, 3, 9, 9], np.uint8), 2, 1, 4, 0),
+        (np.array([3, 232, 0, 1, 7, 255, 254, 0, 0, 7], np.uint8), 2, 2, 5, 1),
+    ),
+    random_cases=6,
+    points=3,
+    properties=(
+        Property(
+            "one number for each of height x width pixels",
+            lambda arguments, depth: np.shape(depth) == arguments[1:3],
+        ),
+        Property(
+            "no distance is 0, and none is more than 65.535 m",
+            lambda arguments, depth: bool(np.all(np.isnan(depth) | ((depth > 0.0) & (depth < 65.536)))),
+        ),
+    ),
+    forbidden=("cv_bridge",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def units(data, height, width, step, order):
+    """The numbers of a 16UC1 image in a byte order, the padding left out."""
+    rows = np.frombuffer(bytes(data), np.uint8)[: height * step].reshape(height, step)
+    return np.frombuffer(rows[:, : 2 * width].tobytes(), f"{order}u2").reshape(height, width)
+
+
+def metres(numbers):
+    return np.where(numbers > 0, numbers * 0.001, np.nan)
+
+
+@wrong(QUESTION, "From the second row on the image slides sideways: at which byte does row r begin?")
+def padding_as_pixels(data, height, width, step, is_bigendian):
+    numbers = np.frombuffer(data.tobytes(), ">u2" if is_bigendian else "<u2")
+    return metres(numbers[: height * width].reshape(height, width))
+
+
+@wrong(QUESTION, "Half of the messages come out as noise. What does is_bigendian say about the first of two bytes?")
+def always_little(data, height, width, step, is_bigendian):
+    return metres(units(data, height, width, step, "<"))
+
+
+@wrong(QUESTION, "Do one pixel by hand: bytes 1, 2, little-endian. Which of the two counts 256ths?")
+def order_swapped(data, height, width, step, is_bigendian):
+    return metres(units(data, height, width, step, "<" if is_bigendian else ">"))
+
+
+@wrong(QUESTION, "A table 800 m away? 16UC1 counts millimetres, the kit metres.")
+def still_millimetres(data, height, width, step, is_bigendian):
+    numbers = units(data, height, width, step, ">" if is_bigendian else "<")
+    return np.where(numbers > 0, numbers, np.nan)
+
+
+@wrong(QUESTION, "A 0 says that the sensor saw nothing there. As a distance it would be inside the lens.")
+def zero_is_a_distance(data, height, width, step, is_bigendian):
+    return units(data, height, width, step, ">" if is_bigendian else "<") * 0.001
+
+
+@wrong(QUESTION, "What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")
+def signed_numbers(data, height, width, step, is_bigendian):
+    return metres(units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16))
+
+
+@wrong(QUESTION, "Nothing is further than 25.5 cm: a pixel has two bytes. Did arithmetic in uint8 overflow?")
+def low_byte_only(data, height, width, step, is_bigendian):
+    numbers = units(data, height, width, step, ">" if is_bigendian else "<")
+    return metres(numbers % 256)

@@ -1,0 +1,111 @@
+"""08_node.pair_stamps: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def pair_stamps(a, b, slop):
+    """For each stamp of a the number of the nearest stamp of b, or -1 if none lies within slop."""
+    found = np.full(len(a), -1)
+    for i, stamp in enumerate(a):
+        apart = np.abs(b - stamp)
+        if len(b) > 0 and apart.min() <= slop:
+            found[i] = apart.argmin()
+    return found
+
+
+def _streams(rng):
+    """Two jittered streams of a second, in nanoseconds of this century; frames of each are lost."""
+    start = 1_700_000_000_000_000_000 + int(rng.integers(0, 10**9))
+    slop = int(rng.integers(12, 22)) * 1_000_000
+    a, b = (start + 33_333_333 * np.arange(30) + rng.integers(-9_000_000, 26_000_000, 30) for _ in "ab")
+    a = np.sort(a)[rng.random(30) < 0.8]
+    b = np.sort(b)[rng.random(30) < 0.7]
+    if len(b) > 3 and len(a) > 3:
+        b[1] = a[2] + slop  # exactly at the bound counts
+        b = np.sort(b)
+    return a, b, slop
+
+
+_NOW = 1_700_000_000_000_000_000
+
+
+QUESTION = Question(
+    name="08_node.pair_stamps",
+    reference=pair_stamps,
+    inputs=_streams,
+    by_hand=(
+        (np.array([0, 33, 66]), np.array([2, 40, 90]), 10),
+        (np.array([0, 33, 66]), np.array([30, 60, 100]), 6),
+        (np.array([10]), np.array([2, 6, 13, 30]), 8),
+        (np.array([10, 50]), np.array([6, 14, 60]), 10),
+        (np.array([10, 20]), np.array([], int), 5),
+        (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
+    ),
+    random_cases=6,
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property("one answer for each stamp of a", lambda arguments, j: np.shape(j) == np.shape(arguments[0])),
+        Property(
+            "whatever is paired lies within slop",
+            lambda arguments, j: all(
+                k == -1 or abs(int(arguments[0][i]) - int(arguments[1][k])) <= arguments[2] for i, k in enumerate(j)
+            ),
+        ),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def pairs(a, b, slop, distance):
+    """For each stamp of a the b of least distance (the earliest of equals), -1 if it is over slop."""
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = distance(a[:, None], b[None, :])
+    best = apart.argmin(axis=1)
+    return np.where(apart.min(axis=1) <= slop, best, -1)
+
+
+@wrong(QUESTION, "A frame whose partner was lost must stay alone: what is slop for?")
+def no_bound(a, b, slop):
+    return pairs(a, b, np.iinfo(np.int64).max, lambda x, y: np.abs(x - y))
+
+
+@wrong(QUESTION, "Stamps that are exactly slop apart still belong together.")
+def strictly_within(a, b, slop):
+    return pairs(a, b, slop - 1, lambda x, y: np.abs(x - y))
+
+
+@wrong(QUESTION, "Depth may be stamped a little later than colour as well as a little earlier.")
+def never_later(a, b, slop):
+    far = np.iinfo(np.int64).max
+    return pairs(a, b, slop, lambda x, y: np.where(y <= x, x - y, far))
+
+
+@wrong(QUESTION, "The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
+def signed_difference(a, b, slop):
+    return pairs(a, b, slop, lambda x, y: x - y)
+
+
+@wrong(QUESTION, "Several stamps may lie within slop; take the nearest of them, not the first.")
+def first_within(a, b, slop):
+    return pairs(a, b, 0, lambda x, y: np.where(np.abs(x - y) <= slop, 0, 1))
+
+
+@wrong(QUESTION, "One lost message shifts all pairs after it: compare stamps, not positions.")
+def in_order_of_arrival(a, b, slop):
+    j = np.arange(len(a))
+    there = j < len(b)
+    near = np.zeros(len(a), bool)
+    near[there] = np.abs(a[there] - b[j[there]]) <= slop
+    return np.where(near, j, -1)
+
+
+@wrong(QUESTION, "Nanoseconds since 1970 have 19 digits; float32 keeps 7. Subtract before you round anything.")
+def stamps_in_float32(a, b, slop):
+    a, b = (np.asarray(stamps, np.float32) for stamps in (a, b))
+    return pairs(a, b, slop, lambda x, y: np.abs(x - y))

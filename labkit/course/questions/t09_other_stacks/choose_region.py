@@ -1,0 +1,110 @@
+"""09_other_stacks.choose_region: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def choose_region(features, mean, covariance, allowed):
+    """Number, from 1, of the allowed piece with the least Mahalanobis distance to the mean; 0 if none is allowed."""
+    off = features - mean
+    squared = (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+    squared[~allowed] = np.inf
+    return squared.argmin() + 1 if allowed.any() else 0
+
+
+def _features(rng):
+    n = int(rng.integers(5, 9))
+    A = rng.normal(size=(3, 3)) * (3.0, 0.4, 1.0)
+    covariance = A.T @ A + np.diag((0.3, 0.02, 0.1))
+    mean = rng.normal(size=3) * (4.0, 1.0, 2.0)
+    features = mean + rng.normal(size=(n, 3)) * (2.0, 1.0, 1.5)
+    allowed = rng.random(n) < 0.7
+    allowed[rng.integers(n)] = True
+    return features, mean, covariance, allowed
+
+
+_LINE = np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.9, 1.9, 0.0]])
+
+
+_TILTED = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+QUESTION = Question(
+    name="09_other_stacks.choose_region",
+    reference=choose_region,
+    inputs=_features,
+    by_hand=(
+        (_LINE, np.zeros(3), np.eye(3), np.array([True, True, True])),
+        (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
+        (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
+        (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
+        (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
+        (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
+    ),
+    random_cases=12,
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property(
+            "the number is that of an allowed piece, or 0",
+            lambda arguments, number: bool(number == 0 or arguments[3][int(number) - 1]),
+        ),
+    ),
+    forbidden=("scipy", "sklearn"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def distances(features, mean, covariance):
+    off = features - mean
+    return (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+
+
+def chosen(distance, allowed):
+    return 1 + int(np.where(allowed, distance, np.inf).argmin()) if np.any(allowed) else 0
+
+
+@wrong(
+    QUESTION, "A difference of 1 in area and one of 1 in shape are not equally unusual: who knows how much each varies?"
+)
+def chosen_euclidean(features, mean, covariance, allowed):
+    return chosen(((features - mean) ** 2).sum(axis=1), allowed)
+
+
+@wrong(QUESTION, "Your distance does not know that two features go together: what stands off the diagonal?")
+def chosen_by_spread(features, mean, covariance, allowed):
+    return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
+
+
+@wrong(QUESTION, "What varies much should count little: yours weighs it most.")
+def chosen_without_inverse(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen((off @ covariance * off).sum(axis=1), allowed)
+
+
+@wrong(QUESTION, "A typical piece is near the mean, not far off.")
+def chosen_unlikeliest(features, mean, covariance, allowed):
+    return 1 + int(np.where(allowed, distances(features, mean, covariance), -np.inf).argmax()) if allowed.any() else 0
+
+
+@wrong(QUESTION, "Pieces count from 1; 0 says that there is none.")
+def chosen_from_0(features, mean, covariance, allowed):
+    return chosen(distances(features, mean, covariance), allowed) - 1
+
+
+@wrong(QUESTION, "A piece at the image's edge may not be chosen.")
+def chosen_although_forbidden(features, mean, covariance, allowed):
+    return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0
+
+
+@wrong(QUESTION, "After features[allowed] the rows have new numbers: which ones does the image of pieces know?")
+def chosen_among_the_allowed(features, mean, covariance, allowed):
+    return 1 + int(distances(features[allowed], mean, covariance).argmin()) if allowed.any() else 0
+
+
+@wrong(QUESTION, "If no piece is allowed, the answer is 0: what is argmin of all inf?")
+def chosen_always(features, mean, covariance, allowed):
+    return 1 + int(np.where(allowed, distances(features, mean, covariance), np.inf).argmin())

@@ -1,0 +1,96 @@
+"""09_other_stacks.enlarge: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def enlarge(labels, size):
+    """Resize labels (h, w) to size = (W, H) by the nearest pixel: new (v, u) shows old (v h // H, u w // W)."""
+    W, H = size
+    h, w = labels.shape
+    rows, columns = np.arange(H) * h // H, np.arange(W) * w // W
+    return labels[rows[:, None], columns]
+
+
+def _labels_and_size(rng):
+    labels = rng.integers(0, 4, (int(rng.integers(5, 8)), int(rng.integers(9, 12)))).astype(np.uint8)
+    W, H = int(rng.integers(12, 30)), int(rng.integers(8, 19))
+    return labels, (W, H)
+
+
+QUESTION = Question(
+    name="09_other_stacks.enlarge",
+    reference=enlarge,
+    inputs=_labels_and_size,
+    by_hand=(
+        (np.array([[0, 2], [1, 3]], np.uint8), (6, 4)),
+        (np.array([[0, 3, 0], [2, 0, 1]], np.uint8), (4, 5)),
+        (np.array([[1, 2, 3, 0]], np.uint8), (2, 3)),
+    ),
+    random_cases=6,
+    rtol=0.0,
+    atol=0.0,
+    points=2,
+    properties=(
+        Property(
+            "no class appears that was not there",
+            lambda arguments, out: bool(np.isin(out, arguments[0]).all()),
+        ),
+    ),
+    forbidden=("cv2", "PIL"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "OpenCV's size is (width, height), a shape is not.")
+def resize_swapped(labels, size):
+    return resize_nearest(labels, size[::-1])
+
+
+def resize_nearest(labels, size):
+    W, H = size
+    h, w = labels.shape
+    return labels[np.arange(H)[:, None] * h // H, np.arange(W) * w // W]
+
+
+@wrong(QUESTION, "np.unique before and after: is the mean of class 0 and 2 a class 1?")
+def resize_bilinear(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = (np.arange(H) + 0.5) * h / H - 0.5, (np.arange(W) + 0.5) * w / W - 0.5
+    wide = [np.interp(columns, np.arange(w), row) for row in labels]
+    return np.stack([np.interp(rows, np.arange(h), column) for column in np.transpose(wide)], axis=1).round()
+
+
+@wrong(QUESTION, "From 2 to 4 pixels, each old one should appear twice: which ones do yours show?")
+def resize_rounded(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows = np.minimum(np.round(np.arange(H) * h / H).astype(int), h - 1)
+    columns = np.minimum(np.round(np.arange(W) * w / W).astype(int), w - 1)
+    return labels[rows[:, None], columns]
+
+
+@wrong(QUESTION, "You stretch between the outermost centres: does every old pixel get the same share of new ones?")
+def resize_corner_to_corner(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = np.linspace(0, h - 1, H).round().astype(int), np.linspace(0, w - 1, W).round().astype(int)
+    return labels[rows[:, None], columns]
+
+
+@wrong(QUESTION, "np.resize repeats the data in reading order: look at it.")
+def resize_tiled(labels, size):
+    W, H = size
+    return np.resize(labels, (H, W))
+
+
+@wrong(QUESTION, "The blob may have other proportions than the image: a factor for each side.")
+def resize_one_factor(labels, size):
+    W, H = size
+    h, w = labels.shape
+    factor = max(W // w, 1)
+    rows = np.minimum(np.arange(H) // factor, h - 1)
+    return labels[rows[:, None], np.minimum(np.arange(W) // factor, w - 1)]

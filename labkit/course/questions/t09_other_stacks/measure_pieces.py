@@ -1,0 +1,92 @@
+"""09_other_stacks.measure_pieces: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def measure_pieces(pieces):
+    """Measure pieces 1 to n: areas (n,), centroids u, v (n, 2), boxes u0, v0, u1, v1 (n, 4), ends included."""
+    area, centroid, box = [], [], []
+    for i in range(1, pieces.max() + 1):
+        v, u = np.nonzero(pieces == i)
+        area.append(u.size)
+        centroid.append((u.mean(), v.mean()))
+        box.append((u.min(), v.min(), u.max(), v.max()))
+    return np.array(area), np.array(centroid), np.array(box)
+
+
+def _pieces(rng):
+    H, W, n = int(rng.integers(9, 12)), int(rng.integers(14, 19)), int(rng.integers(3, 6))
+    pieces = rng.integers(0, n + 1, (H, W))
+    pieces = np.where(rng.random((H, W)) < 0.7, 0, pieces)
+    for i in range(1, n + 1):  # no number goes without a pixel; and pieces of very different sizes
+        v, u = rng.integers(0, H - 3), rng.integers(0, W - 5)
+        pieces[v : v + int(rng.integers(1, 4)), u : u + int(rng.integers(1, 6))] = i
+    return (np.unique(pieces, return_inverse=True)[1].reshape(H, W).astype(np.int32),)
+
+
+QUESTION = Question(
+    name="09_other_stacks.measure_pieces",
+    reference=measure_pieces,
+    inputs=_pieces,
+    by_hand=(
+        (np.array([[0, 1, 1, 1], [0, 0, 0, 1], [2, 0, 0, 0]], np.int32),),
+        (np.array([[1, 1, 2, 2, 2]], np.int32),),
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the areas add up to the pixels that belong to a piece",
+            lambda arguments, output: int(np.sum(output[0])) == int(np.count_nonzero(arguments[0])),
+        ),
+    ),
+    forbidden=("cv2", "scipy", "skimage"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def pieces_by_argwhere(pieces, first=1):
+    for i in range(first, pieces.max() + 1):
+        yield np.argwhere(pieces == i)
+
+
+def measured(pieces, area=len, centroid=lambda vu: vu.mean(axis=0)[::-1], box=None, first=1):
+    box = box or (lambda vu: (*vu.min(axis=0)[::-1], *vu.max(axis=0)[::-1]))
+    found = list(pieces_by_argwhere(pieces, first))
+    return (
+        np.array([area(vu) for vu in found]),
+        np.array([centroid(vu) for vu in found], float).reshape(-1, 2),
+        np.array([box(vu) for vu in found]).reshape(-1, 4),
+    )
+
+
+@wrong(QUESTION, "np.nonzero gives rows first: which of them is u?")
+def measured_rows_first(pieces):
+    return measured(pieces, centroid=lambda vu: vu.mean(axis=0), box=lambda vu: (*vu.min(axis=0), *vu.max(axis=0)))
+
+
+@wrong(QUESTION, "The last column and row of a box still belong to the piece here.")
+def measured_with_open_boxes(pieces):
+    return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(vu.max(axis=0)[::-1] + 1)))
+
+
+@wrong(QUESTION, "0 is no piece: with which is row 0?")
+def measured_with_the_background(pieces):
+    return measured(pieces, first=0)
+
+
+@wrong(QUESTION, "The middle of an L-shaped piece is not that of its box.")
+def measured_by_boxes(pieces):
+    return measured(pieces, centroid=lambda vu: (vu.min(axis=0) + vu.max(axis=0))[::-1] / 2)
+
+
+@wrong(QUESTION, "Count the piece's own pixels: a box holds others too.")
+def measured_box_areas(pieces):
+    return measured(pieces, area=lambda vu: np.prod(np.ptp(vu, axis=0) + 1))
+
+
+@wrong(QUESTION, "The box is (u0, v0, u1, v1): first and last, not first and how many.")
+def measured_widths(pieces):
+    return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(np.ptp(vu, axis=0)[::-1] + 1)))

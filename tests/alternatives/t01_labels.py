@@ -1,0 +1,155 @@
+"""Right answers to the questions of 01_labels, written in other ways than the references."""
+
+import numpy as np
+
+from labkit.course.questions.t01_labels.labels_from_segmentation import numbers_and_seen
+
+# ---------- labels_from_segmentation
+
+
+def labels_modulo(segmentation, class_of_body):
+    with_nothing = np.append(class_of_body, np.uint8(0))
+    return with_nothing[np.where(segmentation < 0, -1, segmentation % (1 << 24))]
+
+
+def labels_loops(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for place, value in np.ndenumerate(segmentation):
+        if value != -1:
+            labels[place] = class_of_body[int(value) - ((int(value) >> 24) << 24)]
+    return labels
+
+
+def labels_by_body(segmentation, class_of_body):
+    body, seen = numbers_and_seen(segmentation)
+    return sum((seen & (body == number)) * int(c) for number, c in enumerate(class_of_body))
+
+
+def labels_torch(segmentation, class_of_body):
+    import torch
+
+    s, table = torch.as_tensor(segmentation.astype(np.int64)), torch.as_tensor(class_of_body.astype(np.int64))
+    return torch.where(s < 0, 0, table[torch.bitwise_and(s.clamp(min=0), 0xFFFFFF)])
+
+
+# ---------- one_hot
+
+
+def one_hot_eye(y, C):
+    return np.vstack([np.eye(C, dtype=np.uint8), np.zeros((1, C), np.uint8)])[np.where(y == 255, C, y)]
+
+
+def one_hot_loops(y, C):
+    Y = np.zeros((*y.shape, C), np.uint8)
+    for place, c in np.ndenumerate(y):
+        if c != 255:
+            Y[(*place, c)] = 1
+    return Y
+
+
+def one_hot_planes(y, C):
+    return np.stack([y == c for c in range(C)], axis=-1).astype(int)
+
+
+def one_hot_torch(y, C):
+    import torch
+
+    y = torch.as_tensor(y.astype(np.int64))
+    return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
+
+
+# ---------- from_one_hot
+
+
+def from_one_hot_sum(Y):
+    classes = np.arange(Y.shape[-1])
+    return (Y * classes).sum(axis=-1) + 255 * (Y.sum(axis=-1) == 0)
+
+
+def from_one_hot_loops(Y):
+    y = np.full(Y.shape[:-1], 255, np.uint8)
+    for *place, c in np.argwhere(Y):
+        y[tuple(place)] = c
+    return y
+
+
+def from_one_hot_einsum(Y):
+    C = Y.shape[-1]
+    y = np.einsum("...c,c->...", Y.astype(int), np.arange(1, C + 1)) - 1
+    return np.where(y < 0, 255, y)
+
+
+def from_one_hot_torch(Y):
+    import torch
+
+    Y = torch.as_tensor(Y)
+    return torch.where(Y.sum(-1) > 0, Y.to(torch.float32).argmax(-1), 255)
+
+
+# ---------- class_shares
+
+
+def shares_loops(y, C):
+    n = [0] * C
+    for c in y.ravel().tolist():
+        if c != 255:
+            n[c] += 1
+    return np.array([count / sum(n) for count in n])
+
+
+def shares_one_hot(y, C):
+    n = np.einsum("vuc->c", one_hot_eye(y, C).astype(np.float64))
+    return n / n.sum()
+
+
+def shares_float32(y, C):
+    return np.stack([np.mean(y[y != 255] == c, dtype=np.float32) for c in range(C)])
+
+
+def shares_torch(y, C):
+    import torch
+
+    n = torch.bincount(torch.as_tensor(y[y != 255].astype(np.int64)), minlength=C).float()
+    return n / n.sum()
+
+
+# ---------- resize_labels
+
+
+def resize_integers(y, height, width):
+    H, W = y.shape
+    rows = (2 * np.arange(height) + 1) * H // (2 * height)
+    columns = (2 * np.arange(width) + 1) * W // (2 * width)
+    return y[np.ix_(rows, columns)]
+
+
+def resize_loops(y, height, width):
+    (H, W), out = y.shape, np.empty((height, width), y.dtype)
+    for i in range(height):
+        for j in range(width):
+            out[i, j] = y[int((i + 0.5) * H / height), int((j + 0.5) * W / width)]
+    return out
+
+
+def resize_take(y, height, width):
+    H, W = y.shape
+    rows = np.floor((np.arange(height) + 0.5) * H / height).astype(np.intp)
+    return y.take(rows, axis=0).take(np.floor((np.arange(width) + 0.5) * W / width).astype(np.intp), axis=1)
+
+
+def resize_torch(y, height, width):
+    import torch
+
+    H, W = y.shape
+    rows = torch.div((2 * torch.arange(height) + 1) * H, 2 * height, rounding_mode="floor")
+    columns = torch.div((2 * torch.arange(width) + 1) * W, 2 * width, rounding_mode="floor")
+    return torch.as_tensor(y)[rows][:, columns]
+
+
+ALTERNATIVES = {
+    "labels_from_segmentation": (labels_modulo, labels_loops, labels_by_body, labels_torch),
+    "one_hot": (one_hot_eye, one_hot_loops, one_hot_planes, one_hot_torch),
+    "from_one_hot": (from_one_hot_sum, from_one_hot_loops, from_one_hot_einsum, from_one_hot_torch),
+    "class_shares": (shares_loops, shares_one_hot, shares_float32, shares_torch),
+    "resize_labels": (resize_integers, resize_loops, resize_take, resize_torch),
+}

@@ -1,0 +1,204 @@
+"""Right answers to the questions of 09_other_stacks, written in other ways than the references."""
+
+import numpy as np
+import torch
+
+from labkit.course.questions.t09_other_stacks.choose_region import chosen
+from labkit.course.questions.t09_other_stacks.hsv_mask import between
+
+# ---------- make_blob
+
+
+def blob_loops(bgr):
+    H, W, _ = bgr.shape
+    blob = np.zeros((1, 3, H, W), np.float32)
+    for v in range(H):
+        for u in range(W):
+            for c in range(3):
+                blob[0, c, v, u] = bgr[v, u, 2 - c] / 255.0
+    return blob
+
+
+def blob_stacked(bgr):
+    return np.stack([bgr[:, :, c].astype(np.float32) / 255 for c in (2, 1, 0)])[np.newaxis]
+
+
+def blob_torch(bgr):
+    return torch.from_numpy(bgr).flip(-1).permute(2, 0, 1).unsqueeze(0).float() / 255
+
+
+def blob_einsum(bgr):
+    swap = np.eye(3, dtype=np.float32)[::-1]
+    return np.einsum("hwc,dc->dhw", bgr.astype(np.float32), swap / np.float32(255))[None]
+
+
+# ---------- labels_from_blob
+
+
+def labels_loops(scores):
+    _, C, H, W = scores.shape
+    labels = np.zeros((H, W), np.uint8)
+    for v in range(H):
+        for u in range(W):
+            for c in range(1, C):
+                if scores[0, c, v, u] > scores[0, labels[v, u], v, u]:
+                    labels[v, u] = c
+    return labels
+
+
+def labels_in_memory(scores):
+    H, W = scores.shape[2:]
+    data = scores.ravel()
+    return np.array([data[i :: H * W].argmax() for i in range(H * W)], np.uint8).reshape(H, W)
+
+
+def labels_channels_last(scores):
+    return np.argmax(np.moveaxis(scores[0], 0, -1), axis=-1)
+
+
+def labels_torch(scores):
+    best = torch.from_numpy(scores)[0]
+    return (best == best.amax(dim=0)).int().argmax(dim=0)
+
+
+# ---------- enlarge
+
+
+def resize_loops(labels, size):
+    W, H = size
+    h, w = labels.shape
+    out = np.zeros((H, W), labels.dtype)
+    for v in range(H):
+        for u in range(W):
+            out[v, u] = labels[int(v * h / H), int(u * w / W)]
+    return out
+
+
+def resize_take(labels, size):
+    W, H = size
+    h, w = labels.shape
+    return labels.take(np.arange(H) * h // H, axis=0).take(np.arange(W) * w // W, axis=1)
+
+
+def resize_one_hot(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows = np.eye(h, dtype=int)[np.arange(H) * h // H]
+    columns = np.eye(w, dtype=int)[np.arange(W) * w // W]
+    return np.einsum("ij,jk,lk->il", rows, labels.astype(int), columns)
+
+
+# ---------- hsv_mask
+
+
+def mask_loops(hsv, lower, upper):
+    mask = np.zeros(hsv.shape[:2], bool)
+    for v in range(hsv.shape[0]):
+        for u in range(hsv.shape[1]):
+            h, s, x = (int(value) for value in hsv[v, u])
+            round_ = lower[0] > upper[0]
+            hue = (h >= lower[0] or h <= upper[0]) if round_ else lower[0] <= h <= upper[0]
+            mask[v, u] = hue and lower[1] <= s <= upper[1] and lower[2] <= x <= upper[2]
+    return mask
+
+
+def mask_modulo(hsv, lower, upper):
+    shifted = (hsv[..., 0].astype(int) - int(lower[0])) % 180 <= (int(upper[0]) - int(lower[0])) % 180
+    return shifted & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+def mask_by_table(hsv, lower, upper):
+    hues = np.zeros(256, bool)
+    hue = int(lower[0])
+    while True:
+        hues[hue] = True
+        if hue == int(upper[0]):
+            break
+        hue = (hue + 1) % 180
+    s, v = hsv[..., 1], hsv[..., 2]
+    return hues[hsv[..., 0]] * (s >= lower[1]) * (s <= upper[1]) * (v >= lower[2]) * (v <= upper[2])
+
+
+def mask_torch(hsv, lower, upper):
+    x = torch.from_numpy(hsv.astype(np.int32))
+    low, high = (torch.from_numpy(np.asarray(b).astype(np.int32)) for b in (lower, upper))
+    above, below = x >= low, x <= high
+    hue = above[..., 0] | below[..., 0] if low[0] > high[0] else above[..., 0] & below[..., 0]
+    return hue & (above & below)[..., 1:].all(dim=-1)
+
+
+# ---------- measure_pieces
+
+
+def measured_loops(pieces):
+    n = int(pieces.max())
+    area, total = [0] * n, [[0, 0] for _ in range(n)]
+    box = [[10**9, 10**9, -1, -1] for _ in range(n)]
+    for v in range(pieces.shape[0]):
+        for u in range(pieces.shape[1]):
+            i = int(pieces[v, u]) - 1
+            if i >= 0:
+                area[i] += 1
+                total[i][0] += u
+                total[i][1] += v
+                box[i] = [min(box[i][0], u), min(box[i][1], v), max(box[i][2], u), max(box[i][3], v)]
+    area = np.array(area)
+    return area, np.array(total) / area[:, None], np.array(box)
+
+
+def measured_bincount(pieces):
+    flat, n = pieces.ravel(), int(pieces.max())
+    v, u = (grid.ravel() for grid in np.mgrid[: pieces.shape[0], : pieces.shape[1]])
+    area = np.bincount(flat, minlength=n + 1)[1:]
+    middle = np.stack([np.bincount(flat, x, n + 1)[1:] / area for x in (u, v)], axis=1)
+    box = np.array([[f(x[flat == i]) for f in (np.min, np.max) for x in (u, v)] for i in range(1, n + 1)])
+    return area, middle.astype(np.float32), box
+
+
+def measured_einsum(pieces):
+    H, W = pieces.shape
+    member = pieces[None] == np.arange(1, pieces.max() + 1)[:, None, None]
+    area = np.einsum("nhw->n", member.astype(np.int64))
+    middle = np.stack([np.einsum("nhw,w->n", member, np.arange(W)), np.einsum("nhw,h->n", member, np.arange(H))], 1)
+    columns, rows = member.any(axis=1), member.any(axis=2)
+    last = W - 1 - columns[:, ::-1].argmax(axis=1), H - 1 - rows[:, ::-1].argmax(axis=1)
+    return area, middle / area[:, None], np.stack([columns.argmax(axis=1), rows.argmax(axis=1), *last], axis=1)
+
+
+# ---------- choose_region
+
+
+def chosen_loops(features, mean, covariance, allowed):
+    best, number, P = np.inf, 0, np.linalg.inv(covariance)
+    for i in range(len(features)):
+        off = features[i] - mean
+        if allowed[i] and off @ P @ off < best:
+            best, number = off @ P @ off, i + 1
+    return number
+
+
+def chosen_einsum(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
+
+
+def chosen_whitened(features, mean, covariance, allowed):
+    white = np.linalg.solve(np.linalg.cholesky(covariance), (features - mean).T)
+    return chosen((white**2).sum(axis=0), allowed)
+
+
+def chosen_torch(features, mean, covariance, allowed):
+    off = torch.from_numpy(features - mean)
+    distance = (off * torch.linalg.solve(torch.from_numpy(covariance), off.T).T).sum(dim=1)
+    distance[~torch.from_numpy(allowed)] = torch.inf
+    return distance.argmin() + 1 if allowed.any() else 0
+
+
+ALTERNATIVES = {
+    "make_blob": (blob_loops, blob_stacked, blob_torch, blob_einsum),
+    "labels_from_blob": (labels_loops, labels_in_memory, labels_channels_last, labels_torch),
+    "enlarge": (resize_loops, resize_take, resize_one_hot),
+    "hsv_mask": (mask_loops, mask_modulo, mask_by_table, mask_torch),
+    "measure_pieces": (measured_loops, measured_bincount, measured_einsum),
+    "choose_region": (chosen_loops, chosen_einsum, chosen_whitened, chosen_torch),
+}
