@@ -15,11 +15,13 @@ from labkit.course.grading.batch import file_name
 from labkit.course.grading.reading import shown_name
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
+from labkit.course.questions.question import of_topic
 
 TOPIC = "04_iou"
 SECRET_VARIABLE = "LABKIT_TEST_SECRET"
 LIMITS = Limits(case_s=2.0, submission_s=60.0, memory_mb=512)
-REST = 9.0  # points of the other questions of 04_iou
+POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
+REST = sum(POINTS.values()) - POINTS["iou"]
 
 
 def workers_alive() -> set[int]:
@@ -122,9 +124,9 @@ def test_the_honest_student_keeps_the_grade(hostile_class):
     from labkit.course.grading.gradebook import opened
 
     course, _, records, _ = hostile_class
-    assert records["honest"].points == REST + 2.0
+    assert records["honest"].points == REST + POINTS["iou"]
     with opened(course) as gradebook:
-        assert gradebook.find_submission(TOPIC, "honest").score == REST + 2.0
+        assert gradebook.find_submission(TOPIC, "honest").score == REST + POINTS["iou"]
         for attack in ATTACKS:
             assert gradebook.find_submission(TOPIC, attack.name).score <= REST
 

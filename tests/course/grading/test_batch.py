@@ -26,6 +26,9 @@ from labkit.course.questions.question import find, of_topic
 
 TOPIC = "04_iou"
 SECRET = "2718281828459045"
+POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
+TOTAL = sum(POINTS.values())
+BUT_IOU = TOTAL - POINTS["iou"]
 ROOT = Path(__file__).parents[3]
 
 
@@ -68,11 +71,11 @@ def test_points_and_words_are_as_constructed(course):
     graded = grade(course)
     assert [record.student for record in graded.records] == ["ada", "ben", "eve"] and graded.graded_now == 3
     ada, ben, eve = graded.records
-    assert [result.points for result in ada.results] == [2.0, 2.0, 2.0, 2.0, 3.0] and not ada.needs_a_look
+    assert {result.question: result.points for result in ada.results} == POINTS and not ada.needs_a_look
     assert ben.points == 0.0
     for result, question in zip(ben.results, of_topic(TOPIC).values(), strict=True):
         assert result.hint == question.misconceptions[0].hint
-    assert [result.points for result in eve.results] == [2.0, 0.0, 2.0, 2.0, 3.0] and eve.needs_a_look
+    assert {result.question: result.points for result in eve.results} == POINTS | {"iou": 0.0} and eve.needs_a_look
     rows = list(csv.DictReader((course / "grades" / TOPIC / "grades.csv").open()))
     assert [(row["student"], row["question"], float(row["points"])) for row in rows] == [
         (record.student, result.question, result.points) for record in graded.records for result in record.results
@@ -82,9 +85,10 @@ def test_points_and_words_are_as_constructed(course):
 def test_gradescope_reads_scores_of_each_question(course):
     grade(course)
     data = json.loads((course / "grades" / TOPIC / "results" / "eve" / "results.json").read_text())
-    assert data["score"] == sum(test["score"] for test in data["tests"]) == 9.0
-    assert [test["status"] for test in data["tests"]] == ["passed", "failed", "passed", "passed", "passed"]
-    assert sum(test["max_score"] for test in data["tests"]) == 11.0
+    assert data["score"] == sum(test["score"] for test in data["tests"]) == BUT_IOU
+    statuses = {test["name"]: test["status"] for test in data["tests"]}
+    assert statuses == dict.fromkeys(POINTS, "passed") | {"iou": "failed"}
+    assert sum(test["max_score"] for test in data["tests"]) == TOTAL
 
 
 def test_students_learn_no_seed_and_no_expected_value(course):
@@ -131,7 +135,7 @@ def test_again_grades_only_what_changed(course):
     assert [r.results for r in again.records] == [r.results for r in first.records]
     kit.submit(course, "ben", TOPIC, kit.right_answers(TOPIC))
     third = grade(course)
-    assert third.graded_now == 1 and third.records[1].points == 11.0
+    assert third.graded_now == 1 and third.records[1].points == TOTAL
     assert grade(course, force=True).graded_now == 3
 
 
@@ -171,7 +175,7 @@ def test_killed_in_the_middle_and_run_again(course):
     assert done.exists() and not (course / "grades" / TOPIC / "grades.csv").exists()
     path.write_text(json.dumps(kit.lab_notebook(TOPIC, kit.right_answers(TOPIC))))
     graded = grade(course)
-    assert graded.graded_now == 3 and [r.points for r in graded.records] == [11.0, 0.0, 11.0, 11.0, 11.0]
+    assert graded.graded_now == 3 and [r.points for r in graded.records] == [TOTAL, 0.0, TOTAL, TOTAL, TOTAL]
     kept = files(course / "grades")
     assert grade(course, force=True).graded_now == 5 and files(course / "grades") == kept
 
@@ -191,7 +195,7 @@ def test_a_dask_cluster_gives_the_same_bytes(course):
 
 def test_without_a_sandbox_every_file_says_so(course):
     graded = grade(course, unsafe=True)
-    assert [record.points for record in graded.records] == [11.0, 0.0, 9.0]
+    assert [record.points for record in graded.records] == [TOTAL, 0.0, BUT_IOU]
     written = files(course / "grades" / TOPIC)
     shown = {name: data for name, data in written.items() if not name.startswith(("records", "secret"))}
     assert len(shown) == 7 and all(b"WITHOUT a sandbox" in data for data in shown.values())
@@ -215,7 +219,7 @@ def test_without_bubblewrap_nothing_is_graded(course, monkeypatch):
 def test_the_gradebook_has_the_scores_and_keeps_manual_ones(course):
     grade(course)
     with opened(course) as book:
-        assert [book.find_submission(TOPIC, s).score for s in ("ada", "ben", "eve")] == [11.0, 0.0, 9.0]
+        assert [book.find_submission(TOPIC, s).score for s in ("ada", "ben", "eve")] == [TOTAL, 0.0, BUT_IOU]
         assert "Hint" in book.find_comment("iou", TOPIC, TOPIC, "ben").auto_comment
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
         assert written.needs_manual_grade and written.auto_score is None
@@ -328,7 +332,10 @@ def test_the_command_prints_a_table_and_says_by_its_status_what_to_look_at(cours
     done = runner.invoke(app, arguments)
     lines = done.stdout.splitlines()
     assert done.exit_code == 1 and lines[0].split()[0] == "student"
-    assert [line.split()[:7] for line in lines[1:3]] == [["ada", *"22223", "11"], ["ben", *"00000", "0"]]
+    right, nothing = (["ada", *POINTS.values(), TOTAL], ["ben", *(0.0 for _ in POINTS), 0.0])
+    for line, (student, *points) in zip(lines[1:3], (right, nothing), strict=True):
+        name, *shown = line.split()[: len(points) + 1]
+        assert name == student and list(map(float, shown)) == points
     assert "ended or crashed" in lines[3] and "3 students, 3 of them graded now" in lines[4]
     os.remove(course / "submitted" / "eve" / TOPIC / f"{TOPIC}.ipynb")
     os.rmdir(course / "submitted" / "eve" / TOPIC)
