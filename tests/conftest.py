@@ -2,8 +2,14 @@
 
 Two things go without: modules that import numba (the hook wraps every function, and numba cannot compile the
 wrapper), and tests marked `bad_input`, in which the functions' own validation must answer.
+
+Tests marked `debian` need Debian packages beside the environment: where those are missing, the tests skip, and the run
+ends with a table of what was skipped and the command that would enable it.
 """
 
+import subprocess
+from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import jaxtyping
@@ -33,3 +39,47 @@ def shape_checks_off_for_bad_input(request):
     jaxtyping.config.update("jaxtyping_disable", marked)
     yield
     jaxtyping.config.update("jaxtyping_disable", False)
+
+
+# ------------------------------------------------------------------------------------------- Debian packages
+
+NEEDS = "needs Debian's "
+
+
+def pytest_addoption(parser):
+    """`--no-skip`: for a machine that is meant to have every Debian package."""
+    parser.addoption("--no-skip", action="store_true", help="fail tests whose Debian packages are missing")
+
+
+@cache
+def installed() -> set[str]:
+    """Names of the Debian packages of this machine; none where there is no dpkg."""
+    try:
+        command = ["dpkg-query", "-W", "-f", "${db:Status-Abbrev} ${Package}\n"]
+        lines = subprocess.run(command, capture_output=True, text=True).stdout.splitlines()
+    except OSError:
+        return set()
+    return {line.split()[1] for line in lines if line.startswith("ii")}
+
+
+def pytest_runtest_setup(item):
+    """Skip a test whose Debian packages are not all there."""
+    needed = [name for mark in item.iter_markers("debian") for name in mark.args]
+    if missing := sorted(set(needed) - installed()):
+        missing_here = pytest.fail if item.config.getoption("--no-skip") else pytest.skip
+        missing_here(NEEDS + " ".join(missing))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """The table of what was skipped, one line per reason, and what to install to run it."""
+    reports = terminalreporter.stats.get("skipped", [])
+    reasons = Counter(str(report.longrepr[-1]).removeprefix("Skipped: ") for report in reports)
+    if not reasons:
+        return
+    terminalreporter.section("not tested on this machine")
+    for reason, count in sorted(reasons.items()):
+        terminalreporter.write_line(f"{count:4d} {'test ' if count == 1 else 'tests'}  {reason}")
+    packages = {name for reason in reasons if reason.startswith(NEEDS) for name in reason.removeprefix(NEEDS).split()}
+    if packages:
+        command = "apt-get install --no-install-recommends " + " ".join(sorted(packages))
+        terminalreporter.write_line(f"To test that as well, as root: {command}")

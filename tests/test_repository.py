@@ -322,6 +322,24 @@ def test_ci_runs_the_readmes_test_command():
     assert "make test" in (ROOT / "README.md").read_text()
 
 
+# ---------------------------------------------------------------------------- what a machine does not have
+
+
+@pytest.mark.parametrize("options, status", [([], 0), (["--no-skip"], 1)])
+def test_what_needs_debian_packages_skips_and_the_table_says_what_to_install(tmp_path, options, status):
+    (tmp_path / "test_one.py").write_text(
+        "import pytest\n\n@pytest.mark.debian('no-such-package', 'dpkg-too')\n@pytest.mark.parametrize('i', [0, 1])\n"
+        "def test_one(i):\n    assert False\n\ndef test_two():\n    pass\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-c", ROOT / "pyproject.toml", "-p", "conftest", "-n", "2", tmp_path]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
+    done = subprocess.run([*command, *options], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == status and "1 passed" in done.stdout, done.stdout + done.stderr
+    if not options:
+        assert re.search(r"2 tests +needs Debian's dpkg-too no-such-package\n", done.stdout)
+        assert "apt-get install --no-install-recommends dpkg-too no-such-package\n" in done.stdout
+
+
 # ------------------------------------------------------------------------------ the benchmarks' runner
 
 

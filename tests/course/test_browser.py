@@ -24,7 +24,7 @@ TOKEN = "a-token-of-this-test"
 PATIENCE_MS = 150_000  # a kernel that imports torch on a busy machine takes its time
 
 pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="needs a browser: Debian's package `chromium`"),
+    pytest.mark.debian("chromium"),
     pytest.mark.timeout(600),
 ]
 

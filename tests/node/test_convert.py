@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -58,11 +57,9 @@ def random_message(rng) -> Image:
     return Image(H, height, width, encoding, order, width * pixel, data)
 
 
+@pytest.mark.debian("python3-cv-bridge", "python3-sensor-msgs")
 def test_a_hundred_random_messages_are_read_as_cv_bridge_reads_them():
     """In a process of the system's Python, whose NumPy cv_bridge was built for."""
-    code = "import cv_bridge, sensor_msgs.msg"
-    if not shutil.which(SYSTEM_PYTHON) or subprocess.run([SYSTEM_PYTHON, "-c", code], capture_output=True).returncode:
-        pytest.skip("cv_bridge is not installed: python3-cv-bridge and python3-sensor-msgs of Debian")
     rng = np.random.default_rng(7)
     messages = [random_message(rng) for _ in range(100)]
     names = ("height", "width", "encoding", "is_bigendian", "step")
@@ -126,10 +123,8 @@ def test_clouds_are_read_wherever_their_fields_stand():
     assert convert.decode_cloud(empty).shape == (0, 3)
 
 
+@pytest.mark.debian("python3-sensor-msgs")
 def test_a_cloud_is_what_ros_reads():
-    code = "import sensor_msgs.point_cloud2"
-    if not shutil.which(SYSTEM_PYTHON) or subprocess.run([SYSTEM_PYTHON, "-c", code], capture_output=True).returncode:
-        pytest.skip("sensor_msgs is not installed: python3-sensor-msgs of Debian")
     P = np.random.default_rng(3).normal(size=(5, 3)).astype(np.float32)
     message = convert.encode_cloud(P, H)
     code = (

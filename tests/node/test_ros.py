@@ -12,7 +12,6 @@ import subprocess
 import sys
 import time
 import xmlrpc.client
-from importlib.machinery import PathFinder
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +27,7 @@ from labkit.node.messages import Diagnostics, Image, PointCloud2, Pose, Topics
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 
-# Looked for without importing: every worker of the suite reads this file, but only one runs it.
-NEEDED = (*ros.PACKAGES, "rosmaster")
-if missing := [name for name in NEEDED if not PathFinder.find_spec(name, [*sys.path, ros.DIST_PACKAGES])]:
-    pytest.skip(f"ROS 1 is not installed: Debian's packages of {', '.join(missing)}", allow_module_level=True)
+pytestmark = pytest.mark.debian(*(f"python3-{name.replace('_', '-')}" for name in (*ros.PACKAGES, "rosmaster")))
 
 ROOT = Path(__file__).parents[2]
 TOPICS = Topics()

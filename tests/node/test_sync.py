@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import shutil
 import subprocess
 
 import numpy as np
@@ -119,13 +118,9 @@ def test_between_two_stamps_the_camera_is_between_two_places():
     assert np.allclose(Rotation.from_matrix(T[:3, :3]).as_euler("xyz"), (0.0, 0.0, 0.25))
 
 
+@pytest.mark.debian("python3-tf2", "python3-rospy", "python3-geometry-msgs")
 def test_the_tree_agrees_with_tf2():
     """Debian's tf2, in a process of the system's Python: chains of moving frames at times in between."""
-    if (
-        not shutil.which(SYSTEM_PYTHON)
-        or subprocess.run([SYSTEM_PYTHON, "-c", "import tf2_py"], capture_output=True).returncode
-    ):
-        pytest.skip("tf2 is not installed: python3-tf2 of Debian")
     rng = np.random.default_rng(3)
     links = [("world", "base"), ("base", "hand"), ("hand", "camera"), ("world", "table")]
     sent = [transform(a, b, int(s * 1e8), rng) for a, b in links for s in range(5)]

@@ -153,12 +153,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(unet, tmp_path, monkey
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.skipif(
-    subprocess.run([SYSTEM_PYTHON, "-c", "import cv2"], capture_output=True).returncode != 0
-    if SYSTEM_PYTHON.exists()
-    else True,
-    reason="Debian's python3-opencv is not installed",
-)
+@pytest.mark.debian("python3-opencv")
 def test_debians_opencv_reads_the_file_and_agrees(file, unet, frames, tmp_path):
     """OpenCV 4.6 in a process of the system's Python, which shares nothing with this one but files."""
     rgb = frames[0].rgb
