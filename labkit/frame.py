@@ -7,9 +7,10 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
-from labkit.labels import CLASSES
+from labkit.labels import IGNORE
 from labkit.support.validation import (
     check_depth,
+    check_height,
     check_K,
     check_labels,
     check_rgb,
@@ -25,13 +26,16 @@ class RGBDFrame:
 
     rgb: uint8 (H, W, 3), RGB. depth: metres, float32 (H, W); 0 or NaN where there is no reading. K: intrinsics, (3, 3),
     pixel centres at integers. T_base_cam: (4, 4), maps camera coordinates (x right, y down, z forward) to base
-    coordinates. labels: true classes, uint8 (H, W), if known. instances: uint8 (H, W), 0 or the number of the object,
-    if known. Raises ValueError naming the argument that does not fit. Sections 1 and 4 of the text.
+    coordinates. labels: true classes, uint8 (H, W), if known; 255 is "ignore". instances: uint8 (H, W), 0 or the number
+    of the object, if known. table_z: height of the table in the base frame, metres, if known. Raises ValueError naming
+    the argument that does not fit. Topics 01 and 06.
 
     >>> rgb, depth = np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), np.float32)
     >>> frame = RGBDFrame(rgb, depth, K=np.diag([9.0, 9.0, 1.0]), T_base_cam=np.eye(4))
     >>> frame.size
     (3, 2)
+    >>> frame
+    RGBDFrame(3 x 2)
     """
 
     rgb: UInt8[np.ndarray, "H W 3"]
@@ -40,6 +44,7 @@ class RGBDFrame:
     T_base_cam: Float[np.ndarray, "4 4"]
     labels: Integer[np.ndarray, "H W"] | None = None
     instances: Integer[np.ndarray, "H W"] | None = None
+    table_z: float | None = None
 
     def __post_init__(self):
         def put(name, value):  # the dataclass is frozen: only here may it still take its checked values
@@ -51,13 +56,20 @@ class RGBDFrame:
         put("K", check_K("K", self.K))
         put("T_base_cam", check_T("T_base_cam", self.T_base_cam))
         if self.labels is not None:
-            labels = check_shape("labels", check_labels("labels", self.labels, len(CLASSES)), (None, None))
+            labels = check_shape("labels", check_labels("labels", self.labels, IGNORE), (None, None))
             check_same_size("rgb", self.rgb, "labels", labels)
             put("labels", labels.astype(np.uint8, copy=False))
         if self.instances is not None:
             instances = check_shape("instances", check_labels("instances", self.instances, 256), (None, None))
             check_same_size("rgb", self.rgb, "instances", instances)
             put("instances", instances.astype(np.uint8, copy=False))
+        if self.table_z is not None:
+            put("table_z", check_height("table_z", self.table_z))
+
+    def __repr__(self) -> str:
+        known = [name for name in ("labels", "instances") if getattr(self, name) is not None]
+        table = [] if self.table_z is None else [f"table_z={self.table_z:.4g}"]
+        return f"RGBDFrame({', '.join([f'{self.size[0]} x {self.size[1]}', *known, *table])})"
 
     @property
     def size(self) -> tuple[int, int]:
@@ -66,7 +78,7 @@ class RGBDFrame:
 
     @classmethod
     def from_files(
-        cls, rgb, depth, K, T_base_cam, labels=None, instances=None, depth_scale: float = 0.001
+        cls, rgb, depth, K, T_base_cam, labels=None, instances=None, depth_scale: float = 0.001, table_z=None
     ) -> "RGBDFrame":
         """Read a frame from image files: 8-bit RGB, 16-bit PNG depth, and 8-bit PNG labels and instances if given.
 
@@ -83,6 +95,7 @@ class RGBDFrame:
             T_base_cam=T_base_cam,
             labels=None if labels is None else read_image("labels", labels, np.uint8),
             instances=None if instances is None else read_image("instances", instances, np.uint8),
+            table_z=table_z,
         )
 
 

@@ -387,6 +387,11 @@ def remove_outliers(
     >>> remove_outliers(P, radius=0.01, min_neighbours=1)[:, 0].tolist()
     [0.0, 0.001]
     """
+    return P[inliers(P, radius, min_neighbours)]
+
+
+def inliers(P: Float[np.ndarray, "N 3"], radius: Scalar = 0.01, min_neighbours: int = 4) -> Integer[np.ndarray, "M"]:
+    """Find the points that `remove_outliers` keeps: their indices in P, ascending."""
     from labkit.support.geometry_kernels import count_neighbours, sort_into_cells
 
     P = _check_cloud("P", P)
@@ -395,7 +400,7 @@ def remove_outliers(
     order, points, cells = sort_into_cells(P, radius)
     keep = np.empty(len(P), bool)
     keep[order] = count_neighbours(points, *cells, radius, min_neighbours) >= min_neighbours
-    return P[keep]
+    return np.flatnonzero(keep)
 
 
 def cluster(P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 30) -> list[Float[np.ndarray, "_ 3"]]:
@@ -409,6 +414,13 @@ def cluster(P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 
     >>> [len(group) for group in cluster(P, gap=0.015, min_points=1)]
     [2, 1]
     """
+    return [P[group] for group in cluster_indices(P, gap, min_points)]
+
+
+def cluster_indices(
+    P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 30
+) -> list[Integer[np.ndarray, "_"]]:
+    """Split a cloud as `cluster` does; for each object the indices of its points in P, ascending."""
     from labkit.support.geometry_kernels import link_cells, sort_into_cells
 
     P = _check_cloud("P", P)
@@ -419,7 +431,7 @@ def cluster(P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 
     group[order] = link_cells(points, *cells, gap)
     sizes = np.bincount(group)
     largest_first = np.argsort(-sizes, kind="stable")
-    return [P[group == g] for g in largest_first if sizes[g] >= min_points]
+    return [np.flatnonzero(group == g) for g in largest_first if sizes[g] >= min_points]
 
 
 # ---------------------------------------------------------------------------------------------------------- checks

@@ -5,19 +5,26 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import cv2
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
 from labkit.frame import RGBDFrame
-from labkit.geometry import back_project_to_base, cluster, remove_outliers
-from labkit.grasp import GraspPlan, plan_grasps
-from labkit.labels import CLASSES, TARGET, one_hot
+from labkit.geometry import back_project_to_base, cluster_indices, inliers
+from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
+from labkit.labels import IGNORE, TARGET
 from labkit.stacks.engines import Engine, open_engine
-from labkit.support.validation import check_labels, check_rgb, check_same_size, check_shape
+from labkit.support.validation import (
+    check_finite,
+    check_height,
+    check_labels,
+    check_rgb,
+    check_shape,
+)
 
-# What the arm can meet: points outside this box (base frame, metres; z from the table) do not concern the grasp.
+# What the Panda can reach and meet, in front of it: x, y from its base, z from the table; metres.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
 
 
@@ -25,105 +32,179 @@ WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
 class Perception:
     """What a robot knows after one frame.
 
-    probabilities: (H, W, C) in 0..1. labels: uint8 (H, W). points: every pixel in the base frame, (H, W, 3), metres,
-    NaN without depth. clouds: one (N, 3) a target, largest first. certainty: for each cloud the mean probability of the
-    target class where it was seen. scene: all points of the workspace, (M, 3). plan: the grasps ranked by their score
-    times that certainty, or the reason why there is none. seconds: time spent by stage.
+    labels: uint8 (H, W). probabilities: (H, W, C) in 0..1, or None where labels came without. points: every pixel in
+    the base frame, (H, W, 3), metres, NaN without depth. pixels: the pixels of each target, indices v * W + u, the
+    largest target first. clouds: their points, an (N, 3) for each target. scene: all points of the workspace, (M, 3).
+    certainty: for each target the mean probability of its class over its pixels, 1 without probabilities. plan: the
+    grasps ranked by their score times that certainty, or the reason why there is none. seconds: time spent by stage.
     """
 
-    probabilities: Float[np.ndarray, "H W C"]
     labels: UInt8[np.ndarray, "H W"]
+    probabilities: Float[np.ndarray, "H W C"] | None
     points: Float[np.ndarray, "H W 3"]
-    clouds: list[np.ndarray]
+    pixels: list[Integer[np.ndarray, "_"]]
+    clouds: list[Float[np.ndarray, "_ 3"]]
     scene: Float[np.ndarray, "M 3"]
+    certainty: tuple[float, ...]
     plan: GraspPlan
-    certainty: tuple[float, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        targets = f"clouds of {', '.join(str(len(cloud)) for cloud in self.clouds) or 'no'} points"
+        grasps = f"{len(self.plan.grasps)} grasps" if self.plan.grasps else f"no grasp: {self.plan.reason}"
+        return f"Perception({self.labels.shape[1]} x {self.labels.shape[0]}, {targets}, {grasps})"
 
 
 class Pipeline:
-    """The chain as one object: `Pipeline(model, table_z).run(frame)`.
+    """The chain as one object: `Pipeline(model).run(frame)`, which is `perceive` and then `locate`.
 
     model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
-    (H, W, C). table_z: height of the calibrated table plane in the base frame, metres. target_class: what to grasp.
+    (H, W, C); None if labels come from elsewhere, and only `locate` is used. table_z: height of the table in the base
+    frame, metres; None takes the frame's own, or else 0. target_class: what to grasp.
     mirror: let a network look at the image and at its mirror image, and average: better, at twice the time.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.stacks.engines): equal numbers, other
     speeds; the model may then be an ONNX file of `labkit export`.
     crf: True refines the labels with the kit's CRF; or a function (probabilities, frame) -> labels (H, W).
-    back_project: function (depth, K, T_base_cam) -> (H, W, 3); split: function of the target's points to a list of
-    clouds; grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan. The defaults are the kit's; each
-    may be replaced by one's own, as the labs do. Raises ValueError for an argument that does not fit. Sections 1 to 5.
+    workspace: ((x, x), (y, y), (z, z)), from and to, metres in the base frame, z from the table: what the arm can meet;
+    nothing outside is a target or an obstacle. gripper: the hand that the planner plans for.
+    back_project: function (depth, K, T_base_cam) -> (H, W, 3). split: function of the target's points (N, 3) to a list
+    of index arrays, one for each object. grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan, in
+    place of the kit's planner. Raises ValueError for an argument that does not fit. Topics 03, 06 and 07.
 
     >>> def sees_nothing(rgb):
     ...     return np.dstack([np.ones(rgb.shape[:2]), np.zeros((*rgb.shape[:2], 3))])
     >>> rgb, depth = np.zeros((6, 8, 3), np.uint8), np.ones((6, 8), np.float32)
     >>> frame = RGBDFrame(rgb, depth, K=np.diag([9.0, 9.0, 1.0]), T_base_cam=np.eye(4))
-    >>> perception = Pipeline(sees_nothing).run(frame)
-    >>> len(perception.clouds), perception.plan.grasps
-    (0, ())
+    >>> Pipeline(sees_nothing).run(frame)
+    Perception(8 x 6, clouds of no points, no grasp: nothing that the camera saw lies in the workspace)
     """
 
     def __init__(
         self,
-        model,
-        table_z: float = 0.0,
+        model=None,
+        table_z: float | None = None,
         target_class: int = TARGET,
         *,
         mirror: bool = True,
         engine: str | None = None,
         crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] = False,
+        workspace: Sequence[Sequence[float]] = WORKSPACE,
+        gripper: Gripper | None = None,
         back_project: Callable = back_project_to_base,
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
-        grasp: Callable[..., GraspPlan] = plan_grasps,
+        grasp: Callable[..., GraspPlan] | None = None,
     ):
         if engine is not None:
             model = open_engine(engine, model)
-        if not callable(model):
+        if model is not None and not callable(model):
             raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
-        if not np.isfinite(table_z):
-            raise ValueError(f"table_z: expected a height in metres, got {table_z}")
-        if target_class not in range(len(CLASSES)):
-            raise ValueError(f"target_class: expected 0 to {len(CLASSES) - 1}, got {target_class!r}")
+        if isinstance(target_class, bool) or target_class not in range(getattr(model, "num_classes", IGNORE)):
+            classes = getattr(model, "num_classes", IGNORE)
+            raise ValueError(f"target_class: expected a class in 0 to {classes - 1}, got {target_class!r}")
+        if grasp is not None and gripper is not None:
+            raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
         self.model = model
-        self.table_z = float(table_z)
+        self.table_z = None if table_z is None else check_height("table_z", table_z)
         self.target_class = target_class
         self.mirror = mirror
         self.crf = refine_labels if crf is True else crf
+        self.workspace = check_finite("workspace", check_shape("workspace", workspace, (3, 2))).astype(np.float64)
+        if not (self.workspace[:, 0] < self.workspace[:, 1]).all():
+            raise ValueError(f"workspace: expected from < to for each of x, y and z, got {self.workspace.tolist()}")
         self.back_project = back_project
         self.split = split or separate_objects
-        self.grasp = grasp
+        self.grasp = grasp or partial(plan_grasps, gripper=gripper or Gripper())
 
-    def run(self, frame: RGBDFrame, labels: Integer[np.ndarray, "H W"] | None = None) -> Perception:
-        """Perceive one frame. `labels`, when given, stand in for the network's: true masks, or anyone else's."""
+    def run(self, frame: RGBDFrame) -> Perception:
+        """From a frame to grasps: `perceive`, then `locate`."""
         seconds = {}
+        labels, probabilities = self.perceive(frame, seconds)
+        return self._locate(frame, _check_labels_of(frame, labels), probabilities, seconds)
+
+    def perceive(
+        self, frame: RGBDFrame, seconds: dict[str, float] | None = None
+    ) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"]]:
+        """Label every pixel: labels, and the class probabilities that they were chosen by.
+
+        seconds: gets the time of each stage, if given. Raises ValueError without a model, or for one that does not give
+        probabilities or has no such class as the target.
+        """
+        if self.model is None:
+            raise ValueError("model: expected one to perceive with, got None; `locate` takes labels from elsewhere")
+        seconds = {} if seconds is None else seconds
         with _timed(seconds, "network"):
-            if labels is None:
-                probabilities = class_probabilities(self.model, frame.rgb, self.mirror)
-            else:
-                labels = check_shape("labels", check_labels("labels", labels, len(CLASSES)), (None, None))
-                check_same_size("frame.rgb", frame.rgb, "labels", labels)
-                probabilities = one_hot(labels).astype(np.float32)
+            probabilities = class_probabilities(self.model, frame.rgb, self.mirror)
+        if self.target_class >= probabilities.shape[-1]:
+            raise ValueError(
+                f"target_class: expected one of the model's {probabilities.shape[-1]} classes, got {self.target_class}"
+            )
         with _timed(seconds, "labels"):
             labels = most_probable(probabilities)
         if self.crf:
             with _timed(seconds, "crf"):
                 labels = self.crf(probabilities, frame)
+        return labels, probabilities
+
+    def locate(
+        self,
+        frame: RGBDFrame,
+        labels: Integer[np.ndarray, "H W"],
+        probabilities: Float[np.ndarray, "H W C"] | None = None,
+    ) -> Perception:
+        """Find the labelled targets in space, and grasps for them.
+
+        labels: of this pipeline's `perceive`, true ones, or anybody's: any classes, 255 for "unknown". probabilities:
+        what they were chosen by, if anything. Raises ValueError naming the argument that does not fit.
+        """
+        labels = _check_labels_of(frame, labels)
+        if probabilities is not None:
+            probabilities = check_probabilities(probabilities, labels.shape, self.target_class)
+        return self._locate(frame, labels, probabilities, {})
+
+    def _locate(self, frame: RGBDFrame, labels, probabilities, seconds: dict[str, float]) -> Perception:
+        table_z = next(z for z in (self.table_z, frame.table_z, 0.0) if z is not None)
         with _timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
         with _timed(seconds, "clouds"):
-            seen = np.isfinite(points[..., 2])
-            clouds = list(self.split(points[seen & (labels == self.target_class)]))
-            scene = self._in_workspace(points)
+            pixels, clouds, scene = self.targets(labels, points, table_z)
         with _timed(seconds, "grasps"):
-            certainty = tuple(mean_under(cloud, probabilities[..., self.target_class], frame) for cloud in clouds)
-            plan = rank(self.grasp(clouds, scene, self.table_z, frame.T_base_cam[:3, 3]), certainty)
-        return Perception(probabilities, labels, points, clouds, scene, plan, certainty, seconds)
+            plan = self.plan(clouds, scene, table_z, frame.T_base_cam[:3, 3])
+            certainty = tuple(1.0 for _ in pixels)
+            if probabilities is not None:
+                of_target = probabilities[..., self.target_class].reshape(-1)
+                certainty = tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
+            plan = rank(plan, certainty)
+        return Perception(labels, probabilities, points, pixels, clouds, scene, certainty, plan, seconds)
 
-    def _in_workspace(self, points: Float[np.ndarray, "H W 3"]) -> Float[np.ndarray, "M 3"]:
+    def targets(
+        self, labels: UInt8[np.ndarray, "H W"], points: Float[np.ndarray, "H W 3"], table_z: float
+    ) -> tuple[list[Integer[np.ndarray, "_"]], list[Float[np.ndarray, "_ 3"]], Float[np.ndarray, "M 3"]]:
+        """Find each target's pixels (indices v * W + u) and points, and all points of the workspace."""
         from labkit.support.geometry_kernels import points_in_box  # numba takes its time to import
 
-        low, high = np.array(WORKSPACE).T + np.outer([1.0, 1.0], [0.0, 0.0, self.table_z])
-        return points_in_box(np.ascontiguousarray(points).reshape(-1, 3), low, high)
+        low, high = self.workspace.T + np.outer([1.0, 1.0], [0.0, 0.0, table_z])
+        points = np.ascontiguousarray(points).reshape(-1, 3)
+        pixels = np.flatnonzero(labels == self.target_class)
+        pixels = pixels[((points[pixels] > low) & (points[pixels] < high)).all(axis=1)]  # NaN lies nowhere
+        each = [pixels[group] for group in self.split(points[pixels])]
+        return each, [points[chosen] for chosen in each], points_in_box(points, low, high)
+
+    def plan(
+        self,
+        clouds: Sequence[Float[np.ndarray, "_ 3"]],
+        scene: Float[np.ndarray, "M 3"],
+        table_z: float,
+        camera_position: Float[np.ndarray, "3"],
+    ) -> GraspPlan:
+        """Plan grasps of the clouds among the scene; where nothing is known to be free, there is none."""
+        if len(scene) == 0:
+            return GraspPlan(reason="nothing that the camera saw lies in the workspace")
+        return self.grasp(clouds, scene, table_z, camera_position)
+
+
+def _check_labels_of(frame: RGBDFrame, labels) -> UInt8[np.ndarray, "H W"]:
+    labels = check_labels("labels", check_shape("labels", labels, frame.depth.shape), IGNORE)
+    return labels.astype(np.uint8, copy=False)
 
 
 @contextmanager
@@ -147,15 +228,35 @@ def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = F
     elif isinstance(model, Engine):
         p = model(rgb, mirror)
     else:
-        p = np.asarray(model(check_rgb("rgb", rgb)))
-    p = check_shape("probabilities", p, (*rgb.shape[:2], None))
-    if not np.isfinite(p).all():
-        raise ValueError("probabilities: expected finite numbers from the model, got NaN or infinity")
-    return p
+        p = model(check_rgb("rgb", rgb))
+    return check_probabilities(p, rgb.shape[:2])
+
+
+def check_probabilities(p, size: tuple[int, int], target_class: int = 0) -> Float[np.ndarray, "H W C"]:
+    """Return what a model gave as an array (H, W, C) if these are probabilities of its classes at each pixel.
+
+    Raises ValueError for another shape, too few classes, NaN (the weights may hold it), and logits or 0..255 scores.
+
+    >>> check_probabilities([[[20, 235]]], (1, 1))
+    Traceback (most recent call last):
+    ...
+    ValueError: probabilities: expected numbers in 0..1 that sum to 1 at each pixel, got 20 to 235; are they scores?
+    """
+    p = check_finite("probabilities", check_shape("probabilities", p, (*size, None)))
+    if p.shape[-1] <= target_class:
+        raise ValueError(f"probabilities: expected more than {target_class} classes, the target's, got {p.shape[-1]}")
+    low, high = p.min(), p.max()
+    total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
+    if low < -1e-3 or high > 1.001 or np.abs(total - 1.0).max() > 0.01:
+        raise ValueError(
+            "probabilities: expected numbers in 0..1 that sum to 1 at each pixel, "
+            f"got {low:.4g} to {high:.4g}; are they scores?"
+        )
+    return p if p.dtype.kind == "f" else p.astype(np.float32)
 
 
 def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray, "H W"]:
-    """The label of each pixel: the class of highest probability (problem 3 of the text), the first one of equals.
+    """The label of each pixel: the class of highest probability, the first one of equals (topic 03).
 
     >>> most_probable(np.array([[[0.2, 0.8], [0.5, 0.5]]]))
     array([[1, 0]], dtype=uint8)
@@ -166,44 +267,32 @@ def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray
 
 
 def refine_labels(probabilities: Float[np.ndarray, "H W C"], frame: RGBDFrame) -> UInt8[np.ndarray, "H W"]:
-    """Labels that are smooth except at edges of colour or depth: the CRF of section 2 on top of a network."""
+    """Labels that are smooth except at edges of colour or depth: a CRF on top of a network (topic 02)."""
     from labkit.crf import refine  # numba: loaded only where it is wanted
 
     return refine(probabilities, frame.rgb, frame.depth).labels
 
 
-def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Float[np.ndarray, "_ 3"]]:
-    """Clean the points of the target class and split them: two targets are two clouds."""
-    return cluster(remove_outliers(P))
-
-
-def mean_under(P: Float[np.ndarray, "N 3"], image: Float[np.ndarray, "H W"], frame: RGBDFrame) -> float:
-    """Mean of an image over the pixels in which a frame's camera sees points (base frame); 0 if it sees none.
-
-    >>> rgb, depth = np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32)
-    >>> frame = RGBDFrame(rgb, depth, K=np.eye(3), T_base_cam=np.eye(4))
-    >>> mean_under(np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]]), np.array([[0.1, 0.2], [0.3, 0.6]]), frame)
-    0.4
-    """
-    R, t = frame.T_base_cam[:3, :3], frame.T_base_cam[:3, 3]
-    x, y, z = frame.K @ R.T @ (P - t).T
-    with np.errstate(all="ignore"):
-        u, v = np.rint(x / z), np.rint(y / z)
-        inside = (z > 0.0) & (u >= 0) & (u < image.shape[1]) & (v >= 0) & (v < image.shape[0])
-    return float(image[v[inside].astype(int), u[inside].astype(int)].mean(dtype=np.float64)) if inside.any() else 0.0
+def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Integer[np.ndarray, "_"]]:
+    """Clean the points of the target class and split them: two targets are two lists of indices into P."""
+    kept = inliers(P)
+    return [kept[group] for group in cluster_indices(P[kept])]
 
 
 def rank(plan: GraspPlan, certainty: Sequence[float]) -> GraspPlan:
     """Weigh the grasps with how certain their targets are, and sort: a fine grip on an obstacle is worth little."""
-    weighed = [replace(grasp, score=grasp.score * certainty[grasp.target]) for grasp in plan.grasps]
-    return replace(plan, grasps=tuple(sorted(weighed, key=lambda grasp: -grasp.score)))
+
+    def weighed(grasp: Grasp) -> Grasp:
+        return replace(grasp, score=grasp.score * certainty[grasp.target])
+
+    return replace(plan, grasps=tuple(sorted(map(weighed, plan.grasps), key=lambda grasp: -grasp.score)))
 
 
 def segment_rgb_image(model, image: UInt8[np.ndarray, "H W 3"], order: str = "rgb") -> UInt8[np.ndarray, "H W"]:
-    """Label each pixel of an image (the text's function of section 6).
+    """Label each pixel of an image with a model as in `Pipeline` (topics 03 and 08).
 
-    order: "rgb", or "bgr" for an image as OpenCV and many ROS cameras give it. The text's version takes either and
-    always swaps; here the caller says which it is. Raises ValueError for another order or no uint8 image.
+    order: "rgb", or "bgr" for an image as OpenCV and many ROS cameras give it: a common listing always swaps channels,
+    whichever it is given; here the caller says. Raises ValueError for another order or no uint8 image.
 
     >>> segment_rgb_image(lambda rgb: rgb / 255.0, np.array([[[255, 0, 0]]], np.uint8), order="bgr")
     array([[2]], dtype=uint8)

@@ -58,10 +58,11 @@ def test_zero_and_nan_depth_are_fine(missing):
         ("T_base_cam", changed(np.eye(4), (0, 0), -1.0), "right-handed"),
         ("T_base_cam", changed(np.eye(4), (3, 0), 1.0), "transposed"),
         ("T_base_cam", np.eye(3), "shape"),
-        ("labels", np.full((6, 8), 4), "0 to 3 or 255"),
+        ("labels", np.full((6, 8), 256), "0 to 254 or 255"),
         ("labels", np.zeros((6, 8)), "integer"),
         ("labels", np.zeros((5, 8), int), "size"),
         ("instances", np.zeros((6, 9), np.uint8), "size"),
+        ("table_z", 750, "millimetres"),
     ],
 )
 def test_wrong_arguments_are_named(argument, value, says):

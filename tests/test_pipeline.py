@@ -9,10 +9,10 @@ from torch import nn
 
 import data_gen
 from labkit.frame import RGBDFrame
-from labkit.grasp import GraspPlan
-from labkit.labels import OBSTACLE, SURFACE, TARGET, one_hot
+from labkit.grasp import GraspPlan, Gripper
+from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
 from labkit.network import SmallSegNet
-from labkit.pipeline import Pipeline, class_probabilities, most_probable, segment_rgb_image
+from labkit.pipeline import WORKSPACE, Pipeline, class_probabilities, most_probable, segment_rgb_image
 from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
 from labkit.sim.world import World
 
@@ -35,7 +35,7 @@ def scene():
 
 def test_two_targets_are_two_clouds_where_the_objects_are(scene):
     frame, middles = scene
-    p = Pipeline(np.asarray).run(frame, labels=frame.labels)
+    p = Pipeline().locate(frame, frame.labels)
     assert len(p.clouds) == 2
     for middle in middles.values():
         distances = [np.linalg.norm(cloud.mean(axis=0) - middle) for cloud in p.clouds]
@@ -46,7 +46,7 @@ def test_two_targets_are_two_clouds_where_the_objects_are(scene):
 
 def test_the_best_grasp_closes_square_on_a_target(scene):
     frame, middles = scene
-    grasp = Pipeline(np.asarray).run(frame, labels=frame.labels).plan.grasps[0]
+    grasp = Pipeline().locate(frame, frame.labels).plan.grasps[0]
     position = grasp.T_base_grasp[:3, 3]
     assert min(np.linalg.norm(position[:2] - middle[:2]) for middle in middles.values()) < 0.02
     closing = np.abs(grasp.T_base_grasp[:3, 1])
@@ -88,21 +88,21 @@ def test_ones_own_functions_take_the_stages_places(scene):
 
     def split(P):
         calls.append("split")
-        return [P[P[:, 1] > 0.0], P[P[:, 1] <= 0.0]]
+        return [np.flatnonzero(P[:, 1] > 0.0), np.flatnonzero(P[:, 1] <= 0.0)]
 
     def grasp(clouds, scene, table_z, camera_position):
         calls.append("grasp")
         return GraspPlan((), f"{len(clouds)} clouds at {table_z}")
 
-    p = Pipeline(np.asarray, 0.0, back_project=back_project, split=split, grasp=grasp).run(frame, frame.labels)
+    p = Pipeline(table_z=0.0, back_project=back_project, split=split, grasp=grasp).locate(frame, frame.labels)
     assert calls == ["back_project", "split", "grasp"] and p.plan.reason == "2 clouds at 0.0"
-    kit = Pipeline(np.asarray).run(frame, labels=frame.labels)
+    kit = Pipeline().locate(frame, frame.labels)
     assert np.nanmax(np.abs(p.points - kit.points)) < 1e-5
 
 
 def test_no_target_is_no_grasp_with_a_reason(scene):
     frame, _ = scene
-    p = Pipeline(np.asarray).run(frame, labels=np.full(frame.labels.shape, SURFACE))
+    p = Pipeline().locate(frame, np.full(frame.labels.shape, SURFACE))
     assert p.clouds == [] and p.plan.grasps == () and "target" in p.plan.reason
 
 
@@ -110,16 +110,107 @@ def test_pixels_without_depth_become_no_points(scene):
     frame, _ = scene
     depth = np.where(frame.labels == TARGET, 0.0, frame.depth).astype(np.float32)
     depth[:100] = np.nan
-    p = Pipeline(np.asarray).run(dataclasses.replace(frame, depth=depth), labels=frame.labels)
+    p = Pipeline().locate(dataclasses.replace(frame, depth=depth), frame.labels)
     assert p.clouds == [] and np.isnan(p.points[:100]).all()
     assert np.isfinite(p.scene).all()
 
 
 def test_every_stage_is_timed(scene):
     frame, _ = scene
-    seconds = Pipeline(np.asarray).run(frame, labels=frame.labels).seconds
-    assert list(seconds) == ["network", "labels", "back_projection", "clouds", "grasps"]
+    pipeline = Pipeline(lambda rgb: one_hot(frame.labels), crf=lambda probabilities, frame: frame.labels)
+    seconds = pipeline.run(frame).seconds
+    assert list(seconds) == ["network", "labels", "crf", "back_projection", "clouds", "grasps"]
     assert all(value >= 0.0 for value in seconds.values())
+
+
+def test_run_is_perceive_and_then_locate(scene):
+    frame, _ = scene
+    pipeline = Pipeline(SmallSegNet().eval())
+    labels, probabilities = pipeline.perceive(frame)
+    p, q = pipeline.run(frame), pipeline.locate(frame, labels, probabilities)
+    assert np.array_equal(p.labels, labels) and np.array_equal(p.probabilities, probabilities)
+    assert p.certainty == q.certainty and p.plan.reason == q.plan.reason
+    assert [g.score for g in p.plan.grasps] == [g.score for g in q.plan.grasps]
+
+
+def test_clouds_carry_their_pixels_and_the_certainty_of_these(scene):
+    frame, _ = scene
+    p_target = np.random.default_rng(0).uniform(0.5, 1.0, frame.labels.shape)
+    probabilities = np.stack([0 * p_target, 1.0 - p_target, p_target, 0 * p_target], axis=-1)
+    p = Pipeline().locate(frame, frame.labels, probabilities)
+    assert len(p.pixels) == 2
+    for pixels, cloud, certainty in zip(p.pixels, p.clouds, p.certainty, strict=True):
+        v, u = np.divmod(pixels, frame.size[0])
+        assert (frame.labels[v, u] == TARGET).all() and np.array_equal(p.points[v, u], cloud)
+        assert certainty == pytest.approx(p_target[v, u].mean())
+    assert Pipeline().locate(frame, frame.labels).certainty == (1.0, 1.0)
+
+
+def moved(frame, x):
+    T = frame.T_base_cam.copy()
+    T[0, 3] += x
+    return dataclasses.replace(frame, T_base_cam=T)
+
+
+def test_nothing_is_grasped_where_nothing_is_known_to_be_free(scene):
+    frame, _ = scene
+    away = moved(frame, 1.2)
+    refused = Pipeline().locate(away, away.labels)
+    assert refused.plan.grasps == () and "workspace" in refused.plan.reason
+    there = ((1.35, 2.2), *WORKSPACE[1:])
+    p, q = Pipeline(workspace=there).locate(away, away.labels), Pipeline().locate(frame, frame.labels)
+    assert len(p.plan.grasps) == len(q.plan.grasps) > 0
+    assert p.plan.grasps[0].T_base_grasp[0, 3] - 1.2 == pytest.approx(q.plan.grasps[0].T_base_grasp[0, 3], abs=0.01)
+
+
+def test_a_target_outside_the_workspace_is_none(scene):
+    frame, _ = scene
+    right_half = Pipeline(workspace=(WORKSPACE[0], (-0.7, 0.0), WORKSPACE[2])).locate(frame, frame.labels)
+    assert len(right_half.clouds) == 1 and right_half.clouds[0][:, 1].max() < 0.0
+
+
+@pytest.mark.parametrize(("classes", "target"), [(21, 5), (2, 1)])
+def test_the_number_of_classes_and_the_target_are_the_callers(classes, target, scene):
+    frame, _ = scene
+    labels = np.where(frame.labels == TARGET, target, 0)
+    p = Pipeline(lambda rgb: one_hot(labels, classes), target_class=target).run(frame)
+    q = Pipeline().locate(frame, frame.labels)
+    assert p.probabilities.shape[-1] == classes
+    assert [len(cloud) for cloud in p.clouds] == [len(cloud) for cloud in q.clouds]
+    assert p.plan.grasps[0].score == q.plan.grasps[0].score
+
+
+def test_the_gripper_reaches_the_planner(scene):
+    frame, _ = scene
+    narrow = Pipeline(gripper=Gripper(max_opening=0.03)).locate(frame, frame.labels).plan
+    assert max((grasp.width for grasp in narrow.grasps), default=0.0) <= 0.03
+    assert max(grasp.width for grasp in Pipeline().locate(frame, frame.labels).plan.grasps) > 0.04
+
+
+@pytest.mark.parametrize(("given", "of_frame", "used"), [(0.1, 0.02, 0.1), (None, 0.02, 0.02), (None, None, 0.0)])
+def test_the_tables_height_is_given_or_the_frames_or_zero(given, of_frame, used, scene):
+    heights = []
+
+    def grasp(clouds, scene, table_z, camera_position):
+        heights.append(table_z)
+        return GraspPlan()
+
+    frame = dataclasses.replace(scene[0], table_z=of_frame)
+    Pipeline(table_z=given, grasp=grasp).locate(frame, frame.labels)
+    assert heights == [used]
+
+
+def test_unknown_labels_stay_unknown(scene):
+    frame, _ = scene
+    labels = np.where(frame.labels == OBSTACLE, IGNORE, frame.labels)
+    assert np.array_equal(Pipeline().locate(frame, labels).labels, labels)
+
+
+def test_what_is_printed_is_short(scene):
+    frame, _ = scene
+    p = Pipeline().locate(frame, frame.labels)
+    assert repr(frame) == "RGBDFrame(320 x 240, labels, instances)"
+    assert repr(p).startswith("Perception(320 x 240, clouds of ") and len(repr(p)) < 100
 
 
 def test_the_crf_removes_speckles_and_may_be_ones_own(scene):
@@ -170,11 +261,24 @@ class Broken(nn.Module):
     ("call", "name"),
     [
         (lambda f: Pipeline("unet"), "model"),
-        (lambda f: Pipeline(np.asarray, table_z=float("nan")), "table_z"),
-        (lambda f: Pipeline(np.asarray, target_class=4), "target_class"),
-        (lambda f: Pipeline(np.asarray).run(f, labels=np.zeros((3, 3), int)), "labels"),
-        (lambda f: Pipeline(np.asarray).run(f, labels=np.full(f.labels.shape, 9)), "labels"),
+        (lambda f: Pipeline().run(f), "model"),
+        (lambda f: Pipeline(table_z=float("nan")), "table_z"),
+        (lambda f: Pipeline(table_z=750), "table_z"),
+        (lambda f: dataclasses.replace(f, table_z=np.inf), "table_z"),
+        (lambda f: Pipeline(target_class=-1), "target_class"),
+        (lambda f: Pipeline(SmallSegNet(), target_class=4), "target_class"),
+        (lambda f: Pipeline(lambda rgb: one_hot(f.labels), target_class=4).run(f), "target_class"),
+        (lambda f: Pipeline(workspace=((0, 1), (0, 1))), "workspace"),
+        (lambda f: Pipeline(workspace=((0, 1), (1, 0), (0, 1))), "workspace"),
+        (lambda f: Pipeline(grasp=np.asarray, gripper=Gripper()), "gripper"),
+        (lambda f: Pipeline().locate(f, np.zeros((3, 3), int)), "labels"),
+        (lambda f: Pipeline().locate(f, np.full(f.labels.shape, 256)), "labels"),
+        (lambda f: Pipeline().locate(f, f.labels, one_hot(f.labels)[..., :2]), "probabilities"),
+        (lambda f: Pipeline().locate(f, f.labels, one_hot(f.labels) * 255), "probabilities"),
         (lambda f: Pipeline(lambda rgb: rgb[:5]).run(f), "probabilities"),
+        (lambda f: Pipeline(lambda rgb: np.full((*rgb.shape[:2], 4), 77, np.uint8)).run(f), "probabilities"),
+        (lambda f: Pipeline(lambda rgb: 4.0 * one_hot(f.labels) - 2.0).run(f), "probabilities"),
+        (lambda f: Pipeline(lambda rgb: 0.5 * one_hot(f.labels)).run(f), "probabilities"),
         (lambda f: Pipeline(Broken()).run(f), "probabilities"),
         (lambda f: segment_rgb_image(np.asarray, f.rgb, order="hsv"), "order"),
         (lambda f: segment_rgb_image(np.asarray, f.rgb / 255.0), "image"),
@@ -194,8 +298,7 @@ def test_a_tiny_image_is_fine():
 def test_a_dataset_feeds_the_pipeline(tmp_path):
     data_gen.generate(tmp_path / "d", [3], "test", (80, 60), progress=False)
     frame = data_gen.load(tmp_path / "d")[0]
-    p = Pipeline(np.asarray, data_gen.sample_scene(3, "test").table.z).run(frame, labels=frame.labels)
-    assert p.points.shape == (60, 80, 3)
+    assert Pipeline().locate(frame, frame.labels).points.shape == (60, 80, 3)
 
 
 def test_the_surer_target_is_grasped_first(scene):

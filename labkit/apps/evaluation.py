@@ -73,7 +73,7 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
 def perceive(frame: RGBDFrame, model, table_z: float, crf: bool = False):
     """Run the pipeline on a frame with a network, or with the frame's own labels if `model` is None."""
     if model is None:
-        return Pipeline(lambda rgb: rgb, table_z).run(frame, labels=frame.labels)
+        return Pipeline(table_z=table_z).locate(frame, frame.labels)
     return Pipeline(model, table_z, crf=crf).run(frame)
 
 

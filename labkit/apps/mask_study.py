@@ -86,7 +86,7 @@ def see(spec, frame: RGBDFrame, mask: Bool[np.ndarray, "H W"]) -> Perception:
     """Run the pipeline on a frame in which `mask` is all that is labelled target; other targets are obstacles."""
     others = np.where(frame.labels == TARGET, OBSTACLE, frame.labels)
     labels = np.where(mask, TARGET, others).astype(np.uint8)
-    return Pipeline(lambda rgb: rgb, spec.table.z).run(frame, labels=labels)
+    return Pipeline(table_z=spec.table.z).locate(frame, labels)
 
 
 def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None = None) -> list[Row]:

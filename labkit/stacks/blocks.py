@@ -1,4 +1,4 @@
-"""A block diagram as Simulink has it: blocks and named signals between them; it runs and draws itself (section 9)."""
+"""A block diagram as Simulink has it: blocks and named signals between them; it runs and draws itself (topic 09)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +7,6 @@ from graphlib import CycleError, TopologicalSorter
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
-
-from labkit.geometry import back_project_to_base, cluster, remove_outliers
-from labkit.grasp import plan_grasps
-from labkit.labels import TARGET
 
 
 @dataclass(frozen=True)
@@ -153,26 +149,21 @@ class Diagram:
                 axes.text(x + 0.08, y + 0.03, signal, va="bottom", fontsize=8, bbox=white, zorder=5)
 
 
-def perception_diagram(segment: Callable, manipulate: Callable, table_z: float = 0.0) -> Diagram:
-    """Section 9's diagram: segmentation feeds point cloud processing, that a pose, that the manipulator's controller.
+def perception_diagram(pipeline, segment: Callable, manipulate: Callable) -> Diagram:
+    """Wire the stages of a Pipeline: segmentation feeds point clouds, these a grasp pose, that the manipulator.
 
-    segment: RGB image -> labels. manipulate: grasps and scene points -> what became of them. The frame's parts come
-    from outside: rgb, depth, K, T_base_cam; every signal can be looked at after a run.
+    segment: RGB image -> labels. manipulate: plan and scene points -> what became of them. A frame's parts come from
+    outside: rgb, depth, K, T_base_cam, table_z; every signal can be looked at after a run.
     """
 
-    def clouds(labels, points):
-        seen = np.isfinite(points[..., 2])
-        target = cluster(remove_outliers(points[seen & (labels == TARGET)]))
-        return target, points[seen & (points[..., 2] > table_z - 0.02)]
-
-    def pose(target, scene, T_base_cam):
-        return plan_grasps(target, scene, table_z, T_base_cam[:3, 3])
+    def pose(clouds, scene, table_z, T_base_cam):
+        return pipeline.plan(clouds, scene, table_z, T_base_cam[:3, 3])
 
     blocks = [
         Block("semantic segmentation", segment, ("rgb",), ("labels",)),
-        Block("back projection", back_project_to_base, ("depth", "K", "T_base_cam"), ("points",)),
-        Block("point clouds", clouds, ("labels", "points"), ("target", "scene")),
-        Block("object pose", pose, ("target", "scene", "T_base_cam"), ("grasps",)),
-        Block("manipulator controller", manipulate, ("grasps", "scene"), ("outcome",)),
+        Block("back projection", pipeline.back_project, ("depth", "K", "T_base_cam"), ("points",)),
+        Block("point clouds", pipeline.targets, ("labels", "points", "table_z"), ("pixels", "clouds", "scene")),
+        Block("grasp pose", pose, ("clouds", "scene", "table_z", "T_base_cam"), ("plan",)),
+        Block("manipulator controller", manipulate, ("plan", "scene"), ("outcome",)),
     ]
-    return Diagram(blocks, inputs=("rgb", "depth", "K", "T_base_cam"))
+    return Diagram(blocks, inputs=("rgb", "depth", "K", "T_base_cam", "table_z"))

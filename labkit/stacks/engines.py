@@ -57,7 +57,7 @@ class TorchEngine(Engine):
 
     def __init__(self, model):
         super().__init__(_grid(model))
-        self.model = model.eval()
+        self.model, self.num_classes = model.eval(), model.num_classes
 
     def forward(self, blob: Float[np.ndarray, "N 3 H W"]) -> Float[np.ndarray, "N C H W"]:
         import torch

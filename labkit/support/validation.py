@@ -42,6 +42,14 @@ def check_finite(name: str, array: np.ndarray) -> np.ndarray:
     return array
 
 
+def check_height(name: str, z) -> float:
+    """Return a height in metres, one finite number of at most 10: more would be millimetres."""
+    z = float(check_finite(name, check_shape(name, z, ())))
+    if abs(z) > 10.0:
+        raise ValueError(f"{name}: expected metres, got {z:.6g}, which looks like millimetres: multiply by 0.001")
+    return z
+
+
 def check_rgb(name: str, image) -> np.ndarray:
     """Return an RGB image, uint8 (H, W, 3)."""
     image = check_shape(name, image, (None, None, 3))

@@ -1,4 +1,4 @@
-"""Everything in Pipeline.run but the network, on scenes with three targets at 320x240."""
+"""Everything in the pipeline but the network, on scenes with three targets at 320x240."""
 
 import numpy as np
 
@@ -17,12 +17,12 @@ def main() -> str:
     candidates = []
     for spec in three:
         frame = render(spec)
-        pipeline = Pipeline(np.asarray, spec.table.z)
-        pipeline.run(frame, labels=frame.labels)
+        pipeline = Pipeline(table_z=spec.table.z)
+        pipeline.locate(frame, frame.labels)
         for _ in range(REPEATS):
-            perception = pipeline.run(frame, labels=frame.labels)
-            rest = {stage: s for stage, s in perception.seconds.items() if stage != "network"}
-            for stage, s in {**rest, "all but the network": sum(rest.values())}.items():
+            perception = pipeline.locate(frame, frame.labels)
+            seconds = perception.seconds
+            for stage, s in {**seconds, "all but the network": sum(seconds.values())}.items():
                 stages.setdefault(stage, []).append(1000.0 * s)
             candidates.append(len(perception.plan.grasps))
     rows = [f"| {name} | {np.median(ms):.2f} | {np.quantile(ms, 0.9):.2f} |" for name, ms in stages.items()]

@@ -278,20 +278,21 @@ def test_a_diagram_runs_its_blocks_in_the_order_of_their_signals():
 def test_simulinks_diagram_does_what_the_pipeline_does():
     spec = data_gen.sample_scene(600_002, "test")
     frame = data_gen.render(spec)
-    expected = Pipeline(np.asarray, spec.table.z).run(frame, labels=frame.labels)
-    diagram = perception_diagram(lambda rgb: frame.labels, lambda grasps, scene: len(grasps.grasps), spec.table.z)
-    signals = diagram.run(rgb=frame.rgb, depth=frame.depth, K=frame.K, T_base_cam=frame.T_base_cam)
+    pipeline = Pipeline(table_z=spec.table.z)
+    expected = pipeline.locate(frame, frame.labels)
+    diagram = perception_diagram(pipeline, lambda rgb: frame.labels, lambda plan, scene: len(plan.grasps))
+    camera = {name: getattr(frame, name) for name in ("rgb", "depth", "K", "T_base_cam")}
+    signals = diagram.run(**camera, table_z=spec.table.z)
     assert signals["outcome"] > 0
     assert np.array_equal(signals["points"], expected.points, equal_nan=True)
-    assert len(signals["target"]) == len(expected.clouds)
-    assert all(np.array_equal(a, b) for a, b in zip(signals["target"], expected.clouds, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(signals["clouds"], expected.clouds, strict=True))
     assert diagram.columns().keys() == set(diagram.blocks) and max(diagram.columns().values()) == 4
-    best, reference = signals["grasps"].grasps[0], expected.plan.grasps[0]
+    best, reference = signals["plan"].grasps[0], expected.plan.grasps[0]
     assert np.allclose(best.T_base_grasp[:3, 3], reference.T_base_grasp[:3, 3], atol=0.01)
 
 
 def test_a_diagram_draws_every_block_signal_and_wire():
-    diagram = perception_diagram(len, len)
+    diagram = perception_diagram(Pipeline(), len, len)
     axes = Figure().subplots()
     diagram.draw(axes)
     texts = [text.get_text().replace("\n", " ") for text in axes.texts]
