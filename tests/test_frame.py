@@ -57,6 +57,7 @@ def test_zero_and_nan_depth_are_fine(missing):
         ("T_base_cam", changed(np.eye(4), (0, 0), 1.1), "orthonormal"),
         ("T_base_cam", changed(np.eye(4), (0, 0), -1.0), "right-handed"),
         ("T_base_cam", changed(np.eye(4), (3, 0), 1.0), "transposed"),
+        ("T_base_cam", changed(np.eye(4), (2, 3), 850.0), "millimetres"),
         ("T_base_cam", np.eye(3), "shape"),
         ("labels", np.full((6, 8), 256), "0 to 254 or 255"),
         ("labels", np.zeros((6, 8)), "integer"),

@@ -5,8 +5,9 @@ Shape annotations are checked only while tests run; these checks always are, at 
 
 import numpy as np
 
-# No sensor of this kit sees further; a larger number is a depth in millimetres.
+# No sensor of this kit sees further, and no arm's camera stands further away; larger numbers are millimetres.
 MAX_DEPTH_M = 100.0
+MAX_TRANSLATION_M = 20.0
 
 
 def check_shape(name: str, array, shape: tuple) -> np.ndarray:
@@ -95,7 +96,7 @@ def check_K(name: str, K) -> np.ndarray:
 
 
 def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
-    """Return a rigid transform in SE(3) as float64 (4, 4): orthonormal, right-handed, last row 0 0 0 1."""
+    """Return a rigid transform in SE(3) as float64 (4, 4): orthonormal, right-handed, last row 0 0 0 1, in metres."""
     T = check_finite(name, check_shape(name, T, (4, 4))).astype(np.float64)
     if np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() > tolerance:
         raise ValueError(f"{name}: expected its last row to be 0 0 0 1, got {T[3].tolist()}; is it transposed?")
@@ -107,6 +108,12 @@ def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
         )
     if np.linalg.det(R) < 0.0:
         raise ValueError(f"{name}: expected a right-handed rotation (determinant +1), got a mirror image (-1)")
+    far = np.abs(T[:3, 3]).max()
+    if far > MAX_TRANSLATION_M:
+        raise ValueError(
+            f"{name}: expected a translation in metres, got {far:.6g}, which looks like millimetres: "
+            "multiply T[:3, 3] by 0.001"
+        )
     return T
 
 
