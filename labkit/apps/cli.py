@@ -191,7 +191,9 @@ def node(
     elif ros:
         command.run_on_ros(settings)
     else:
-        typer.echo(command.answer_bag(settings, bag, out, probabilities))
+        line, answered = command.answer_bag(settings, bag, out, probabilities)
+        typer.echo(line)
+        raise typer.Exit(0 if answered else 1)
 
 
 @app.command()

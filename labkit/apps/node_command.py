@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass, fields, replace
 
+from labkit.node import ros, ros1
+from labkit.node.bags import process
 from labkit.node.convert import rigid
 from labkit.node.messages import DEFAULT_TOPICS, Topics
 from labkit.node.rehearsal import camera_to_lift
@@ -75,18 +77,15 @@ def rehearse(settings: Settings, spec) -> str:
 
 def run_on_ros(settings: Settings) -> Counts | None:
     """Run on ROS until SIGINT."""
-    from labkit.node import ros
-
     options = settings.node()
-    ros.ros("rospy")  # what is missing is said before the weights are loaded
+    ros1.ros("rospy")  # what is missing is said before the weights are loaded
     return ros.run(settings.pipeline(), **options)
 
 
-def answer_bag(settings: Settings, bag, out, probabilities: bool) -> str:
-    """Answer the frames of a bag; a line."""
-    from labkit.node.bags import process
-
+def answer_bag(settings: Settings, bag, out, probabilities: bool) -> tuple[str, bool]:
+    """Answer the frames of a bag; a line, and whether any frame was answered."""
     counts = process(bag, out, settings.pipeline(), probabilities=probabilities, **settings.node())
-    bad = f"{counts.failed} frames and {counts.skipped} messages skipped"
+    bad = f"{counts.lost} lost, {counts.failed} unusable, {counts.skipped} malformed messages"
     reasons = ", ".join(f"{reason} ({n})" for reason, n in counts.reasons.most_common(5))
-    return f"wrote {out}: {counts.answered} frames answered, {bad}" + (f": {reasons}" if reasons else "")
+    line = f"wrote {out}: {counts.answered} frames answered, {bad}" + (f": {reasons}" if reasons else "")
+    return line, counts.answered > 0

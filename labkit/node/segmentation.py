@@ -1,4 +1,4 @@
-"""The segmentation node: the data flow of the text's section 5 around a Pipeline, over any transport."""
+"""The segmentation node: the data flow of topic 08 around a Pipeline, over any transport."""
 
 import logging
 import threading
@@ -47,11 +47,13 @@ class Counts:
     """What became of the messages and frames.
 
     answered: frames with results published. dropped: frames that a newer one superseded before anybody looked at them.
-    failed: frames that could not be used, skipped: messages that were malformed; `reasons` says why, and how often.
+    lost: frames of which a message never came. failed: frames that could not be used. skipped: messages that were
+    malformed. `reasons` says why, and how often.
     """
 
     answered: int = 0
     dropped: int = 0
+    lost: int = 0
     failed: int = 0
     skipped: int = 0
     reasons: Counter = field(default_factory=Counter)
@@ -63,12 +65,13 @@ class SegmentationNode:
     pipeline: what perceives. transport: a Bus, or an edge to ROS or to a bag. T_base_cam: where the camera stands; None
     takes it from the transforms on /tf and /tf_static at the image's stamp, waiting up to `patience` seconds for them.
     base_frame: the base's name in messages. slop: how far the stamps of one frame may lie apart, seconds. depth_scale:
-    metres a unit of 16UC1. Raises ValueError for an argument that does not fit.
+    metres per unit of 16UC1. Raises ValueError for an argument that does not fit.
 
-    Messages may come from any thread and are only looked over there; frames are perceived by whoever calls `spin` or
+    Messages may come from any thread, which only checks them; frames are perceived by the thread that calls `spin` or
     `spin_once`. One frame waits: a newer one takes its place, and the old one is counted as dropped. Whatever is
-    malformed or does not fit together is logged with the reason and skipped. Every result carries the colour image's
-    stamp. Probabilities, the planner's scene and the gripper's opening are published if anybody wants them.
+    malformed or does not fit together is logged with the reason and skipped; a transport delivers a ValueError in place
+    of a message that it cannot read. Every result carries the colour image's stamp. Probabilities, the planner's scene
+    and the gripper's opening are published if anybody wants them.
 
     >>> from labkit.node.bus import Bus
     >>> node = SegmentationNode(Pipeline(lambda rgb: rgb / 255.0), Bus(), T_base_cam=np.eye(4))
@@ -92,7 +95,7 @@ class SegmentationNode:
         if not (np.isfinite(slop) and slop >= 0.0):
             raise ValueError(f"slop: expected seconds of 0 or more, got {slop}")
         if not (np.isfinite(depth_scale) and depth_scale > 0.0):
-            raise ValueError(f"depth_scale: expected metres a unit, above 0, got {depth_scale}")
+            raise ValueError(f"depth_scale: expected metres per unit, above 0, got {depth_scale}")
         self.pipeline, self.transport, self.topics = pipeline, transport, topics
         self.T_base_cam = None if T_base_cam is None else check_T("T_base_cam", T_base_cam)
         self.base_frame, self.depth_scale, self.patience = base_frame, depth_scale, patience
@@ -120,12 +123,14 @@ class SegmentationNode:
     def _receiver(self, stream: str, check):
         topic = getattr(self.topics, stream)
 
-        def receive(message: Message) -> None:
+        def receive(message: Message | ValueError) -> None:
             try:
+                if isinstance(message, ValueError):
+                    raise message
                 check(message)
                 stamp = _stamp(message)
             except ValueError as error:
-                self.skip(topic, error)
+                self._skip(topic, error)
                 return
             with self._news:
                 together = self._sync.add(stream, stamp, message)
@@ -143,21 +148,22 @@ class SegmentationNode:
             self._distortion_said = True
             logger.warning("%s: distortion is not undone; publish rectified images", self.topics.info)
 
-    def _take_transforms(self, message: Transforms, static: bool) -> None:
+    def _take_transforms(self, message: Transforms | ValueError, static: bool) -> None:
         topic = self.topics.tf_static if static else self.topics.tf
         if not isinstance(message, Transforms):
-            self.skip(topic, ValueError(f"message: expected Transforms, got {type(message).__name__}"))
+            unread = isinstance(message, ValueError)
+            error = message if unread else ValueError(f"message: expected Transforms, got {type(message).__name__}")
+            self._skip(topic, error)
             return
         for transform in message.transforms:
             try:
                 self.tree.add(transform, static)
             except ValueError as error:
-                self.skip(topic, error)
+                self._skip(topic, error)
         with self._news:
             self._news.notify_all()
 
-    def skip(self, topic: str, error: ValueError) -> None:
-        """Log a message that cannot be used, and count it; edges call it for what they cannot even read."""
+    def _skip(self, topic: str, error: ValueError) -> None:
         logger.warning("%s: message skipped: %s", topic, error)
         with self._news:
             self.counts.skipped += 1
@@ -210,6 +216,21 @@ class SegmentationNode:
         )
         return True
 
+    def flush(self) -> None:
+        """Count what waits for its partners as lost: nothing more will come."""
+        with self._news:
+            self._sync.flush()
+            self._count_lost()
+
+    def _count_lost(self) -> None:
+        self.counts.lost = max(self._sync.left.values(), default=0)
+        bound = f"within {self._sync.slop / 1e6:g} ms"
+        lost = {getattr(self.topics, stream): frames for stream, frames in self._sync.missing().items()}
+        lost["message of another topic"] = 0 if any(lost.values()) else self.counts.lost
+        for what, frames in lost.items():
+            self.counts.reasons[f"frame lost: no {what} {bound}"] = frames
+        self.counts.reasons = +self.counts.reasons  # without zeros
+
     def _base_transform(self, header: Header, arrived: float) -> Float[np.ndarray, "4 4"]:
         """Where the camera stood at an image's stamp; its transform may arrive a little later than the image."""
         if self.T_base_cam is not None:
@@ -253,8 +274,8 @@ class SegmentationNode:
 
     def _report(self, header: Header, message: str, values: dict[str, str], level: int = 0) -> None:
         with self._news:
+            self._count_lost()
             counted = {f.name: getattr(self.counts, f.name) for f in fields(Counts) if f.name != "reasons"}
-            counted["unmatched"] = self._sync.unmatched
             values = values | {name: str(n) for name, n in counted.items()}
             values |= {reason: str(n) for reason, n in self.counts.reasons.most_common(5)}
         self.transport.publish(self.topics.diagnostics, Diagnostics(header, "segmentation", level, message, values))

@@ -1,16 +1,21 @@
 """Which messages belong together: those whose stamps differ by less than a bound, whatever order they come in."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
+
+from labkit.node.messages import NANOSECONDS
 
 
 class Synchronizer:
-    """Approximate time synchronisation of several streams.
+    """Approximate time synchronisation of several streams (topic 08).
 
-    `add` returns one message a stream as soon as all their stamps lie within `slop` nanoseconds, else None. Of several
-    that would do, the ones nearest to the message just added are taken. Each stream keeps `depth` messages that wait;
-    what is pushed out, or is older than what was taken, is counted in `unmatched`. Stamps need not rise, so that a
-    camera's clock may start anew. Raises ValueError for a slop below 0 or an empty queue.
+    `add` returns one message per stream as soon as all their stamps lie within `slop` nanoseconds, else None. Of
+    several that would do, it takes the ones nearest to the message just added. Each stream keeps `depth` messages that
+    wait. A message that is pushed out, or is older than what was taken, is counted in `left`, by stream.
+
+    Stamps need not rise. A stamp that is `restart` nanoseconds behind its stream's newest says that the clock was set
+    back: what waits is then of the time before, and pairs with nothing that comes after. Raises ValueError for a slop
+    below 0 or an empty queue.
 
     >>> sync = Synchronizer(("rgb", "depth"), slop=10)
     >>> sync.add("rgb", 100, "image"), sync.add("depth", 50, "old"), sync.add("depth", 104, "depth")
@@ -19,18 +24,31 @@ class Synchronizer:
     1
     """
 
-    def __init__(self, streams: Sequence[str], slop: int, depth: int = 10):
+    def __init__(self, streams: Sequence[str], slop: int, depth: int = 10, restart: int = NANOSECONDS):
         if slop < 0:
             raise ValueError(f"slop: expected nanoseconds of 0 or more, got {slop}")
         if depth < 1:
             raise ValueError(f"depth: expected at least one waiting message, got {depth}")
-        self.slop, self.unmatched = slop, 0
+        self.slop, self.restart, self.left = slop, restart, Counter()
         self._waiting = {stream: deque(maxlen=depth) for stream in streams}
+        self._newest: dict[str, int] = {}
+        self._to_follow: set[str] = set()  # streams that have sent nothing since another one's clock was set back
+
+    @property
+    def unmatched(self) -> int:
+        """How many messages went without the others of their moment."""
+        return self.left.total()
+
+    def missing(self) -> dict[str, int]:
+        """Give the number of moments that were lost because a stream's message did not come, by stream."""
+        moments = max(self.left.values(), default=0)
+        return {stream: moments - self.left[stream] for stream in self._waiting}
 
     def add(self, stream: str, stamp: int, message) -> dict | None:
         """Take a message in; return the set that it completes, by stream, or None."""
+        self._follow_clock(stream, stamp)
         queue = self._waiting[stream]
-        self.unmatched += len(queue) == queue.maxlen
+        self.left[stream] += len(queue) == queue.maxlen
         queue.append((stamp, message))
         if not all(self._waiting.values()):
             return None
@@ -41,6 +59,21 @@ class Synchronizer:
             return None
         for name, (when, _) in chosen.items():
             newer = [item for item in self._waiting[name] if item[0] > when]
-            self.unmatched += len(self._waiting[name]) - len(newer) - 1
+            self.left[name] += len(self._waiting[name]) - len(newer) - 1
             self._waiting[name] = deque(newer, self._waiting[name].maxlen)
         return {name: message for name, (_, message) in chosen.items()}
+
+    def flush(self) -> None:
+        """Give up what waits, and count it: nothing more will come."""
+        for name, queue in self._waiting.items():
+            self.left[name] += len(queue)
+            queue.clear()
+
+    def _follow_clock(self, stream: str, stamp: int) -> None:
+        newest = self._newest.get(stream, stamp)
+        set_back = stamp < newest - self.restart
+        self._newest[stream] = stamp if set_back else max(stamp, newest)
+        if set_back and stream not in self._to_follow:
+            self.flush()
+            self._to_follow = self._waiting.keys() - {stream}
+        self._to_follow.discard(stream)

@@ -16,9 +16,10 @@ from labkit.node.messages import NANOSECONDS, Transform
 
 
 class TransformTree:
-    """Transforms by child frame, each with its parent; moving ones are kept for `seconds` and interpolated in between.
+    """Transforms by child frame, each with its parent; moving ones are kept for `seconds` and interpolated (topic 08).
 
-    May be filled by one thread and asked by another.
+    A frame has one parent and is static or moves: what was said last holds, and what was known before is forgotten. One
+    thread may fill the tree while another asks it.
 
     >>> tree = TransformTree()
     >>> from labkit.node.messages import Header
@@ -31,27 +32,29 @@ class TransformTree:
     def __init__(self, seconds: float = 10.0):
         self._span = seconds * NANOSECONDS
         self._parents: dict[str, str] = {}
-        self._static: dict[str, np.ndarray] = {}
-        self._moving: dict[str, list[tuple[int, np.ndarray]]] = {}
+        self._static: set[str] = set()
+        self._histories: dict[str, list[tuple[int, np.ndarray]]] = {}
         self._lock = threading.Lock()
 
     def add(self, transform: Transform, static: bool = False) -> None:
-        """Take a transform in; raises ValueError if its rotation is none or a frame's name is missing.
+        """Take a transform in; raises ValueError if its quaternion is no rotation or the name of a frame is missing.
 
-        A moving one that is more than the kept time older than the newest begins a new history: the clock was set back.
+        One that is older than the newest by more than the kept time begins a new history: the clock was set back.
         """
         parent, child, stamp = transform.header.frame_id, transform.child_frame_id, transform.header.stamp
         if not parent or not child or parent == child:
             raise ValueError(f"transform: expected the names of two frames, got {parent!r} and {child!r}")
         T_parent_child = rigid(transform.translation, transform.rotation)
         with self._lock:
-            if self._parents.setdefault(child, parent) != parent:
-                self._parents[child] = parent
-                self._moving.pop(child, None)
+            if self._parents.get(child) != parent or (child in self._static) != static:
+                self._static.discard(child)
+                self._histories[child] = []
+            self._parents[child] = parent
+            history = self._histories[child]
             if static:
-                self._static[child] = T_parent_child
+                self._static.add(child)
+                history[:] = [(stamp, T_parent_child)]
                 return
-            history = self._moving.setdefault(child, [])
             if history and stamp < history[-1][0] - self._span:
                 history.clear()
             bisect.insort(history, (stamp, T_parent_child), key=lambda item: item[0])
@@ -87,9 +90,9 @@ class TransformTree:
 
     def _at(self, child: str, stamp: int) -> np.ndarray:
         """T_parent_child at a time: straight between the neighbours' places, and on the shortest turn."""
+        history = self._histories[child]
         if child in self._static:
-            return self._static[child]
-        history = self._moving[child]
+            return history[0][1]
         first, last = history[0][0], history[-1][0]
         if not first <= stamp <= last:
             side, by = ("before the first", first - stamp) if stamp < first else ("after the last", stamp - last)

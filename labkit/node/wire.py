@@ -1,9 +1,12 @@
-"""The kit's messages as ROS's and back, for rospy and for bags alike: both name the fields of a message the same way.
+"""The kit's messages as the bytes of ROS 1 and ROS 2, and back: what bags hold and what travels between nodes.
 
-How a message class is found, and how times, bytes and numbers are held, differs; that is what a Maker knows.
+`rosbags` knows every message type of ROS by its definition and needs no ROS. So one module serves bags and both
+middlewares, and no edge needs message classes of its own.
 """
 
-from abc import ABC, abstractmethod
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from labkit.node.messages import (
     NANOSECONDS,
@@ -21,142 +24,130 @@ from labkit.node.messages import (
 )
 
 TYPES = {
-    Image: "sensor_msgs/Image",
-    CameraInfo: "sensor_msgs/CameraInfo",
-    PointCloud2: "sensor_msgs/PointCloud2",
-    Pose: "geometry_msgs/PoseStamped",
-    Transforms: "tf2_msgs/TFMessage",
-    JointState: "sensor_msgs/JointState",
-    Diagnostics: "diagnostic_msgs/DiagnosticArray",
+    Image: "sensor_msgs/msg/Image",
+    CameraInfo: "sensor_msgs/msg/CameraInfo",
+    PointCloud2: "sensor_msgs/msg/PointCloud2",
+    Pose: "geometry_msgs/msg/PoseStamped",
+    Transforms: "tf2_msgs/msg/TFMessage",
+    JointState: "sensor_msgs/msg/JointState",
+    Diagnostics: "diagnostic_msgs/msg/DiagnosticArray",
 }
 KINDS = {name: kind for kind, name in TYPES.items()}
 DIAGNOSED_BY = "labkit"  # the hardware_id of diagnostics: who says it
 
 
-class Maker(ABC):
-    """Makes messages of one library."""
+class Wire:
+    """Translates between messages and bytes, for one of the two generations of ROS.
 
-    @abstractmethod
-    def __call__(self, name: str, /, **fields):
-        """A message of ROS type `name`, such as "sensor_msgs/Image"."""
+    >>> wire = Wire(ros1=False)
+    >>> pose = Pose(Header(5, "base_link"), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+    >>> wire.decode("geometry_msgs/msg/PoseStamped", wire.encode(pose)) == pose
+    True
+    """
 
-    @abstractmethod
-    def header(self, header: Header):
-        """A std_msgs/Header."""
+    def __init__(self, ros1: bool):
+        self.ros1 = ros1
+        self.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+        if ros1:  # the one type that rosbags' store of ROS 1 lacks
+            definition = "geometry_msgs/TransformStamped[] transforms"
+            self.store.register(get_types_from_msg(definition, TYPES[Transforms]))
 
-    @abstractmethod
-    def data(self, data):
-        """Bytes as the library holds uint8[]."""
+    def encode(self, message: Message) -> memoryview:
+        """Write a message as the bytes of its ROS type."""
+        name = TYPES[type(message)]
+        raw = self._build(name, _by_ros_names(message))
+        return self.store.serialize_ros1(raw, name) if self.ros1 else self.store.serialize_cdr(raw, name)
 
-    @abstractmethod
-    def numbers(self, values):
-        """Numbers as the library holds float64[]."""
+    def decode(self, name: str, data) -> Message:
+        """Read the bytes of a ROS type such as "sensor_msgs/msg/Image".
+
+        Raises ValueError for a type that the kit does not use, and for bytes that do not hold such a message.
+        """
+        if name not in KINDS:
+            raise ValueError(f"type: expected one of {', '.join(KINDS)}, got {name}")
+        try:
+            raw = self.store.deserialize_ros1(data, name) if self.ros1 else self.store.deserialize_cdr(data, name)
+            return _read(KINDS[name], raw)
+        except Exception as error:  # rosbags raises a dozen types for bytes that are damaged
+            raise ValueError(f"message: expected a {name}: {type(error).__name__}: {error}") from error
+
+    def _build(self, name: str, given):
+        """Make a message of rosbags' class; a field that is not given is 0 or empty."""
+        if isinstance(given, tuple):
+            given = dict(zip("xyzw", map(float, given), strict=False))
+        elif isinstance(given, Header):
+            seconds, nanoseconds = divmod(given.stamp, NANOSECONDS)
+            given = {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": given.frame_id}
+        elif not isinstance(given, dict):
+            given = vars(given)
+        _, fields = self.store.fielddefs[name]
+        # ROS 2 calls K and D of a CameraInfo k and d.
+        values = {key: self._value(kind, given.get(key, given.get(key.upper()))) for key, kind in fields}
+        return self.store.types[name](**values)
+
+    def _value(self, kind, value):
+        node, detail = kind
+        if node == Nodetype.BASE:
+            return ("" if detail[0] == "string" else 0) if value is None else value
+        if node == Nodetype.NAME:
+            return self._build(detail, {} if value is None else value)
+        (inner, element), length = detail
+        if inner == Nodetype.NAME:
+            return [self._build(element, one) for one in value or ()]
+        if element[0] == "string":
+            return list(value or ())
+        if value is None:
+            return np.zeros(length, element[0])
+        return np.frombuffer(value, np.uint8) if element[0] == "uint8" else np.array(value, element[0])
 
 
-def to_ros(message: Message, make: Maker):
-    """Translate a message of the kit to one of ROS."""
-    name = TYPES[type(message)]
-    if isinstance(message, Transforms):
-        return make(name, transforms=[_transform(one, make) for one in message.transforms])
-    header = make.header(message.header)
+def _by_ros_names(message: Message) -> dict:
+    """Give a message's content under the names that ROS has for it."""
     match message:
-        case Image():
-            layout = {key: getattr(message, key) for key in ("height", "width", "encoding", "is_bigendian", "step")}
-            return make(name, header=header, data=make.data(message.data), **layout)
-        case CameraInfo():
-            return _camera_info(message, header, make)
-        case PointCloud2():
-            names = ("height", "width", "is_bigendian", "point_step", "row_step", "is_dense")
-            layout = {key: getattr(message, key) for key in names}
-            fields = [
-                make("sensor_msgs/PointField", name=f.name, offset=f.offset, datatype=f.datatype, count=f.count)
-                for f in message.fields
-            ]
-            return make(name, header=header, fields=fields, data=make.data(message.data), **layout)
+        case CameraInfo(K=K):
+            P = (*K[0:3], 0, *K[3:6], 0, *K[6:9], 0)
+            return vars(message) | {"distortion_model": "plumb_bob", "R": np.eye(3).ravel(), "P": P}
         case Pose():
-            position, orientation = (
-                _vector("Point", message.position, make),
-                _vector("Quaternion", message.orientation, make),
-            )
-            pose = make("geometry_msgs/Pose", position=position, orientation=orientation)
-            return make(name, header=header, pose=pose)
-        case JointState():
-            values, none = make.numbers(message.position), make.numbers(())
-            return make(name, header=header, name=list(message.name), position=values, velocity=none, effort=none)
+            return {"header": message.header, "pose": vars(message)}
+        case Transforms():
+            return {"transforms": [vars(one) | {"transform": vars(one)} for one in message.transforms]}
         case Diagnostics():
-            values = [make("diagnostic_msgs/KeyValue", key=key, value=text) for key, text in message.values.items()]
-            told = {"level": message.level, "name": message.name, "message": message.message, "values": values}
-            status = make("diagnostic_msgs/DiagnosticStatus", hardware_id=DIAGNOSED_BY, **told)
-            return make(name, header=header, status=[status])
+            values = [{"key": key, "value": text} for key, text in message.values.items()]
+            status = {"level": message.level, "name": message.name, "message": message.message, "values": values}
+            return {"header": message.header, "status": [status | {"hardware_id": DIAGNOSED_BY}]}
+        case _:
+            return vars(message)
 
 
-def _vector(name: str, values, make: Maker):
-    return make(f"geometry_msgs/{name}", **dict(zip("xyzw", map(float, values), strict=False)))
-
-
-def _transform(one: Transform, make: Maker):
-    moved = make(
-        "geometry_msgs/Transform",
-        translation=_vector("Vector3", one.translation, make),
-        rotation=_vector("Quaternion", one.rotation, make),
-    )
-    header = make.header(one.header)
-    return make("geometry_msgs/TransformStamped", header=header, child_frame_id=one.child_frame_id, transform=moved)
-
-
-def _camera_info(message: CameraInfo, header, make: Maker):
-    K = message.K
-    region = make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-    return make(
-        TYPES[CameraInfo],
-        header=header,
-        height=message.height,
-        width=message.width,
-        distortion_model="plumb_bob",
-        D=make.numbers(message.D),
-        K=make.numbers(K),
-        R=make.numbers((1, 0, 0, 0, 1, 0, 0, 0, 1)),
-        P=make.numbers((*K[0:3], 0, *K[3:6], 0, *K[6:9], 0)),
-        binning_x=0,
-        binning_y=0,
-        roi=region,
-    )
-
-
-def from_ros(name: str, raw) -> Message:
-    """Translate a message of ROS type `name` to the kit's; raises ValueError for a type that the kit does not use."""
-    kind = KINDS.get(name)
-    if kind is None:
-        raise ValueError(f"type: expected one of {', '.join(KINDS)}, got {name}")
+def _read(kind: type, raw) -> Message:
+    """Translate a message of rosbags' class to one of the kit's."""
     if kind is Transforms:
         return Transforms(tuple(_read_transform(one) for one in raw.transforms))
     header = _read_header(raw.header)
-    if kind is Image:
-        return Image(header, raw.height, raw.width, raw.encoding, raw.is_bigendian, raw.step, _bytes(raw.data))
-    if kind is CameraInfo:
-        K, D = (getattr(raw, key, None) for key in "KD")  # ROS 2 writes them small
-        K, D = raw.k if K is None else K, raw.d if D is None else D
-        return CameraInfo(header, raw.height, raw.width, tuple(map(float, K)), tuple(map(float, D)))
-    if kind is PointCloud2:
-        fields = tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in raw.fields)
-        shape = (raw.height, raw.width, fields, bool(raw.is_bigendian), raw.point_step, raw.row_step)
-        return PointCloud2(header, *shape, _bytes(raw.data), bool(raw.is_dense))
-    if kind is Pose:
-        return Pose(header, _read_vector(raw.pose.position, "xyz"), _read_vector(raw.pose.orientation, "xyzw"))
-    if kind is JointState:
-        return JointState(header, tuple(raw.name), tuple(map(float, raw.position)))
-    if len(raw.status) != 1:
-        raise ValueError(f"status: expected the diagnostics of one node, got {len(raw.status)}")
-    status = raw.status[0]
-    values = {pair.key: pair.value for pair in status.values}
-    return Diagnostics(header, status.name, int(status.level), status.message, values)
+    match kind.__name__:
+        case "Image":
+            return Image(header, raw.height, raw.width, raw.encoding, raw.is_bigendian, raw.step, memoryview(raw.data))
+        case "CameraInfo":
+            K, D = (raw.K, raw.D) if hasattr(raw, "K") else (raw.k, raw.d)
+            return CameraInfo(header, raw.height, raw.width, tuple(K.tolist()), tuple(D.tolist()))
+        case "PointCloud2":
+            fields = tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in raw.fields)
+            shape = (raw.height, raw.width, fields, bool(raw.is_bigendian), raw.point_step, raw.row_step)
+            return PointCloud2(header, *shape, memoryview(raw.data), bool(raw.is_dense))
+        case "Pose":
+            return Pose(header, _read_vector(raw.pose.position, "xyz"), _read_vector(raw.pose.orientation, "xyzw"))
+        case "JointState":
+            return JointState(header, tuple(raw.name), tuple(raw.position.tolist()))
+        case _:
+            if len(raw.status) != 1:
+                raise ValueError(f"status: expected the diagnostics of one node, got {len(raw.status)}")
+            status = raw.status[0]
+            values = {pair.key: pair.value for pair in status.values}
+            return Diagnostics(header, status.name, int(status.level), status.message, values)
 
 
 def _read_header(raw) -> Header:
-    stamp = raw.stamp
-    if hasattr(stamp, "nsecs"):
-        return Header(stamp.secs * NANOSECONDS + stamp.nsecs, raw.frame_id)
-    return Header(stamp.sec * NANOSECONDS + stamp.nanosec, raw.frame_id)
+    return Header(raw.stamp.sec * NANOSECONDS + raw.stamp.nanosec, raw.frame_id)
 
 
 def _read_transform(raw) -> Transform:
@@ -167,7 +158,3 @@ def _read_transform(raw) -> Transform:
 
 def _read_vector(raw, names: str) -> tuple[float, ...]:
     return tuple(float(getattr(raw, name)) for name in names)
-
-
-def _bytes(data):
-    return data if isinstance(data, bytes | bytearray) else memoryview(data)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from labkit.apps import cli
 from labkit.apps.node_command import Settings
 from labkit.node.actors import Camera
 from labkit.node.bags import BagWriter
+from labkit.node.messages import DEFAULT_TOPICS, Image
 
 
 def run(monkeypatch, *arguments) -> int:
@@ -35,10 +37,20 @@ def test_bag_says_what_became_of_the_frames(monkeypatch, capsys, tmp_path):
         Camera(bag).publish(frame, 1)
     out = tmp_path / "out"
     assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 0
-    assert f"wrote {out}: 1 frames answered, 0 frames and 0 messages skipped" in capsys.readouterr().out
+    assert f"wrote {out}: 1 frames answered, 0 lost, 0 unusable, 0 malformed messages" in capsys.readouterr().out
     assert (out / "metadata.yaml").is_file()
     assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 2
     assert "it is there already" in capsys.readouterr().err
+
+
+def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(monkeypatch, capsys, tmp_path):
+    frame = data_gen.render(data_gen.sample_scene(620000, "test"), (64, 48))
+    with BagWriter(tmp_path / "in.bag") as bag:
+        Camera(bag, topics=replace(DEFAULT_TOPICS, depth="/elsewhere")).publish(frame, 1)
+        bag.advertise(DEFAULT_TOPICS.depth, Image)
+    assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", tmp_path / "out", "--model", "smallsegnet") == 1
+    said = "0 frames answered, 1 lost, 0 unusable, 0 malformed messages: frame lost: no /camera/depth/image_raw within"
+    assert said in capsys.readouterr().out
 
 
 @pytest.mark.bad_input

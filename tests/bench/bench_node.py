@@ -69,10 +69,10 @@ def in_process(frame) -> str:
 
 def over_ros(frame) -> str:
     """Added latency, and a minute at 30 Hz, with a master, the node, and this process as camera and listener."""
-    from labkit.node import ros
+    from labkit.node import ros1
 
     try:
-        ros.ros("rospy"), ros.ros("rosmaster")
+        ros1.ros("rospy"), ros1.ros("rosmaster")
     except ModuleNotFoundError as error:
         return f"ROS on loopback was not measured: {error}"
     with socket.socket() as probe:
@@ -88,7 +88,7 @@ def over_ros(frame) -> str:
     node = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     try:
         time.sleep(1.0)
-        with ros.RosTransport("bench") as transport:
+        with ros1.Ros1Transport("bench") as transport:
             return talk(transport, frame)
     finally:
         node.send_signal(signal.SIGINT)

@@ -24,7 +24,7 @@ from labkit.node.messages import (
     Transform,
     Transforms,
 )
-from labkit.node.wire import from_ros
+from labkit.node.wire import Wire
 from labkit.pipeline import Pipeline
 
 TOPICS = Topics()
@@ -56,14 +56,13 @@ def record(path, frames, **options):
 
 
 def contents(path) -> dict[str, list]:
-    """Messages by topic, as rosbags' own reader finds them."""
-    found = {}
+    """Messages by topic, with the stamps of the recording."""
+    found, wire = {}, Wire(ros1=path.suffix == ".bag")
     with AnyReader([path]) as reader:
         for connection in reader.connections:
             found[connection.topic] = []
         for connection, stamp, data in reader.messages():
-            message = from_ros(connection.msgtype.replace("/msg/", "/"), reader.deserialize(data, connection.msgtype))
-            found[connection.topic].append((stamp, message))
+            found[connection.topic].append((stamp, wire.decode(connection.msgtype, data)))
     return found
 
 
@@ -154,6 +153,20 @@ def test_malformed_messages_of_a_bag_are_skipped(tmp_path, frames):
     surface = one_hot(np.full((12, 16), SURFACE)).astype(np.float32)
     counts = process(tmp_path / "in.bag", tmp_path / "out", Pipeline(lambda rgb: surface), progress=False)
     assert (counts.answered, counts.skipped, counts.failed) == (5, 10, 0)
+
+
+def test_frames_of_which_a_message_was_lost_are_counted_and_named(tmp_path, frames):
+    """Four moments: one whole, one without colour, two without depth."""
+    ways = [{}, {"rgb": "/gone"}, {"depth": "/gone"}, {"depth": "/gone"}]
+    with BagWriter(tmp_path / "in.bag") as bag:
+        for number, way in enumerate(ways):
+            Camera(bag, topics=dataclasses.replace(TOPICS, **way)).publish(frames[0], number * 100 * MS)
+    counts = process(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
+    assert (counts.answered, counts.lost, counts.failed, counts.skipped) == (1, 3, 0, 0)
+    assert counts.reasons == {
+        f"frame lost: no {TOPICS.rgb} within 20 ms": 1,
+        f"frame lost: no {TOPICS.depth} within 20 ms": 2,
+    }
 
 
 @pytest.mark.bad_input

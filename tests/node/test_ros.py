@@ -1,295 +1,21 @@
-"""The node on ROS 1: a real master and real TCP on loopback, the node in a process of its own.
+"""The text's run_ros_node: what becomes of its arguments. The middleware is left out; test_ros1.py has it."""
 
-One process may be one node of ROS, so this file's process plays camera, listener and arm as the node "tester".
-"""
-
-import contextlib
-import dataclasses
-import os
-import signal
-import socket
-import subprocess
-import sys
-import time
-import xmlrpc.client
-from pathlib import Path
-
-import numpy as np
 import pytest
 
-import data_gen
-from labkit.frame import RGBDFrame
-from labkit.labels import CLASSES
-from labkit.network import load_model, weights_path
-from labkit.node import convert, ros
-from labkit.node.actors import Arm, Camera
-from labkit.node.messages import Diagnostics, Image, PointCloud2, Pose, Topics
-from labkit.pipeline import Pipeline
-from labkit.sim.world import World
-
-pytestmark = pytest.mark.debian(*(f"python3-{name.replace('_', '-')}" for name in (*ros.PACKAGES, "rosmaster")))
-
-ROOT = Path(__file__).parents[2]
-TOPICS = Topics()
-MS = 1_000_000
-PATIENCE = 60.0  # seconds: only a failure waits so long
-MASTER = """
-import sys, time
-sys.path.append("/usr/lib/python3/dist-packages")
-import rosmaster.master
-master = rosmaster.master.Master(port=int(sys.argv[1]))
-master.start()
-while master.ok():
-    time.sleep(0.05)
-"""
-CAMERA = """
-import sys, time
-import numpy as np
-from labkit.frame import RGBDFrame
-from labkit.node.actors import Camera
-from labkit.node.ros import RosTransport
-name, first, last = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
-frame = RGBDFrame(np.zeros((24, 32, 3), np.uint8), np.ones((24, 32), np.float32), np.diag([30.0, 30.0, 1.0]), np.eye(4))
-with RosTransport(name) as transport:
-    camera = Camera(transport)
-    topics = camera.topics
-    while not all(map(transport.wanted, (topics.rgb, topics.depth, topics.info, topics.tf))):
-        time.sleep(0.01)
-    for number in range(first, last):
-        camera.publish(frame, number * 1_000_000)
-        print(number, flush=True)
-        time.sleep(0.02)
-    sys.stdin.read()
-"""
-
-
-def wait_for(condition, what: str):
-    """Poll until something is there; the test fails, and says what was missing, if it never comes."""
-    deadline = time.monotonic() + PATIENCE
-    while not (found := condition()):
-        assert time.monotonic() < deadline, f"waited in vain for {what}"
-        time.sleep(0.005)
-    return found
-
-
-@contextlib.contextmanager
-def process(*command, **options):
-    """A process that is gone afterwards."""
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen([sys.executable, *map(str, command)], env=environment, text=True, **options) as started:
-        try:
-            yield started
-        finally:
-            started.kill()
-
-
-@contextlib.contextmanager
-def master(port: int):
-    with process("-c", MASTER, port) as started:
-        wait_for(lambda: listens(port), "the master")
-        yield started
-
-
-def listens(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
-
-
-@pytest.fixture(scope="module")
-def port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-class Watcher:
-    """Camera and listener of this process."""
-
-    def __init__(self, transport):
-        self.transport, self.camera = transport, Camera(transport)
-        kinds = {"mask": Image, "cloud": PointCloud2, "grasp": Pose, "diagnostics": Diagnostics}
-        self.heard = {name: [] for name in kinds}
-        for name, kind in kinds.items():
-            transport.subscribe(getattr(TOPICS, name), kind, self.heard[name].append)
-
-    def connected(self) -> bool:
-        """Whether the node listens to all that the camera says, and this process to all that the node says."""
-        spoken = map(self.transport.wanted, (TOPICS.rgb, TOPICS.depth, TOPICS.info, TOPICS.tf))
-        listened = [self.transport._subscribers[getattr(TOPICS, name)].get_num_connections() > 0 for name in self.heard]
-        return all(spoken) and all(listened)
-
-    def answer(self, name: str, stamp: int):
-        """The message of a stamp, once it is there."""
-        return wait_for(lambda: next((m for m in self.heard[name] if m.header.stamp == stamp), None), f"{name} {stamp}")
-
-    def counted(self) -> dict[str, int]:
-        """The node's own counts, as it told them last."""
-        values = self.heard["diagnostics"][-1].values
-        return {name: int(values[name]) for name in ("answered", "dropped", "skipped", "failed")}
-
-
-@pytest.fixture(scope="module")
-def tester(port, tmp_path_factory):
-    folder = str(tmp_path_factory.mktemp("ros"))
-    ours = {
-        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-        "ROS_IP": "127.0.0.1",
-        "ROS_HOME": folder,
-        "ROS_LOG_DIR": folder,
-    }
-    before = {name: os.environ.get(name) for name in ours}
-    os.environ.update(ours)
-    try:
-        with master(port) as started, ros.RosTransport("tester") as transport:
-            tester = Watcher(transport)
-            tester.master = started
-            yield tester
-    finally:
-        if ros.DIST_PACKAGES in sys.path:
-            sys.path.remove(ros.DIST_PACKAGES)
-        for name, value in before.items():
-            os.environ.pop(name, None) if value is None else os.environ.__setitem__(name, value)
-
-
-@contextlib.contextmanager
-def node(tester, *options, command=("-m", "labkit.apps.cli", "node", "--ros", "--model", "smallsegnet")):
-    """The node in a process, connected; SIGINT ends it with status 0."""
-    for messages in tester.heard.values():
-        messages.clear()
-    with process(*command, *options, stderr=subprocess.PIPE) as started:
-        wait_for(tester.connected, "the node")
-        yield started
-        started.send_signal(signal.SIGINT)
-        started.said = started.communicate(timeout=PATIENCE)[1]
-        assert started.returncode == 0, started.said
-
-
-@pytest.fixture(scope="module")
-def frame():
-    return data_gen.render(data_gen.sample_scene(620000, "test"), (160, 120))
-
-
-def small(frame) -> RGBDFrame:
-    return RGBDFrame(frame.rgb[:24, :32], frame.depth[:24, :32], frame.K, frame.T_base_cam)
-
-
-def compare_with_the_pipeline(tester, frame):
-    """Over loopback the node says what the pipeline finds, and carries stamp and frames through."""
-    pipeline = Pipeline(load_model(weights_path("smallsegnet")), table_z=0.01)
-    expected = pipeline.run(frame)
-    stamp = 1_700_000_000_123_456_789
-    tester.camera.publish(frame, stamp)
-    mask, cloud = tester.answer("mask", stamp), tester.answer("cloud", stamp)
-    assert np.mean(convert.decode_image(mask) != expected.labels) < 1e-3
-    assert mask.encoding == "mono8" and mask.header.frame_id == "camera_optical_frame"
-    assert cloud.header.frame_id == "base_link" and len(expected.clouds) > 0
-    found, whole = convert.decode_cloud(cloud), np.concatenate(expected.clouds)
-    assert abs(len(found) - len(whole)) < 0.05 * len(whole)
-    assert np.allclose(found.mean(axis=0), whole.mean(axis=0), atol=2e-3)
-
-
-def test_bad_messages_a_killed_camera_and_a_new_master_cost_no_good_frame(tester, frame, port):
-    """200 good frames among 200 malformed messages; then the camera dies, the master too, and others take over."""
-    tiny, camera = small(frame), tester.camera
-    with node(tester, "--table-z", "0.01") as running:
-        compare_with_the_pipeline(tester, frame)
-        rng = np.random.default_rng(0)
-        for number in range(200):
-            header = dataclasses.replace(camera_header(camera), stamp=number * 33 * MS)
-            stream = str(rng.choice(["rgb", "depth"]))
-            encoding, step = ("rgb8", 96) if stream == "rgb" else ("32FC1", 128)
-            cut = bytes(int(rng.integers(0, 23 * step)))
-            tester.transport.publish(getattr(TOPICS, stream), Image(header, 24, 32, encoding, 0, step, cut))
-            camera.publish(tiny, number * 33 * MS)
-            tester.answer("mask", number * 33 * MS)
-        wait_for(lambda: tester.counted()["answered"] == 201, "the count")
-        assert tester.counted() == {"answered": 201, "dropped": 0, "skipped": 200, "failed": 0}
-
-        with process("-c", CAMERA, "first", 10_000, 99_999, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as first:
-            wait_for(lambda: any(mask.header.stamp >= 10_005 * MS for mask in tester.heard["mask"]), "the first camera")
-            first.kill()
-        tester.master.kill()
-        tester.master.wait()
-        wait_for(lambda: not listens(port), "the master's end")
-        camera.publish(tiny, 20_000 * MS)
-        tester.answer("mask", 20_000 * MS)  # nodes that know each other need no master
-
-        with (
-            master(port),
-            process("-c", CAMERA, "second", 30_000, 30_050, stdin=subprocess.PIPE, stdout=subprocess.PIPE),
-        ):
-            tester.answer("mask", 30_049 * MS)
-            camera.publish(tiny, 40_000 * MS)
-            tester.answer("mask", 40_000 * MS)
-            wait_for(lambda: tester.heard["diagnostics"][-1].header.stamp == 40_000 * MS, "the last count")
-            answered = [mask.header.stamp // MS for mask in tester.heard["mask"]]
-            of_second = sum(30_000 <= stamp < 30_050 for stamp in answered)
-            counted = tester.counted()
-            assert counted["failed"] == 0 and of_second + counted["dropped"] >= 50
-            assert counted["answered"] == len(answered) == len(set(answered))
-    assert running.said.count("message skipped: data: expected") == 200 and "registering again" in running.said
-
-
-def camera_header(camera):
-    return convert.Header(0, camera.frame_id)
-
-
-def test_without_a_master_it_waits_and_sigint_ends_it_with_status_0(tester):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        nobody = f"http://127.0.0.1:{probe.getsockname()[1]}"
-    environment = os.environ | {"ROS_MASTER_URI": nobody, "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "labkit.apps.cli", "node", "--ros", "--model", "smallsegnet"]
-    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as waiting:
-        line = waiting.stderr.readline()
-        while line and "waiting for the ROS master" not in line:
-            line = waiting.stderr.readline()
-        assert nobody in line
-        waiting.send_signal(signal.SIGINT)
-        waiting.stderr.read()
-    assert waiting.returncode == 0
+from labkit.network import weights_path
+from labkit.node import ros
 
 
 @pytest.fixture
-def living_master(tester, port):
-    """A master for the tests after the one that ended the first."""
-    if listens(port):
-        yield
-    else:
-        with master(port):
-            yield
-
-
-def test_from_camera_topic_to_lift_over_ros(tester, living_master):
-    """Section 5's diagram over a real master: camera and arm here, the text's run_ros_node in another process."""
-    spec = data_gen.sample_scene(0, "test")
-    code = (
-        "from labkit.network import weights_path; from labkit.node.ros import run_ros_node\n"
-        f"run_ros_node(weights_path('unet'), 4, 2, table_z={spec.table.z})"
-    )
-    with World(spec) as world:
-        frame = world.render((320, 240))
-        arm = Arm(tester.transport, world)
-        with node(tester, command=("-c", code)) as running:
-            tester.camera.publish(frame, 5 * MS)
-            tester.answer("grasp", 5 * MS)
-            result = arm.act(timeout=PATIENCE)
-            shut_down("/segmentation_node")  # what `rosnode kill` does; the status is 0 as after SIGINT
-            assert running.wait(PATIENCE) == 0
-    assert result.success and result.class_id == CLASSES.index("target"), result
-
-
-def shut_down(name: str) -> None:
-    with xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
-        _, _, uri = master.lookupNode("/tester", name)
-    with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(uri) as slave:  # it may be gone before it answers
-        slave.shutdown("/tester", "test")
-
-
-def test_the_texts_function_uses_all_of_its_arguments(monkeypatch):
+def asked(monkeypatch):
+    """What `run` would have been asked to do, without any ROS."""
     asked = []
     monkeypatch.setattr(ros, "ros", lambda module: None)
     monkeypatch.setattr(ros, "run", lambda pipeline, **options: asked.append((pipeline, options)))
+    return asked
+
+
+def test_every_argument_is_used(asked):
     ros.run_ros_node(weights_path("smallsegnet"), 4, 1, table_z=0.1, base_frame="panda_link0")
     ((pipeline, options),) = asked
     assert pipeline.target_class == 1 and pipeline.table_z == 0.1 and pipeline.model.num_classes == 4
@@ -297,10 +23,11 @@ def test_the_texts_function_uses_all_of_its_arguments(monkeypatch):
 
 
 @pytest.mark.bad_input
-def test_wrong_arguments_are_named():
+def test_wrong_arguments_are_named(asked):
     with pytest.raises(ValueError, match=r"^num_classes:"):
         ros.run_ros_node(weights_path("smallsegnet"), 3, 1)
     with pytest.raises(ValueError, match=r"^target_class:"):
         ros.run_ros_node(weights_path("smallsegnet"), 4, 4)
     with pytest.raises(FileNotFoundError):
         ros.run_ros_node("nowhere.pt", 4, 1)
+    assert not asked

@@ -61,12 +61,25 @@ def test_lost_messages_cost_their_frame_and_no_other():
     assert sync.unmatched == 6
 
 
-def test_a_clock_that_starts_anew_is_followed():
-    sync = Synchronizer(("rgb", "depth"), slop=10, depth=5)
-    for stamp in (10_000, 10_033):
-        sync.add("rgb", stamp, stamp)
-    found = [sync.add(stream, stamp, stamp) for stamp in (0, 33, 66) for stream in ("rgb", "depth")]
-    assert [s["rgb"] for s in found if s] == [0, 33, 66]
+@pytest.mark.parametrize("first", ["rgb", "depth"])
+def test_after_a_restart_of_the_clock_nothing_pairs_with_what_came_before(first):
+    """Depth was left alone at 66, just where colour is after the restart; whichever stream restarts first."""
+    sync, second = Synchronizer(("rgb", "depth"), slop=10, restart=1000), {"rgb": "depth", "depth": "rgb"}[first]
+    old = [("depth", 66), *((stream, stamp) for stamp in (9900, 9933) for stream in ("rgb", "depth")), (second, 9966)]
+    new = [(stream, stamp) for stamp in (33, 66, 99) for stream in (first, second)]
+    for stream, stamp in old:
+        sync.add(stream, stamp, ("old", stamp))
+    found = [sync.add(stream, stamp, ("new", stamp)) for stream, stamp in new]
+    assert [s for s in found if s] == [{"rgb": ("new", t), "depth": ("new", t)} for t in (33, 66, 99)]
+
+
+def test_a_restart_forgets_what_waits_in_every_stream():
+    sync = Synchronizer(("rgb", "depth"), slop=10, restart=1000)
+    for stream, stamp in (("depth", 2000), ("depth", 33)):  # the second is the only sign of a restart
+        sync.add(stream, stamp, "before")
+    sync.add("rgb", 5000, "before")
+    assert sync.add("rgb", 33, "after") is None, "colour restarted once more: that depth is of the time before"
+    assert sync.add("depth", 33, "after") == {"rgb": "after", "depth": "after"}
 
 
 def test_no_queue_grows():
@@ -171,6 +184,19 @@ def test_what_is_not_known_is_said():
         tree.lookup("base", "camera", 3_500_000_000)
     tree.add(transform("base", "camera", 7, rng))
     assert tree.lookup("base", "camera", 7).shape == (4, 4), "a clock that was set back begins a new history"
+
+
+@pytest.mark.parametrize("parent", ["base", "hand"])
+def test_a_frame_follows_what_was_said_last(parent):
+    """A camera is taken off its stand and moved, under the same parent or another one, then put on a stand again."""
+    tree, rng = TransformTree(), np.random.default_rng(6)
+    for static in (True, False, True):
+        message = transform(parent if not static else "base", "camera", 0, rng)
+        tree.add(message, static)
+        T = tree.lookup(message.header.frame_id, "camera", 0)
+        assert np.allclose(T[:3, 3], message.translation)
+    with pytest.raises(LookupError):
+        tree.lookup("hand", "camera", 0)
 
 
 def test_a_loop_of_frames_is_no_trap():

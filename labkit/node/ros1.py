@@ -1,0 +1,137 @@
+"""The edge to ROS 1: a transport over rospy (topic 08).
+
+rospy comes from Debian, not from pip. Its folder is appended to the module path when it is first needed, after the
+environment's own packages; put first, it would bring the system's NumPy and OpenCV.
+"""
+
+import functools
+import importlib
+import logging
+import sys
+import threading
+import xmlrpc.client
+from collections.abc import Callable
+
+from labkit.node.messages import Message
+from labkit.node.wire import TYPES, Wire
+
+logger = logging.getLogger(__name__)
+DIST_PACKAGES = "/usr/lib/python3/dist-packages"
+BUFFER = 2**24  # bytes; rospy's default holds a small part of an image, and then lags behind by whole frames
+QUEUE = 10  # messages to a slow listener
+CHECK_SECONDS = 0.5  # how often the master is asked whether it still knows us
+
+
+def ros(module: str):
+    """Import a module of ROS 1; raises ModuleNotFoundError that says what to install."""
+    if importlib.util.find_spec(module.partition(".")[0]) is None and DIST_PACKAGES not in sys.path:
+        sys.path.append(DIST_PACKAGES)
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"{error.name} is missing; ROS 1 on Debian: apt install python3-rospy") from error
+
+
+class Ros1Transport:
+    """A node of ROS 1 as a transport: what it publishes and subscribes goes over TCP to and from other nodes.
+
+    A process holds one. Unlike rospy alone it survives a master that is started anew, to which every node is unknown:
+    it registers again, so that nodes that come later find it. Use it as a context manager, or call `close`.
+    """
+
+    def __init__(self, name: str):
+        self._rospy = ros("rospy")
+        self._rospy.init_node(name, disable_signals=True)
+        self._wire = Wire(ros1=True)
+        self._publishers, self._subscribers = {}, {}
+        self._closing = threading.Event()
+        self._keeper = threading.Thread(target=self._keep_registered, daemon=True)
+        self._keeper.start()
+
+    @classmethod
+    def open(cls, name: str, stop: threading.Event) -> "Ros1Transport | None":
+        """Join ROS as soon as a master answers; None if `stop` is set before. ROS sets it when it ends the node."""
+        uri = ros("rosgraph").get_master_uri()
+        said = False
+        while not stop.is_set():
+            try:
+                xmlrpc.client.ServerProxy(uri).getPid("/labkit")
+                break
+            except OSError:
+                if not said:
+                    logger.warning("waiting for the ROS master at %s", uri)
+                said = True
+                stop.wait(CHECK_SECONDS)
+        else:
+            return None
+        transport = cls(name)
+        ros("rospy").on_shutdown(stop.set)  # `rosnode kill`, or another node took this one's name
+        return transport
+
+    def __enter__(self) -> "Ros1Transport":
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self) -> None:
+        """Leave ROS."""
+        self._closing.set()
+        self._keeper.join()
+        self._rospy.signal_shutdown("done")
+
+    def advertise(self, topic: str, kind: type) -> None:
+        """Tell the master that messages of the class `kind` come from here."""
+        self._publishers[topic] = self._rospy.Publisher(topic, self._message_class(TYPES[kind]), queue_size=QUEUE)
+
+    def publish(self, topic: str, message: Message) -> None:
+        """Send a message to all who listen; they get it from a thread of rospy's, so this does not wait for them."""
+        if self._rospy.is_shutdown():  # nobody is left
+            return
+        raw = self._message_class(TYPES[type(message)])()
+        raw._buff = self._wire.encode(message)
+        self._publishers[topic].publish(raw)
+
+    def subscribe(self, topic: str, kind: type, callback: Callable[[Message | ValueError], None]) -> None:
+        """Call `callback` in a thread of rospy's with every message, or with the error if it cannot be read."""
+        name = TYPES[kind]
+
+        def receive(raw) -> None:
+            try:
+                message = self._wire.decode(name, raw._buff)
+            except ValueError as error:
+                message = error
+            callback(message)
+
+        cls = self._message_class(name)
+        self._subscribers[topic] = self._rospy.Subscriber(topic, cls, receive, buff_size=BUFFER, tcp_nodelay=True)
+
+    def wanted(self, topic: str) -> bool:
+        """Whether any node listens."""
+        return self._publishers[topic].get_num_connections() > 0
+
+    @functools.cache  # noqa: B019 - a process holds one transport
+    def _message_class(self, name: str) -> type:
+        """A class of rospy that sends and receives a type's bytes as they are; `Wire` writes and reads them."""
+        text, checksum = self._wire.store.generate_msgdef(name, ros_version=1)
+        told = {"_type": name.replace("/msg/", "/"), "_md5sum": checksum, "_full_text": text}
+        return type(name.rpartition("/")[2], (self._rospy.AnyMsg,), told)
+
+    def _keep_registered(self) -> None:
+        name, uri = self._rospy.get_name(), self._rospy.get_node_uri()
+        master = xmlrpc.client.ServerProxy(ros("rosgraph").get_master_uri())
+        itself = xmlrpc.client.ServerProxy(uri)
+        while not self._closing.wait(CHECK_SECONDS):
+            try:
+                known, _, _ = master.lookupNode(name, name)
+                if known == 1:
+                    continue
+                logger.warning("the ROS master does not know %s (was it restarted?); registering again", name)
+                for publisher in tuple(self._publishers.values()):
+                    master.registerPublisher(name, publisher.resolved_name, publisher.type, uri)
+                for subscriber in tuple(self._subscribers.values()):
+                    topic = subscriber.resolved_name
+                    _, _, sources = master.registerSubscriber(name, topic, subscriber.type, uri)
+                    itself.publisherUpdate("/master", topic, sources)
+            except (OSError, xmlrpc.client.Error):
+                continue  # the master is away: nodes that know each other go on without it
