@@ -2,7 +2,7 @@
 
 import pytest
 
-from labkit.network import weights_path
+from labkit.network import ARCHITECTURES, save_model, weights_path
 from labkit.node import ros
 
 
@@ -20,6 +20,12 @@ def test_every_argument_is_used(asked):
     ((pipeline, options),) = asked
     assert pipeline.target_class == 1 and pipeline.table_z == 0.1 and pipeline.model.num_classes == 4
     assert options == {"base_frame": "panda_link0"}
+
+
+def test_any_number_of_classes_and_any_of_them_as_target(asked, tmp_path):
+    save_model(ARCHITECTURES["smallsegnet"](6), tmp_path / "six.pt")
+    ros.run_ros_node(tmp_path / "six.pt", 6, 5)
+    assert asked[0][0].target_class == 5
 
 
 @pytest.mark.bad_input

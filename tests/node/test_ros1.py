@@ -11,7 +11,6 @@ import socket
 import subprocess
 import sys
 import xmlrpc.client
-from importlib.machinery import PathFinder
 
 import numpy as np
 import pytest
@@ -39,15 +38,7 @@ from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 
-
-# Looked for without importing: every worker of the suite reads this file, but only one runs it.
-def missing(*packages: str) -> list[str]:
-    return [name for name in packages if not PathFinder.find_spec(name, [*sys.path, ros1.DIST_PACKAGES])]
-
-
-if missing("rospy", "rosmaster"):
-    pytest.skip("ROS 1 is not installed: python3-rospy and python3-rosmaster of Debian", allow_module_level=True)
-
+pytestmark = pytest.mark.debian("python3-rospy", "python3-rosmaster")
 TOPICS = Topics()
 MS = 1_000_000
 MASTER = """
@@ -238,12 +229,11 @@ MESSAGES = [
 ]
 
 
+@pytest.mark.debian(*(f"python3-{package}-msgs" for package in ("sensor", "geometry", "tf2", "diagnostic")))
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
 def test_bytes_and_checksum_are_those_of_the_classes_of_ros(message):
     """The class that Debian's package has for the type reads the kit's bytes and writes the same ones."""
     package, _, kind = TYPES[type(message)].split("/")
-    if missing(package):
-        pytest.skip(f"{package} is not installed: python3-{package.replace('_', '-')} of Debian")
     cls, wire = getattr(ros1.ros(f"{package}.msg"), kind), Wire(ros1=True)
     data, again = bytes(wire.encode(message)), io.BytesIO()
     cls().deserialize(data).serialize(again)
