@@ -332,8 +332,8 @@ def fit_plane(
     """Find the plane on which most points of a cloud lie: a table, seen with everything that stands on it.
 
     RANSAC (Fischler and Bolles, 1981): of `tries` planes through three random points the one with most points within
-    `tolerance` metres wins; then least squares over these points, and over those that it finds. The normal points to the
-    side of `viewer`, the camera's place. Raises ValueError if the cloud holds NaN, fewer than three points, or only
+    `tolerance` metres wins; then least squares over these points, and over those that it finds. The normal points to
+    the side of `viewer`, the camera's place. Raises ValueError if the cloud holds NaN, fewer than three points, or only
     points on a line. Topic 06.
 
     >>> x, y = np.meshgrid(np.arange(10.0), np.arange(8.0))

@@ -151,6 +151,47 @@ def demo(
 
 
 @app.command()
+def perceive(
+    color: Annotated[Path, typer.Argument(help="Colour picture, 8 bit.")],
+    depth: Annotated[Path, typer.Argument(help="Depth picture aligned to it, 16-bit PNG; 0 is no reading.")],
+    intrinsics: Annotated[
+        str, typer.Option(help='The camera: "fx fy cx cy", or a file of librealsense, BOP, Open3D or ROS.')
+    ],
+    camera_pose: Annotated[
+        str | None, typer.Option(help='Where the camera stands in the base frame: "x y z qx qy qz qw".')
+    ] = None,
+    plane: Annotated[
+        Literal["auto"] | None, typer.Option(help="Find the table and lay the base frame on it; so without a pose.")
+    ] = None,
+    table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres, with a pose.")] = 0.0,
+    depth_scale: Annotated[
+        float | None, typer.Option(help="Metres per unit of the depth file; else the camera file's, or 0.001.")
+    ] = None,
+    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    mask: Annotated[
+        Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for overlay.png, clouds, grasps.json, report.html.")] = Path("out"),
+) -> None:
+    """Find targets and grasps in a picture of your own camera; no target is an answer, too."""
+    from labkit.apps import perceive as own
+    from labkit.apps.node_command import Settings
+    from labkit.network import load_model, weights_path
+
+    if plane is not None and camera_pose is not None:
+        raise ValueError("plane: expected either --plane auto or --camera-pose, got both")
+    T_base_cam = Settings(camera_pose=camera_pose).T_base_cam()
+    frame = own.read_frame(color, depth, own.read_intrinsics(intrinsics), depth_scale)
+    if mask is None:
+        seen = own.perceive(frame, load_model(weights_path(model)), T_base_cam=T_base_cam, table_z=table_z)
+    else:
+        seen = own.perceive(frame, labels=own.read_mask(mask, frame.size), T_base_cam=T_base_cam, table_z=table_z)
+    typer.echo(own.describe(seen))
+    for path in own.save(seen, out):
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
 def node(
     sim: Annotated[bool, typer.Option("--sim", help="Rehearse in this process: camera, node, and an arm.")] = False,
     ros: Annotated[bool, typer.Option("--ros", help="Run on ROS 1 until SIGINT.")] = False,

@@ -1,0 +1,377 @@
+"""`labkit perceive`: a colour picture and a depth picture of anybody's camera become a mask, clouds, grasps, a report.
+
+Without a camera pose the table is found in the depth picture (`base_on_table`), and the base frame is laid on it.
+"""
+
+import base64
+import html
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import trimesh
+from jaxtyping import Float, UInt8
+from matplotlib.colors import to_hex
+
+from labkit.course.views import View
+from labkit.frame import RGBDFrame, read_image
+from labkit.geometry import Plane, back_project, fit_plane, invert_transform
+from labkit.grasp import Gripper
+from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
+from labkit.pipeline import Perception, Pipeline
+from labkit.support.files import write_atomically
+
+MOST_POINTS = 9000  # of the report's view: more make the page heavy, and the eye sees no difference
+TABLE_MARGIN = 0.02  # metres under the table that noise may reach
+ROOM = 0.5  # metres over the table that matter for a grasp
+SHOWN = 5  # grasps that the report lists and draws
+NEAR = 0.45  # metres around the targets that the view shows
+
+
+# --------------------------------------------------------------------------------------------- what comes in
+
+
+@dataclass(frozen=True, eq=False)
+class Intrinsics:
+    """A camera's matrix K, (3, 3), and its depth unit in metres, if the file says it."""
+
+    K: Float[np.ndarray, "3 3"]
+    depth_scale: float | None = None
+
+
+def read_intrinsics(text: str) -> Intrinsics:
+    """Read a camera matrix: "fx fy cx cy" itself, or a file of one of the usual kinds.
+
+    JSON of librealsense (fx, fy, ppx, ppy), of BOP (fx, fy, cx, cy, or cam_K of scene_camera.json; depth_scale in
+    millimetres), of Open3D (intrinsic_matrix, column by column); the YAML of ROS (camera_matrix); or a text file of
+    four or nine numbers. Raises ValueError if there is none of these, FileNotFoundError for a missing file. Topic 06.
+
+    >>> read_intrinsics("600 601 320 240").K.tolist()
+    [[600.0, 0.0, 320.0], [0.0, 601.0, 240.0], [0.0, 0.0, 1.0]]
+    """
+    numbers = _numbers(text)
+    if len(numbers) in (4, 9):
+        return Intrinsics(_matrix(numbers))
+    path = Path(text)
+    if not path.is_file():
+        raise FileNotFoundError(f'intrinsics: expected "fx fy cx cy" or a file, got {text!r}')
+    content = path.read_text(errors="replace")
+    try:
+        return _from_json(json.loads(content))
+    except json.JSONDecodeError:
+        yaml = re.search(r"camera_matrix:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
+        numbers = _numbers(yaml[1] if yaml else content)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        numbers = []
+    if len(numbers) not in (4, 9):
+        raise ValueError(
+            f"intrinsics: found no camera matrix in {path}; expected fx, fy, cx, cy (or ppx, ppy), cam_K, "
+            "intrinsic_matrix, camera_matrix, or four or nine numbers"
+        )
+    return Intrinsics(_matrix(numbers))
+
+
+def _numbers(text: str) -> list[float]:
+    """The numbers of a text that holds nothing else."""
+    try:
+        return [float(word) for word in re.split(r"[\s,;]+", text.strip(" \t\r\n[]"))]
+    except ValueError:
+        return []
+
+
+def _matrix(numbers: list[float]) -> Float[np.ndarray, "3 3"]:
+    if len(numbers) == 9:
+        return np.array(numbers).reshape(3, 3)
+    fx, fy, cx, cy = numbers
+    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+def _from_json(facts: dict) -> Intrinsics:
+    """The camera of a JSON file; of several frames (BOP) the first one's."""
+    if "fx" not in facts and all(isinstance(value, dict) for value in facts.values()):
+        facts = facts[min(facts, key=lambda name: (len(name), name))]
+    scale = facts.get("depth_scale")
+    if "cam_K" in facts:
+        K = _matrix([float(value) for value in facts["cam_K"]])
+    elif "intrinsic_matrix" in facts:
+        K = _matrix([float(value) for value in facts["intrinsic_matrix"]]).T
+    else:
+        cx, cy = (facts[new] if new in facts else facts[old] for new, old in (("cx", "ppx"), ("cy", "ppy")))
+        K = _matrix([float(value) for value in (facts["fx"], facts["fy"], cx, cy)])
+    return Intrinsics(K, None if scale is None else 0.001 * float(scale))
+
+
+def read_mask(path, size: tuple[int, int]) -> np.ndarray:
+    """Read somebody's mask as labels, uint8 (H, W): 0 and one other value mean "target"; else the kit's own classes.
+
+    size: width and height that it must have. Raises ValueError for an image of another kind, size or other values.
+    """
+    mask = read_image("mask", path, np.uint8)
+    if mask.shape[::-1] != size:
+        raise ValueError(f"mask: expected the colour picture's size, {size[0]} x {size[1]}, got {mask.shape[::-1]}")
+    values = np.unique(mask)
+    if len(values[values > 0]) <= 1:
+        return np.where(mask > 0, TARGET, 0).astype(np.uint8)
+    if not np.isin(values, [*range(len(CLASSES)), IGNORE]).all():
+        raise ValueError(
+            f"mask: expected 0 and one other value, or labels 0 to {len(CLASSES) - 1} and 255, "
+            f"got {values[:6].tolist()}{' ...' if len(values) > 6 else ''}"
+        )
+    return mask
+
+
+def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None = None) -> RGBDFrame:
+    """Read the two pictures as one frame, in the camera's own frame (T_base_cam is the identity).
+
+    depth_scale: metres per unit of the depth file; if None, what the intrinsics' file says, or else 0.001. Raises
+    ValueError with the likely cause if the files are swapped, their sizes differ, or the depths cannot be metres.
+    """
+    scale = depth_scale or intrinsics.depth_scale or 0.001
+    kinds = [cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (color, depth)]
+    if all(image is not None for image in kinds) and kinds[0].dtype == np.uint16 and kinds[1].dtype == np.uint8:
+        raise ValueError(f"color: {color} holds 16-bit numbers and {depth} 8-bit ones: are the two swapped?")
+    rgb = read_image("color", color, np.uint8, colour=True)
+    raw = read_image("depth", depth, np.uint16)
+    if raw.shape != rgb.shape[:2]:
+        sizes = " and ".join(f"{w} x {h}" for h, w in (rgb.shape[:2], raw.shape))
+        raise ValueError(f"depth: expected the size of the colour picture, got {sizes}; align depth to colour first")
+    metres = raw.astype(np.float32) * np.float32(scale)
+    seen = metres[raw > 0]
+    if not seen.size:
+        raise ValueError(f"depth: {depth} holds no reading, only zeros")
+    middle = float(np.median(seen))
+    if not 0.05 <= middle <= 20.0:
+        raise ValueError(
+            f"depth_scale: with {scale:g} metres per unit the median depth is {middle:.3g} m; the file's values are "
+            f"around {np.median(raw[raw > 0]):.0f}: 0.001 is right for millimetres, 0.0001 for tenths of them"
+        )
+    return RGBDFrame(rgb, metres, intrinsics.K, np.eye(4))
+
+
+def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
+    """Lay a base frame on a table that was found in the camera's frame: T_base_cam.
+
+    The origin is the table's point under the camera, z is the table's normal, and x points away from the camera, along
+    its line of sight; looking straight down, along the picture's upper edge. Topic 06.
+
+    >>> base_on_table(Plane(np.array([0.0, 0.0, -1.0]), 0.7, np.ones(4, bool), 0.0))[:3, 3].tolist()
+    [0.0, 0.0, 0.7]
+    """
+    z = plane.normal
+    ahead = np.array([0.0, 0.0, 1.0])
+    if abs(z @ ahead) > 0.999:
+        ahead = np.array([0.0, -1.0, 0.0])
+    x = ahead - (ahead @ z) * z
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3] = np.stack([x, np.cross(z, x), z])
+    T[2, 3] = plane.offset
+    return T
+
+
+# ---------------------------------------------------------------------------------------------- what is made of it
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A frame in the base frame, what was perceived in it, and the table's plane if it was fitted."""
+
+    frame: RGBDFrame
+    perception: Perception
+    plane: Plane | None = None
+
+
+def perceive(
+    frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z: float = 0.0, gripper: Gripper | None = None
+) -> Seen:
+    """Run the chain on a frame that is given in the camera's own frame.
+
+    model: a network, or None with `labels`, somebody else's. T_base_cam: the camera's pose; without it the largest
+    plane of the depth picture is taken for the table, and `table_z` for 0. All that was seen over the table is the
+    workspace. Raises ValueError if no plane can be found. Topics 06 and 07.
+    """
+    P_cam = back_project(frame.depth, frame.K)
+    P_cam = P_cam[np.isfinite(P_cam[..., 2])]
+    plane = None
+    if T_base_cam is None:
+        plane, table_z = fit_plane(P_cam), 0.0
+        T_base_cam = base_on_table(plane)
+    frame = RGBDFrame(frame.rgb, frame.depth, frame.K, T_base_cam, table_z=table_z)
+    P = P_cam @ T_base_cam[:3, :3].T + T_base_cam[:3, 3]
+    over = P[(P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM)]
+    low, high = (over.min(axis=0) - 1e-3, over.max(axis=0) + 1e-3) if len(over) else (-np.ones(3), np.ones(3))
+    workspace = ((low[0], high[0]), (low[1], high[1]), (-TABLE_MARGIN, ROOM))
+    pipeline = Pipeline(model, workspace=workspace, gripper=gripper)
+    return Seen(frame, pipeline.run(frame) if labels is None else pipeline.locate(frame, labels), plane)
+
+
+def describe(seen: Seen) -> str:
+    """Say what was found, in lines for a terminal: the table, each target, where and how wide to close."""
+    p, lines = seen.perception, []
+    if seen.plane is not None:
+        height = seen.frame.T_base_cam[2, 3]
+        tilt = np.degrees(np.arcsin(np.clip(-seen.frame.T_base_cam[2, 2], -1.0, 1.0)))
+        lines.append(
+            f"table: {seen.plane.inliers.mean():.0%} of {seen.plane.inliers.size} points lie on one plane, "
+            f"{1000.0 * seen.plane.residual:.1f} mm off it (root mean square)"
+        )
+        lines.append(f"camera: {height:.3f} m over the table, looking {tilt:.0f} degrees down")
+    for number, (cloud, certainty) in enumerate(zip(p.clouds, p.certainty, strict=True), start=1):
+        middle = ", ".join(f"{x:+.3f}" for x in cloud.mean(axis=0, dtype=np.float64))
+        lines.append(f"target {number}: {len(cloud)} points around ({middle}) m, certainty {certainty:.2f}")
+    if not p.plan.grasps:
+        return "\n".join([*lines, f"no grasp: {p.plan.reason}"])
+    best = p.plan.grasps[0]
+    place = ", ".join(f"{x:+.3f}" for x in best.T_base_grasp[:3, 3])
+    yaw = np.degrees(np.arctan2(best.T_base_grasp[1, 1], best.T_base_grasp[0, 1])) % 180.0
+    lines.append(
+        f"best grasp: target {best.target + 1}, close at ({place}) m of the base frame, from jaws "
+        f"{100.0 * best.width:.1f} cm apart, closing at {yaw:.0f} degrees from x; score {best.score:.2f}, the best of "
+        f"{len(p.plan.grasps)}"
+    )
+    return "\n".join(lines)
+
+
+def grasps_json(seen: Seen) -> dict:
+    """The grasps as plain data: poses in the base frame and in the camera's, metres; width, score, target."""
+    T_cam_base = invert_transform(seen.frame.T_base_cam)
+    p = seen.perception
+    return {
+        "T_base_cam": seen.frame.T_base_cam.tolist(),
+        "table_z": seen.frame.table_z,
+        "reason": p.plan.reason,
+        "targets": [
+            {"points": len(cloud), "centroid": cloud.mean(axis=0, dtype=np.float64).tolist(), "certainty": certainty}
+            for cloud, certainty in zip(p.clouds, p.certainty, strict=True)
+        ],
+        "grasps": [
+            {
+                "T_base_grasp": grasp.T_base_grasp.tolist(),
+                "T_cam_grasp": (T_cam_base @ grasp.T_base_grasp).tolist(),
+                "width": float(grasp.width),
+                "score": float(grasp.score),
+                "target": grasp.target + 1,
+            }
+            for grasp in p.plan.grasps
+        ],
+    }
+
+
+def view(seen: Seen, gripper: Gripper | None = None) -> View:
+    """Cloud, targets and jaws in 3-D."""
+    p, table_z = seen.perception, seen.frame.table_z or 0.0
+    P, rgb = p.points.reshape(-1, 3), seen.frame.rgb.reshape(-1, 3)
+    others = (P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM) & (p.labels.ravel() != TARGET)
+    middle = np.median(np.concatenate(p.clouds) if p.clouds else P[others], axis=0) if others.any() else np.zeros(3)
+    others &= np.abs(P[:, :2] - middle[:2]).max(axis=1) < NEAR
+    others = np.flatnonzero(others)
+    others = others[:: max(1, len(others) // MOST_POINTS)]
+    shown = View(eye=tuple((seen.frame.T_base_cam[:3, 3] - middle).tolist()), height=560)
+    shown.points(P[others], "what the camera saw", rgb[others], 1.5)
+    for number, cloud in enumerate(p.clouds, start=1):
+        some = cloud[:: max(1, len(cloud) // 3000)]
+        shown.points(some, f"target {number}", to_hex(PALETTE[TARGET] / 255), 2.5)
+    hand = gripper or Gripper()
+    shown.jaws(p.plan.grasps[:1], hand, "best grasp").jaws(p.plan.grasps[1:SHOWN], hand, "other grasps", "#bbbbbb")
+    return shown.frame(np.eye(4), "base", 0.1)
+
+
+def picture(seen: Seen) -> UInt8[np.ndarray, "H W 3"]:
+    """The colour picture with its labels laid over it, and the targets outlined in white."""
+    labels = np.where(seen.perception.labels == SURFACE, 0, seen.perception.labels)
+    painted = overlay(seen.frame.rgb, labels)
+    target = (labels == TARGET).astype(np.uint8)
+    outlines, _ = cv2.findContours(target, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    return cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+
+
+# -------------------------------------------------------------------------------------------------- what goes out
+
+
+def save(seen: Seen, out, gripper: Gripper | None = None) -> list[Path]:
+    """Write overlay.png, target_N.ply, grasps.json and report.html into the folder `out`; returns their paths."""
+    out = Path(out)
+    files = {"overlay.png": _png(picture(seen)), "grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
+    for number, (cloud, pixels) in enumerate(zip(seen.perception.clouds, seen.perception.pixels, strict=True), start=1):
+        colours = seen.frame.rgb.reshape(-1, 3)[pixels]
+        files[f"target_{number}.ply"] = trimesh.PointCloud(cloud, colours).export(file_type="ply")
+    files["report.html"] = report(seen, gripper).encode()
+    for stale in out.glob("target_*.ply"):  # of an earlier picture with more targets
+        if stale.name not in files:
+            stale.unlink()
+    for name, data in files.items():
+        write_atomically(out / name, data)
+    return [out / name for name in files]
+
+
+def report(seen: Seen, gripper: Gripper | None = None) -> str:
+    """One HTML page that needs no network: the pictures, what was found, the grasps, and a view to turn."""
+    depth = seen.frame.depth
+    known = np.isfinite(depth) & (depth > 0.0)
+    low, high = np.percentile(depth[known], [2, 98]) if known.any() else (0.0, 1.0)
+    grey = np.clip((high - depth) / max(high - low, 1e-6), 0.0, 1.0)
+    coloured = cv2.applyColorMap((255 * np.where(known, grey, 0.0)).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
+    coloured[~known] = 0
+    pictures = {
+        "what the camera saw": seen.frame.rgb,
+        f"depth: {low:.2f} m (yellow) to {high:.2f} m (violet), black without a reading": coloured[..., ::-1],
+        "labels: targets orange, obstacles green": picture(seen),
+    }
+    figures = "".join(
+        f'<figure><img alt="{html.escape(title)}" src="data:image/png;base64,{_base64(_at_most(image, 640))}">'
+        f"<figcaption>{html.escape(title)}</figcaption></figure>"
+        for title, image in pictures.items()
+    )
+    rows = "".join(
+        f"<tr><td>{number}</td><td>{grasp.target + 1}</td>"
+        + "".join(f"<td>{x:+.3f}</td>" for x in grasp.T_base_grasp[:3, 3])
+        + f"<td>{100.0 * grasp.width:.1f}</td><td>{grasp.score:.2f}</td></tr>"
+        for number, grasp in enumerate(seen.perception.plan.grasps[:SHOWN], start=1)
+    )
+    table = (
+        "<table><caption>the best grasps, in the base frame</caption><tr><th>grasp</th><th>target</th><th>x (m)</th>"
+        f"<th>y (m)</th><th>z (m)</th><th>opening (cm)</th><th>score</th></tr>{rows}</table>"
+    )
+    return PAGE.format(
+        figures=figures,
+        words=html.escape(describe(seen)),
+        table=table if rows else "",
+        view=view(seen, gripper).html(script=True),
+    )
+
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>labkit perceive</title><style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 66em; margin: 2em auto; padding: 0 1em; color: #222 }}
+figure {{ display: inline-block; width: 19em; margin: 0 1em 1em 0; vertical-align: top }}
+img {{ width: 100% }} figcaption, caption {{ font-size: 0.85em; color: #555; text-align: left }}
+table {{ border-collapse: collapse; margin: 1em 0 }} th, td {{ padding: 0.2em 0.8em; text-align: right }}
+tr + tr {{ border-top: 1px solid #ddd }} pre {{ white-space: pre-wrap; background: #f5f5f5; padding: 1em }}
+</style></head><body>
+<h1>What the camera saw, and where to close the jaws</h1>
+{figures}
+<pre>{words}</pre>
+{table}
+<h2>The view in 3-D: drag to turn, wheel to come closer</h2>
+{view}
+</body></html>
+"""
+
+
+def _at_most(image: UInt8[np.ndarray, "H W 3"], width: int) -> UInt8[np.ndarray, "h w 3"]:
+    """An image no wider than `width`."""
+    if image.shape[1] <= width:
+        return image
+    return cv2.resize(image, (width, round(image.shape[0] * width / image.shape[1])), interpolation=cv2.INTER_AREA)
+
+
+def _png(rgb: UInt8[np.ndarray, "H W 3"]) -> bytes:
+    return cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))[1].tobytes()
+
+
+def _base64(rgb: UInt8[np.ndarray, "H W 3"]) -> str:
+    return base64.b64encode(_png(rgb)).decode()

@@ -1,0 +1,168 @@
+"""labkit perceive: pictures of anybody's camera, judged by a simulated scene whose poses are known."""
+
+import json
+import re
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+import data_gen
+from data_gen import DepthSensor
+from labkit.apps import perceive
+from labkit.apps.cli import app
+from labkit.geometry import Plane, transform_points
+from labkit.labels import TARGET
+from labkit.pipeline import Pipeline
+from labkit.sim.world import World
+
+SIZE = (424, 240)  # not the size of any training
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    """A scene as a camera sees it who knows nothing else: files of colour and depth, a mask, the camera matrix."""
+    folder = tmp_path_factory.mktemp("shot")
+    spec = data_gen.sample_scene(900_005, "test")
+    with World(spec) as world:
+        frame = world.render(SIZE)
+        centres = {thing.name: world.centre(thing.name) for thing in spec.objects if thing.class_id == TARGET}
+    depth = DepthSensor().apply(frame, np.random.default_rng(0)).depth
+    cv2.imwrite(str(folder / "color.png"), frame.rgb[..., ::-1])
+    cv2.imwrite(str(folder / "depth.png"), np.rint(np.nan_to_num(depth) * 1000.0).astype(np.uint16))
+    cv2.imwrite(str(folder / "mask.png"), np.where(frame.labels == TARGET, 255, 0).astype(np.uint8))
+    fx, fy, cx, cy = frame.K[0, 0], frame.K[1, 1], frame.K[0, 2], frame.K[1, 2]
+    return SimpleNamespace(folder=folder, spec=spec, frame=frame, centres=centres, K=f"{fx} {fy} {cx} {cy}")
+
+
+def run(shot, out, *options: str, color="color.png", depth="depth.png", K=None):
+    """Run the command on the shot's files."""
+    files = [str(shot.folder / color), str(shot.folder / depth)]
+    arguments = ["perceive", *files, "--intrinsics", K or shot.K, "--out", str(out), *options]
+    done = CliRunner().invoke(app, arguments)
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done
+
+
+def test_with_the_table_fitted_the_targets_are_where_the_simulator_has_them(shot, tmp_path):
+    done = run(shot, tmp_path, "--mask", str(shot.folder / "mask.png"))
+    said = json.loads((tmp_path / "grasps.json").read_text())
+    T_cam_base = np.linalg.inv(said["T_base_cam"])
+    true_T_cam_base = np.linalg.inv(shot.frame.T_base_cam)
+    assert np.degrees(np.arccos(T_cam_base[:3, 2] @ true_T_cam_base[:3, 2])) < 0.3, "the table's normal"
+    height = shot.frame.T_base_cam[2, 3] - shot.spec.table.z
+    assert said["T_base_cam"][2][3] == pytest.approx(height, abs=0.003), "the camera's height over the table"
+    for target in said["targets"]:
+        P_cam = transform_points(T_cam_base, np.array([target["centroid"]]))
+        P_base = transform_points(shot.frame.T_base_cam, P_cam)[0]
+        assert min(np.linalg.norm(P_base - centre) for centre in shot.centres.values()) < 0.04
+    assert "lie on one plane" in done.output and "best grasp" in done.output
+
+
+def test_a_given_pose_gives_the_grasps_of_the_pipeline_itself(shot, tmp_path):
+    from scipy.spatial.transform import Rotation
+
+    T = shot.frame.T_base_cam
+    pose = " ".join(map(str, [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()]))
+    mask = str(shot.folder / "mask.png")
+    run(shot, tmp_path, "--camera-pose", pose, "--table-z", str(shot.spec.table.z), "--mask", mask)
+    said = json.loads((tmp_path / "grasps.json").read_text())
+    frame = perceive.read_frame(shot.folder / "color.png", shot.folder / "depth.png", perceive.read_intrinsics(shot.K))
+    frame = type(frame)(frame.rgb, frame.depth, frame.K, T, table_z=shot.spec.table.z)
+    labels = np.where(shot.frame.labels == TARGET, TARGET, 0)
+    best = Pipeline().locate(frame, labels).plan.grasps[0]
+    assert np.allclose(said["grasps"][0]["T_base_grasp"], best.T_base_grasp, atol=1e-3)
+    assert np.allclose(np.array(said["T_base_cam"]) @ said["grasps"][0]["T_cam_grasp"], best.T_base_grasp, atol=1e-3)
+
+
+def test_clouds_and_report_hold_what_was_seen(shot, tmp_path):
+    (tmp_path / "target_7.ply").write_text("of an earlier picture")
+    run(shot, tmp_path, "--mask", str(shot.folder / "mask.png"))
+    said = json.loads((tmp_path / "grasps.json").read_text())
+    clouds = sorted(tmp_path.glob("target_*.ply"))
+    assert len(clouds) == len(said["targets"])
+    first = trimesh.load(clouds[0])
+    assert len(first.vertices) == said["targets"][0]["points"]
+    assert np.allclose(first.vertices.mean(axis=0), said["targets"][0]["centroid"], atol=1e-5)
+    report = (tmp_path / "report.html").read_bytes()
+    assert len(report) < 6e6
+    outside_scripts = re.sub(rb"<script[^>]*>.*?</script>", b"", report, flags=re.DOTALL)
+    assert not re.search(rb'(?:src|href)="(?!data:)', outside_scripts) and b"<script src" not in report
+    assert cv2.imread(str(tmp_path / "overlay.png")).shape == shot.frame.rgb.shape
+
+
+def test_a_network_labels_the_picture(shot, tmp_path):
+    done = run(shot, tmp_path, "--model", "unet")
+    assert "target 1:" in done.output and "certainty 0." in done.output
+
+
+def test_no_target_is_an_answer_with_a_reason(shot, tmp_path):
+    cv2.imwrite(str(shot.folder / "nothing.png"), np.zeros(SIZE[::-1], np.uint8))
+    done = run(shot, tmp_path, "--mask", str(shot.folder / "nothing.png"))
+    assert done.exit_code == 0 and "no grasp: no target points" in done.output
+    assert json.loads((tmp_path / "grasps.json").read_text())["reason"] == "no target points"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"color": "depth.png", "depth": "color.png"}, "swapped"),
+        ({"depth": "mask.png"}, "depth: expected uint16"),
+        ({"options": ["--depth-scale", "1.0"]}, "depth_scale: with 1 metres per unit the median depth"),
+        ({"options": ["--depth-scale", "1e-6"]}, "0.001 is right for millimetres"),
+        ({"color": "small.png"}, "align depth to colour"),
+        ({"options": ["--mask", "small_mask.png"]}, "mask: expected the colour picture's size, 424 x 240, got"),
+        ({"options": ["--mask", "grey_mask.png"]}, "mask: expected 0 and one other value"),
+        ({"K": "600 600 320"}, "intrinsics: expected"),
+        ({"options": ["--camera-pose", "1 2 3"]}, "camera_pose: expected seven numbers"),
+        ({"options": ["--plane", "auto", "--camera-pose", "0 0 1 1 0 0 0"]}, "plane: expected either"),
+    ],
+)
+def test_wrong_input_is_one_clear_line(shot, tmp_path, change, message):
+    cv2.imwrite(str(shot.folder / "small.png"), shot.frame.rgb[::2, ::2])
+    cv2.imwrite(str(shot.folder / "small_mask.png"), np.zeros((120, 212), np.uint8))
+    cv2.imwrite(str(shot.folder / "grey_mask.png"), np.tile(np.arange(SIZE[0]) % 200, (SIZE[1], 1)).astype(np.uint8))
+    options = [str(shot.folder / o) if o.endswith(".png") else o for o in change.pop("options", [])]
+    with pytest.raises((ValueError, OSError), match=re.escape(message)):
+        run(shot, tmp_path / "out", *options, **change)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "scale"),
+    [
+        ("realsense.json", '{"width": 640, "fx": 600, "fy": 601, "ppx": 320, "ppy": 240}', None),
+        ("camera.json", '{"fx": 600.0, "fy": 601.0, "cx": 320.0, "cy": 240.0, "depth_scale": 0.1}', 0.0001),
+        ("scene_camera.json", '{"12": {"cam_K": [600, 0, 320, 0, 601, 240, 0, 0, 1], "depth_scale": 1.0}}', 0.001),
+        ("open3d.json", '{"width": 640, "intrinsic_matrix": [600, 0, 0, 0, 601, 0, 320, 240, 1]}', None),
+        (
+            "ros.yaml",
+            "image_width: 640\ncamera_matrix:\n  rows: 3\n  data: [600, 0, 320, 0, 601, 240, 0, 0, 1]\n",
+            None,
+        ),
+        ("K.txt", "600 0 320\n0 601 240\n0 0 1\n", None),
+    ],
+)
+def test_camera_files_of_the_usual_kinds_are_read(tmp_path, name, content, scale):
+    (tmp_path / name).write_text(content)
+    found = perceive.read_intrinsics(str(tmp_path / name))
+    assert found.K.tolist() == [[600.0, 0.0, 320.0], [0.0, 601.0, 240.0], [0.0, 0.0, 1.0]]
+    assert found.depth_scale == (None if scale is None else pytest.approx(scale))
+
+
+@pytest.mark.parametrize("content", ["{}", '{"fx": 1}', "[1, 2]", "nothing", ""])
+def test_a_file_without_a_camera_is_refused(tmp_path, content):
+    (tmp_path / "camera.json").write_text(content)
+    with pytest.raises(ValueError, match="found no camera matrix"):
+        perceive.read_intrinsics(str(tmp_path / "camera.json"))
+
+
+def test_a_camera_that_looks_straight_down_has_a_base_frame_too():
+    plane = Plane(np.array([0.0, 0.0, -1.0]), 0.7, np.ones(3, bool), 0.0)
+    T = perceive.base_on_table(plane)
+    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3)) and np.isclose(np.linalg.det(T[:3, :3]), 1.0)
+    assert np.allclose(transform_points(T, np.array([[0.2, 0.1, 0.7]]))[0, 2], 0.0), "a point of the table"
