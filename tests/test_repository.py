@@ -21,7 +21,6 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 PINS = read_pins(ROOT / "constraints.txt")
-MAX_LINES = 420
 # The rooms of labkit, and whom each may import besides itself; the root's modules are rooms of their own.
 BASE = {"support", "frame", "labels"}
 MATHEMATICS = BASE | {"geometry", "losses", "metrics", "network", "training", "crf", "grasp"}
@@ -136,11 +135,6 @@ def test_arrows_between_rooms_point_one_way():
 
 
 # --------------------------------------------------------------------------------- what the files hold
-
-
-def test_every_module_is_read_in_one_sitting():
-    long = {name: n for name, path in modules().items() if (n := len(path.read_text().splitlines())) > MAX_LINES}
-    assert not long, long
 
 
 def test_every_module_says_what_it_is():
