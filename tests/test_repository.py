@@ -186,7 +186,8 @@ def test_pins_leave_the_build_of_a_package_open():
 
 def test_every_import_of_the_kit_is_required():
     """An import that works here only because another package brought it along breaks when that one lets go of it."""
-    brought_by = {"cv2": "opencv-python-headless", "PIL": "pillow", "pybullet_data": "pybullet"}
+    brought_by = {"cv2": "opencv-python-headless", "PIL": "pillow"}
+    brought_by |= {"pybullet_data": "pybullet", "mpl_toolkits": "matplotlib"}
     users = chain(*(lines for extra, lines in EXTRAS.items() if extra not in ("test", "bench")))
     required = {canonical(Requirement(line).name) for line in chain(PROJECT["dependencies"], users)}
     for name, path in modules().items():
