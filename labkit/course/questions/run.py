@@ -19,6 +19,7 @@ from types import TracebackType
 import numpy as np
 
 from labkit.course.questions.judge import Problem, Verdict, expected_cases, plain, verdict
+from labkit.course.questions.program import Program
 from labkit.course.questions.question import Question
 
 MAX_PRINTED = 600  # characters that are kept of what an answer prints
@@ -47,15 +48,16 @@ def judge(
 ) -> Verdict:
     """Run an answer on the cases that belong to a seed and tell the first problem, if there is one.
 
-    limit_s: seconds for all cases together (where the system has interval timers, in the main thread); what was not
-    reached then counts as not returned. printed: takes what the answer prints; else it is dropped.
+        limit_s: seconds for all cases together (where the system has interval timers, in the main thread); what was not
+        reached then counts as not returned. printed: takes what the answer prints; else it is dropped.
 
-    >>> from labkit.course.questions.question import Question
-    >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(3),))
-    >>> judge(double, lambda x: x + x, seed=0).passed
-    True
-    >>> judge(double, lambda x: (2 * x)[:, None], seed=0).problem.says
-    'expected shape (3,), got (3, 1)'
+        >>> from labkit.course.questions.program import Program
+    from labkit.course.questions.question import Question
+        >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(3),))
+        >>> judge(double, lambda x: x + x, seed=0).passed
+        True
+        >>> judge(double, lambda x: (2 * x)[:, None], seed=0).problem.says
+        'expected shape (3,), got (3, 1)'
     """
     cases = expected_cases(question, seed)
     outputs, altered = run(answer, [case.args for case in cases], limit_s, printed)
@@ -83,15 +85,37 @@ def run(
     return outputs, frozenset(altered)
 
 
+def define(program: Program, name: str, limit_s: float | None = None, printed: Printed | None = None) -> object:
+    """Run a program in a namespace of its own; give what it defines under a name, or the Problem that came up."""
+    namespace = {"__name__": "__main__"}
+
+    def run_pieces() -> None:
+        for label, text in program.pieces:
+            file = f"<{label}>"
+            linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+            exec(compile(text, file, "exec", dont_inherit=True), namespace)
+
+    problem = guarded(run_pieces, {f"<{label}>" for label, _ in program.pieces}, limit_s, printed or Printed())
+    return problem or namespace.get(name)
+
+
 def call(answer: Callable, args: tuple, limit_s: float | None, printed: Printed) -> object:
-    """Call an answer once: `plain` of its output, or a Problem. Nothing that it raises gets out."""
+    """Call an answer once: `plain` of its output, or a Problem."""
+    return guarded(lambda: plain(answer(*args)), own_files(answer), limit_s, printed)
+
+
+def guarded(function: Callable, own: set[str], limit_s: float | None, printed: Printed) -> object:
+    """Call a function of the student's; give its result, or the Problem that it raised. Nothing gets out.
+
+    own: files, or cells, that the student wrote.
+    """
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), silent():
-            return limited(lambda: plain(answer(*args)), limit_s)
+            return limited(function, limit_s)
     except TimeIsUp:
         return Problem("time", "it did not return in time: does a loop never end?")
     except BaseException as error:  # SystemExit and KeyboardInterrupt as well: they are the answer's, not ours
-        return exception_problem(error, own_files(answer))
+        return exception_problem(error, own)
 
 
 @contextlib.contextmanager

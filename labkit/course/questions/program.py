@@ -1,0 +1,425 @@
+"""From a notebook to the program that answers one question: the answer's cell, and what it needs of other cells.
+
+The check in a notebook, `labkit check` and the grader run the same program, so a tick of one is a tick of the others:
+
+    program(cells, "iou", blanks)    the cell that defines iou, and by names the definitions, imports and constants of
+                                     other cells that it needs; not the rest of these cells, and not their drawings
+
+Nothing here runs a student's code. The module needs the standard library alone, so that it can also run in the
+grader's sandbox: a stranger's text may break a parser.
+"""
+
+import ast
+import builtins
+import re
+import symtable
+import sys
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+UNREADABLE = (SyntaxError, ValueError, RecursionError, MemoryError)  # what a parser raises for a stranger's text
+KEEPS_ITS_BODY = (
+    "%%time",
+    "%%timeit",
+    "%%capture",
+    "%%prun",
+)  # cell magics around Python; others hold another language
+# Names that show something or count progress. They are replaced by functions that do nothing.
+QUIET = {
+    "tqdm": "lambda things=(), *rest, **options: things",
+    "trange": "lambda *bounds, **options: range(*(b for b in bounds if isinstance(b, int)))",
+    "display": "lambda *things, **options: None",
+    "clear_output": "lambda *things, **options: None",
+}
+QUIET_MODULES = ("tqdm", "IPython")
+KIT = ("labkit", "data_gen")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A code cell: its source, and the grade id that nbgrader gave it, "" if none."""
+
+    source: str
+    grade_id: str = ""
+
+
+@dataclass(frozen=True)
+class Program:
+    """What to run, in order, in one namespace, before the answer is called.
+
+    pieces: (name, text) of each cell that is needed; lines that are not needed are blank, so that numbers of lines are
+    those of the cell. calls: other blanks that the answer calls, directly or not. refused: why the answer cannot be
+    graded, in words for its student; "" if it can.
+    """
+
+    pieces: tuple[tuple[str, str], ...] = ()
+    calls: tuple[str, ...] = ()
+    refused: str = ""
+
+
+class Refused(Exception):
+    """An answer that cannot be graded; the text says why."""
+
+
+def program(
+    cells: Sequence[Cell],
+    name: str,
+    blanks: Collection[str] = (),
+    packages: Collection[str] = ("numpy",),
+    forbidden: Collection[str] = (),
+    given: Mapping[str, str] | None = None,
+    latest: bool = False,
+) -> Program:
+    """Cut out of a notebook's code cells the program that defines the function `name`.
+
+    cells: all code cells, in the notebook's order, or in the order in which they were run if `latest` is set: then the
+    last definition of a name counts, otherwise the nearest one above, and only without that the first one below.
+    blanks: functions that the lab asks for. packages: those that there are where answers are graded, beside the
+    standard library; forbidden: those that this task does not allow. given: for blanks that the student has wrong, the
+    source that takes their place.
+
+    >>> cells = [Cell("import numpy as np\\nimport matplotlib.pyplot as plt"), Cell("half = 0.5\\nplt.plot([half])")]
+    >>> program([*cells, Cell("def f(x):\\n    return half * np.abs(x)")], "f").pieces
+    (('cell 1', 'import numpy as np\\n'), ('cell 2', 'half = 0.5\\n'), ('f', 'def f(x):\\n    return half * np.abs(x)'))
+    """
+    try:
+        slicer = Slicer([Parsed(cell) for cell in cells], blanks, {*packages, *sys.stdlib_module_names}, forbidden)
+        return slicer.cut(name, given or {}, latest)
+    except Refused as reason:
+        return Program(refused=str(reason))
+
+
+def cells_of(notebook_cells: object) -> list[Cell]:
+    """The code cells of a notebook as JSON has it; whatever is none is left out."""
+    found = []
+    for cell in notebook_cells if isinstance(notebook_cells, list) else ():
+        if not isinstance(cell, dict) or cell.get("cell_type") != "code":
+            continue
+        source, metadata = cell.get("source"), cell.get("metadata")
+        if isinstance(source, list) and all(isinstance(line, str) for line in source):
+            source = "".join(source)
+        mark = metadata.get("nbgrader") if isinstance(metadata, dict) else None
+        grade_id = mark.get("grade_id") if isinstance(mark, dict) else None
+        if isinstance(source, str):
+            found.append(Cell(source, grade_id if isinstance(grade_id, str) else ""))
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------- one cell
+
+
+@dataclass
+class Statement:
+    """Statements at the top of a cell that share lines, usually one.
+
+    binds: names that it gives a value. touches: names whose value it may change. needs: names that it or a function in
+    it reads. modules: what it imports where the import must succeed.
+    """
+
+    nodes: list[ast.stmt]
+    first: int
+    last: int
+    binds: set[str]
+    touches: set[str]
+    needs: set[str]
+    modules: set[str]
+    star: bool
+
+
+class Parsed:
+    """A cell as statements; `statements` is empty, and `problem` says why, if it is not Python."""
+
+    def __init__(self, cell: Cell):
+        self.grade_id = cell.grade_id
+        self.text = cell.source.replace("\r\n", "\n").replace("\r", "\n")
+        self.problem = ""
+        self.statements: list[Statement] = []
+        try:
+            tree = self.parse()
+            self.dump = ast.dump(tree)
+            self.statements = list(statements(tree, self.text.split("\n")))
+        except UNREADABLE as error:
+            line = getattr(error, "lineno", None)
+            self.problem = f"its cell is not Python{f': look at line {line}' if line else ''}"
+
+    def parse(self) -> ast.Module:
+        """Parse the cell; what only IPython understands is taken out, each time that it stops the parser."""
+        magic = re.match(r"\s*(%%\w+).*", self.text)
+        if magic:
+            rest = self.text[magic.end() :]
+            self.text = "\n" * self.text[: magic.end()].count("\n") + rest
+            self.text = self.text if magic[1] in KEEPS_ITS_BODY else "\n" * self.text.count("\n")
+        while True:
+            try:
+                return ast.parse(self.text)
+            except SyntaxError as error:
+                lines = self.text.split("\n")
+                number = (error.lineno or 0) - 1
+                if not 0 <= number < len(lines) or (plain := without_magic(lines[number])) is None:
+                    raise
+                lines[number] = plain
+                self.text = "\n".join(lines)
+
+    @cached_property
+    def binds(self) -> set[str]:
+        """All names that the cell gives a value."""
+        return set().union(*(statement.binds for statement in self.statements))
+
+    def is_blank(self, name: str) -> bool:
+        """Whether the function of this name is as it was released: it only raises NotImplementedError."""
+        for statement in self.statements:
+            for node in statement.nodes:
+                if isinstance(node, ast.FunctionDef) and node.name == name:
+                    body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+                    return len(body) == 1 and isinstance(body[0], ast.Raise) and "NotImplemented" in ast.dump(body[0])
+        return False
+
+    def kept(self, chosen: Collection[int]) -> str:
+        """The text with only these statements, by their positions; other lines are blank."""
+        lines = {n for i in chosen for n in range(self.statements[i].first, self.statements[i].last + 1)}
+        return "\n".join(line if n in lines else "" for n, line in enumerate(self.text.split("\n"), start=1))
+
+
+def without_magic(line: str) -> str | None:
+    """A line without what only IPython understands, None if there is no such thing in it.
+
+    >>> without_magic("%time x = 1"), without_magic("    !ls"), without_magic("x = %timeit -o f()")
+    ('x = 1', '    pass', 'x = None')
+    """
+    if timed := re.match(r"(\s*)%time\s+(\S.*)$", line):
+        return timed[1] + timed[2]
+    if whole := re.match(r"(\s*)(?:[%!].*|\?{1,2}[\w.]+;?\s*|[\w.%]+\?{1,2};?\s*)$", line):
+        return whole[1] + "pass"
+    if assigned := re.match(r"(\s*[\w\s,.]+=\s*)[%!]", line):
+        return assigned[1] + "None"
+    return None
+
+
+def statements(tree: ast.Module, lines: list[str]) -> Iterator[Statement]:
+    """The statements of a cell, those on the same lines together."""
+    together: list[Statement] = []
+    for node in tree.body:
+        first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
+        if not together or first > together[-1].last:
+            together.append(Statement([], first, first, set(), set(), set(), set(), False))
+        statement = together[-1]
+        statement.nodes.append(node)
+        statement.last = max(statement.last, node.end_lineno or first)
+    for statement in together:
+        text = "\n".join(lines[statement.first - 1 : statement.last])
+        statement.binds, statement.needs = names_of(text)
+        for node in statement.nodes:
+            statement.touches |= touched(node)
+            statement.modules |= set(imported(node))
+            statement.star |= isinstance(node, ast.ImportFrom) and node.names[0].name == "*"
+            if is_check(node):
+                statement.binds -= {target.id for target in node.targets if isinstance(target, ast.Name)}
+        statement.needs |= statement.touches
+        yield statement
+
+
+def names_of(text: str) -> tuple[set[str], set[str]]:
+    """The names that a text binds at its top, and those that it, or a function in it, reads from there."""
+    top = symtable.symtable(text, "cell", "exec")
+    binds = {s.get_name() for s in top.get_symbols() if s.is_assigned() or s.is_imported() or s.is_namespace()}
+    needs = {s.get_name() for s in top.get_symbols() if s.is_referenced()}
+    inner = list(top.get_children())
+    while inner:
+        table = inner.pop()
+        needs |= {s.get_name() for s in table.get_symbols() if s.is_global()}
+        inner += table.get_children()
+    return binds, needs
+
+
+def touched(node: ast.stmt) -> set[str]:
+    """Names whose value a statement may change in place: x[0] = 1, x.a = 1, x += 1, x.append(1), np.add.at(x, ...)."""
+    found = set()
+    for part in ast.walk(node):
+        if isinstance(part, ast.Subscript | ast.Attribute) and isinstance(part.ctx, ast.Store | ast.Del):
+            found.add(root(part))
+        elif isinstance(part, ast.AugAssign):
+            found.add(root(part.target))
+        elif isinstance(part, ast.Expr) and isinstance(part.value, ast.Call):
+            function = part.value.func
+            if isinstance(function, ast.Attribute):
+                found.add(root(function))
+                if root(function) in ("np", "numpy", "random"):
+                    found |= {root(argument) for argument in part.value.args[:1]}
+    return found - {"", "np", "numpy", "plt"}
+
+
+def root(node: ast.expr) -> str:
+    """The name at the beginning of x.y[0].z, "" if there is none."""
+    while isinstance(node, ast.Attribute | ast.Subscript | ast.Call | ast.Starred):
+        node = node.func if isinstance(node, ast.Call) else node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def imported(node: ast.AST) -> Iterator[str]:
+    """The packages that a statement imports, in functions too; not those whose failing it handles."""
+    if isinstance(node, ast.Try) and node.handlers:
+        return
+    if isinstance(node, ast.Import):
+        yield from (alias.name.partition(".")[0] for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        yield (node.module or "").partition(".")[0] if not node.level else "."
+    for child in ast.iter_child_nodes(node):
+        yield from imported(child)
+
+
+def is_check(node: ast.stmt) -> bool:
+    """Whether a statement is `iou = check("04_iou.iou", iou)`: it puts nothing new in the place of the answer."""
+    if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Call):
+        return False
+    function = node.value.func
+    return getattr(function, "id", getattr(function, "attr", "")) == "check"
+
+
+# -------------------------------------------------------------------------------------------------- several cells
+
+
+class Slicer:
+    """The cells of a notebook, and what of them an answer needs."""
+
+    def __init__(self, cells: list[Parsed], blanks: Collection[str], modules: set[str], forbidden: Collection[str]):
+        self.cells, self.blanks, self.modules = cells, blanks, modules
+        self.forbidden = {name.partition(".")[0] for name in forbidden}
+
+    def cut(self, name: str, given: Mapping[str, str], latest: bool) -> Program:
+        """The program of one answer; raises Refused."""
+        home = self.home(name, latest)
+        chosen: dict[int, set[int]] = {}
+        calls: dict[str, None] = {}
+        seen = {(name, home)}
+        waiting: list[tuple[str, int, tuple[str, ...]]] = [(name, home, (name,))]
+        quiet: dict[str, None] = {}
+        while waiting:
+            wanted, asking, way = waiting.pop(0)
+            if wanted != name and wanted in self.blanks:
+                calls[wanted] = None
+                if wanted in given:
+                    continue
+            at = home if wanted == name else self.place(wanted, asking, latest)
+            if at is None:
+                if wanted in QUIET:
+                    quiet[f"{wanted} = {QUIET[wanted]}"] = None
+                continue
+            for where, i in self.statements_for(wanted, at, home if at <= home else at):
+                statement = self.cells[where].statements[i]
+                self.allow(statement, way)
+                if i in chosen.setdefault(where, set()):
+                    continue
+                chosen[where].add(i)
+                for other in sorted(statement.needs):
+                    if (other, where) not in seen:
+                        seen.add((other, where))
+                        waiting.append((other, where, (*way, other)))
+        pieces = [("quiet", "\n".join(quiet))] if quiet else []
+        pieces += [(f"{blank}, the kit's", given[blank]) for blank in calls if blank in given]
+        for where in sorted(chosen):
+            text = hushed(self.cells[where].kept(chosen[where]))
+            pieces.append((name if where == home else f"cell {where + 1}", text))
+        return Program(tuple(pieces), tuple(calls))
+
+    def home(self, name: str, latest: bool) -> int:
+        """The cell that holds the answer; raises Refused if there is none, or several that differ."""
+        marked = [i for i, cell in enumerate(self.cells) if cell.grade_id == name]
+        defining = [i for i in marked if name in self.cells[i].binds]
+        answered = [i for i in defining if not self.cells[i].is_blank(name)]
+        if len({self.cells[i].dump for i in answered}) > 1:
+            raise Refused(f"{len(answered)} different cells have its grade id: keep one")
+        elsewhere = [
+            i
+            for i, cell in enumerate(self.cells)
+            if i not in marked
+            and name in cell.binds
+            and (latest or not cell.is_blank(name))
+            and self.is_defined(name, i)
+        ]
+        if latest and elsewhere:
+            return elsewhere[-1]
+        for found in (answered[-1:], elsewhere[-1:], defining[-1:]):
+            if found:
+                return found[0]
+        raise Refused(next((self.cells[i].problem for i in marked if self.cells[i].problem), f"no cell defines {name}"))
+
+    def is_defined(self, name: str, i: int) -> bool:
+        """Whether a cell defines a function of this name, and does not merely use the name for something."""
+        for statement in self.cells[i].statements:
+            for node in statement.nodes:
+                if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+                    return True
+                if isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda) and name in statement.binds:
+                    return True
+        return False
+
+    def place(self, wanted: str, asking: int, latest: bool) -> int | None:
+        """The cell that gives a name its value for a cell that needs it."""
+        binding = [i for i, cell in enumerate(self.cells) if wanted in cell.binds]
+        if wanted in self.blanks:
+            binding = [i for i in binding if self.cells[i].grade_id == wanted] or [
+                i for i in binding if self.is_defined(wanted, i)
+            ]
+        if asking in binding:
+            return asking
+        above, below = [i for i in binding if i < asking], [i for i in binding if i > asking]
+        if hasattr(builtins, wanted):
+            below = []
+        if binding and latest:
+            return binding[-1]
+        if above or below:
+            return above[-1] if above else below[0]
+        stars = [i for i, cell in enumerate(self.cells) if any(statement.star for statement in cell.statements)]
+        return stars[-1] if stars and not hasattr(builtins, wanted) else None
+
+    def statements_for(self, wanted: str, at: int, until: int) -> Iterator[tuple[int, int]]:
+        """The statements of a cell that give a name its value, and those up to the answer that change it in place."""
+        for where in range(at, until + 1):
+            for i, statement in enumerate(self.cells[where].statements):
+                binds = where == at and (wanted in statement.binds or statement.star)
+                future = where == at and any(
+                    isinstance(node, ast.ImportFrom) and node.module == "__future__" for node in statement.nodes
+                )
+                if binds or future or (wanted in statement.touches and self.is_value(wanted, at)):
+                    yield where, i
+
+    def is_value(self, wanted: str, at: int) -> bool:
+        """Whether a name stands for a value, not for a module."""
+        nodes = [n for statement in self.cells[at].statements if wanted in statement.binds for n in statement.nodes]
+        return not any(isinstance(node, ast.Import | ast.ImportFrom) for node in nodes)
+
+    def allow(self, statement: Statement, way: tuple[str, ...]) -> None:
+        """Raise Refused if a statement imports what is absent where answers are graded; way: names that led to it."""
+        for module in sorted(statement.modules):
+            if module in QUIET_MODULES or (module in self.modules and module not in self.forbidden):
+                continue
+            through = f"it uses {way[1]}: " if len(way) > 1 else ""
+            if module in KIT:
+                raise Refused(f"{through}an answer does not use {module}; take what you need from the arguments")
+            if module in self.forbidden:
+                raise Refused(f"{through}the task is to do it without {module}")
+            raise Refused(f"{through}there is no module {module[:40]} where answers are graded")
+
+
+def hushed(text: str) -> str:
+    """Put functions that do nothing in the place of what is imported of tqdm and IPython."""
+    if not any(module in text for module in QUIET_MODULES):
+        return text
+    lines = text.split("\n")
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Import | ast.ImportFrom) or set(imported(node)) - set(QUIET_MODULES):
+            continue
+        quiet = ", ".join(f"{name}={function}" for name, function in QUIET.items())
+        bound = {}
+        for alias in node.names:
+            if isinstance(node, ast.ImportFrom) and alias.name in QUIET:
+                bound[alias.asname or alias.name] = QUIET[alias.name]
+            else:
+                bound[alias.asname or alias.name.partition(".")[0]] = f'__import__("types").SimpleNamespace({quiet})'
+        indent = lines[node.lineno - 1][: node.col_offset]
+        for n in range(node.lineno - 1, node.end_lineno):
+            lines[n] = ""
+        lines[node.lineno - 1] = indent + "; ".join(f"{name} = {value}" for name, value in bound.items())
+    return "\n".join(lines)

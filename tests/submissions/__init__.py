@@ -1,0 +1,69 @@
+"""Submissions as students hand them in. honest.txt holds kinds of honest ones, of 04_iou.iou; `honest` reads it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+FUNCTION = "iou"
+# What short names of cells in honest.txt stand for: the lab's own cells.
+OWN = {
+    "setup": [("import numpy as np", "setup")],
+    "check": [('iou = check("04_iou.iou", iou)', "check_iou")],
+}
+OWN["lab"] = [
+    *OWN["setup"],
+    ("import matplotlib.pyplot as plt\n\nimport data_gen\nfrom labkit import check", ""),
+    ("frames = [data_gen.render(data_gen.sample_scene(seed)) for seed in (1, 2)]", ""),
+]
+
+
+@dataclass(frozen=True)
+class Honest:
+    """A submission: its name, its code cells with their grade ids, and words of its refusal, "" if it is right."""
+
+    name: str
+    cells: tuple[tuple[str, str], ...]
+    refused: str = ""
+
+    def notebook(self, **metadata) -> dict:
+        """The notebook as JSON has it."""
+        return {"cells": [code(*cell) for cell in self.cells], "metadata": metadata, "nbformat": 4, "nbformat_minor": 4}
+
+
+def code(source: str, grade_id: str = "") -> dict:
+    """A code cell as JSON has it."""
+    mark = {"nbgrader": {"grade_id": grade_id, "solution": grade_id == FUNCTION}} if grade_id else {}
+    return {"cell_type": "code", "metadata": mark, "source": source, "outputs": [], "execution_count": None}
+
+
+def honest() -> list[Honest]:
+    """Read honest.txt: "=== NAME | REFUSED WORDS" begins a submission, "--- GRADE ID" a cell."""
+    found = []
+    for text in ("\n" + Path(__file__).with_name("honest.txt").read_text()).split("\n=== ")[1:]:
+        head, *cells = (
+            text.split("\n--- ") if "\n---\n" not in text else text.replace("\n---\n", "\n--- \n").split("\n--- ")
+        )
+        name, _, refused = head.partition(" | ")
+        pairs = [cell.partition("\n")[::2] for cell in cells]
+        sources = [OWN.get(grade_id) or [(source.rstrip("\n"), grade_id)] for grade_id, source in pairs]
+        found.append(Honest(name, tuple(cell for own in sources for cell in own), refused.strip()))
+    return found
+
+
+def as_editors_save_it(right: Honest) -> dict[str, dict]:
+    """A notebook as Colab, VS Code, Windows and old editors save it."""
+    colab = right.notebook(colab={"provenance": []}, accelerator="GPU", kernelspec={"name": "python3"})
+    for number, cell in enumerate(colab["cells"]):
+        cell["metadata"] |= {"id": f"x{number}", "executionInfo": {"status": "ok"}, "colab": {"base_uri": "local"}}
+    lines = right.notebook()
+    for cell in lines["cells"]:
+        cell["source"] = cell["source"].splitlines(keepends=True)
+        cell["metadata"] |= {"tags": ["mine"], "collapsed": True, "jupyter": {"source_hidden": False}}
+    code_editor = right.notebook(language_info={"name": "python"}, vscode={"interpreter": {"hash": "0"}})
+    for cell in code_editor["cells"]:
+        cell["metadata"] |= {"vscode": {"languageId": "python"}}
+    windows = right.notebook()
+    for cell in windows["cells"]:
+        cell["source"] = cell["source"].replace("\n", "\r\n")
+    odd = right.notebook()
+    odd["cells"] += [{"cell_type": "markdown", "metadata": {}, "source": "iou"}, {"cell_type": "raw"}, {}, None]
+    return {"Colab": colab, "lines": lines, "VS Code": code_editor, "CRLF": windows, "other cells": odd}
