@@ -1,22 +1,50 @@
-# Each target works first on a fresh machine that has only Python 3.11, and reuses .venv after that.
-#   make demo    set up, then one scene from the camera's image to the lifted object
-#   make test    set up, then lint and every test
-#   make lab     JupyterLab
+# Each target works first on a fresh machine that has only Python 3.11, and reuses its environment after that.
+#   make demo    set up .venv, then one scene from the camera's image to the lifted object
+#   make test    set up .venv, then lint and every test
+#   make lab     JupyterLab; alone on a machine, it installs what students need and no more
 #   make release generate labs/ from solutions/
 #   make train   make the data again and train the shipped weights again (over an hour on two cores)
 #   make stacks  build the same in C++, Java and Octave where they are installed, and compare
-#   make bench   add the peers, measure against them, write BENCHMARKS.md
-#   make clean   remove what can be made again in seconds; .venv and data/ stay
+#   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
+#   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
+#   make clean   remove what can be made again in seconds; environments and data/ stay
 # make PYTHON=/path/to/python3.11 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
+.ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks bench clean
+.PHONY: demo test lab release train stacks bench fresh clean
 
-EXTRAS := instructor,stacks,test
 BIN := .venv/bin
 ARGS ?=
+
+demo: .venv/installed
+	$(BIN)/labkit demo $(ARGS)
+
+test: .venv/installed
+	tests/run $(ARGS)
+
+# Settings of JupyterLab for the course. A .venv that has everything is used as it is.
+lab: export JUPYTER_CONFIG_PATH := $(CURDIR)/labkit/course/jupyter
+lab: $(or $(wildcard .venv/installed),.venv/installed-lab)
+	$(BIN)/jupyter lab $(ARGS)
+
+release: .venv/installed
+	$(BIN)/labkit release $(ARGS)
+
+stacks: .venv/installed
+	$(BIN)/python -m tests.stacks.run $(ARGS)
+
+bench: .venv-bench/installed
+	.venv-bench/bin/python -m tests.bench.run $(ARGS)
+
+fresh: .venv/installed
+	$(BIN)/python tests/fresh/run $(ARGS)
+
+clean:
+	rm -rf out build *.egg-info .pytest_cache .ruff_cache .hypothesis .coverage
+	find . -path './.venv*' -prune -o -name __pycache__ -type d -exec rm -rf {} +
 
 # Training: what the shipped weights were made with. EPOCHS is each model's own number if it is not given.
 TRAIN_SCENES ?= 3000
@@ -26,75 +54,41 @@ WORKERS ?= 2
 EPOCHS ?=
 DEVICE ?= auto
 
-demo: .venv/installed
-	$(BIN)/labkit demo $(ARGS)
-
-# Two processes with one thread each: with two each, they only wait for one another. ARGS="-n 8" takes more cores.
-# Notebooks: outputs of lessons and solutions are compared with the committed ones, labs run as students get them.
-NBVAL := -q --nbval-current-env --nbval-cell-timeout 240 -n 2 --dist loadfile
-test: export OMP_NUM_THREADS := 1
-test: .venv/installed
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
-	$(BIN)/python -m pytest $(NBVAL) --nbval lessons solutions
-	$(BIN)/python -m pytest $(NBVAL) --nbval-lax labs
-
-lab: .venv/installed
-	$(BIN)/jupyter lab $(ARGS)
-
-release: .venv/installed
-	$(BIN)/labkit release $(ARGS)
-
 # Each step goes on where it was stopped, and does nothing if it was finished; the last one replaces the shipped weights.
 train: .venv/installed
 	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)
-	$(BIN)/labkit train data/train --val data/val --model smallsegnet $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
-	$(BIN)/labkit train data/train --val data/val --model unet $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
-	mkdir -p labkit/weights
+	for model in smallsegnet unet; do
+	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
+	done
 	cp data/runs/smallsegnet.pt data/runs/unet.pt labkit/weights/
 
-stacks: .venv/installed
-	$(BIN)/python -m tests.stacks.run $(ARGS)
+# Environments, and the extras of pyproject.toml that each holds.
+.venv/installed: EXTRAS := course,instructor,stacks,test
+.venv/installed-lab: EXTRAS := course,stacks
+.venv-bench/installed: EXTRAS := course,instructor,stacks,test,bench
 
-bench: .venv/installed-bench
-	$(BIN)/python -m tests.bench.run $(ARGS)
-
-clean:
-	rm -rf out build *.egg-info .pytest_cache .ruff_cache .hypothesis .coverage
-	find . -path ./.venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
-
-# .venv/installing is there while an installation runs and becomes .venv/installed when it ends. One that was killed
-# leaves `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
+# A file `installing` is there while an installation runs and becomes `installed` when it ends. One that was killed leaves
+# `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
 # A changed pyproject.toml or constraints.txt only installs the difference.
-.venv/installed: pyproject.toml constraints.txt
-	@python=""; \
-	for candidate in $(or $(PYTHON),python3.11 python3 python); do \
-	    if "$$candidate" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then \
-	        python="$$candidate"; break; \
-	    fi; \
-	done; \
-	if [ -z "$$python" ]; then \
-	    echo "labkit needs Python 3.11 with its venv module (Debian, Ubuntu: python3.11-venv); $(if $(PYTHON),PYTHON=$(PYTHON) is not one,make PYTHON=/path/to/python3.11 names one)." >&2; \
-	    exit 1; \
-	fi; \
-	if [ -e .venv/installing ] || ! $(BIN)/python -c 'import sys, pip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then \
-	    rm -rf .venv; \
-	fi; \
-	mkdir -p .venv; \
-	touch .venv/installing; \
-	if [ ! -e $(BIN)/python ]; then \
-	    echo "Setting up .venv: once, a minute or two where packages come quickly."; \
-	    "$$python" -m venv .venv; \
+.venv/installed .venv/installed-lab .venv-bench/installed: pyproject.toml constraints.txt
+	@is_right='import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))'
+	for python in $(or $(PYTHON),python3.11 python3 python) ""; do
+	    if "$$python" -c "$$is_right" 2>/dev/null; then break; fi
+	done
+	if [ -z "$$python" ]; then
+	    echo "labkit needs Python 3.11 with its venv module (Debian, Ubuntu: python3.11-venv); $(if $(PYTHON),PYTHON=$(PYTHON) is not one,make PYTHON=/path/to/python3.11 names one)." >&2
+	    exit 1
 	fi
-	@if [ -n "$(TORCH_INDEX)" ]; then \
-	    $(BIN)/python -m pip install --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"; \
+	if [ -e $(@D)/installing ] || ! $(@D)/bin/python -c "import pip; $$is_right" 2>/dev/null; then rm -rf $(@D); fi
+	mkdir -p $(@D)
+	touch $(@D)/installing
+	if [ ! -e $(@D)/bin/python ]; then
+	    echo "Setting up $(@D): once, a minute or two where packages come quickly."
+	    "$$python" -m venv $(@D)
 	fi
-	@$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt setuptools
-	@$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]'
-	@mv .venv/installing $@
-
-.venv/installed-bench: .venv/installed
-	$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt --no-build-isolation -e '.[$(EXTRAS),bench]'
-	touch $@
+	install() { $(@D)/bin/python -m pip install --disable-pip-version-check "$$@"; }
+	if [ -n "$(TORCH_INDEX)" ]; then install --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"; fi
+	install -c constraints.txt setuptools
+	install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]'
+	mv $(@D)/installing $@

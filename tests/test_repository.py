@@ -3,10 +3,12 @@
 import ast
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from graphlib import TopologicalSorter
 from itertools import chain
 from pathlib import Path
@@ -21,27 +23,20 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 PINS = read_pins(ROOT / "constraints.txt")
-# The rooms of labkit, and whom each may import besides itself; the root's modules are rooms of their own.
-BASE = {"support", "frame", "labels"}
-MATHEMATICS = BASE | {"geometry", "losses", "metrics", "network", "training", "crf", "grasp"}
-ROOMS = {
-    "support": set(),
-    "labels": {"support"},
-    "frame": {"support", "labels"},
-    "geometry": BASE,
-    "losses": BASE,
-    "metrics": BASE,
-    "network": BASE,
-    "crf": BASE,
-    "grasp": BASE | {"geometry"},
-    "training": BASE | {"losses", "metrics", "network"},
-    "sim": BASE | {"geometry"},
-    "stacks": MATHEMATICS,
-    "pipeline": MATHEMATICS | {"stacks"},
-    "node": MATHEMATICS | {"stacks", "pipeline", "sim"},
-    "course": MATHEMATICS | {"stacks", "pipeline", "sim", "node"},
-    "apps": MATHEMATICS | {"stacks", "pipeline", "sim", "node", "course"},
-}
+# The rooms of labkit from the bottom up: each may import what stands above it in this list, itself, and `labkit`.
+LAYERS = (
+    "support",
+    "labels",
+    "frame",
+    "geometry losses metrics network crf",
+    "grasp training",
+    "stacks",
+    "pipeline sim",
+    "node",
+    "course",
+    "apps",
+)
+BELOW = {room: " ".join(LAYERS[:i]).split() for i, layer in enumerate(LAYERS) for room in layer.split()}
 
 
 def tracked(*patterns: str) -> list[Path]:
@@ -51,94 +46,66 @@ def tracked(*patterns: str) -> list[Path]:
     return [ROOT / name for name in names if name and (ROOT / name).is_file()]
 
 
+# -------------------------------------------------------------------------------- what may import what
+
+
+@cache
 def modules() -> dict[str, Path]:
     """Dotted names of all modules of labkit and data_gen, with their files."""
     files = tracked("labkit/*.py", "data_gen/*.py")
     return {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
 
 
-def imports(path: Path, everywhere: bool) -> set[str]:
-    """Names that a file imports as dotted paths: everywhere, or only when it is imported itself."""
-    tree = ast.parse(path.read_text())
-    found, waiting = set(), [tree]
+def imports(path: Path, everywhere: bool = True) -> set[str]:
+    """Modules that a file names in its imports: everywhere, or only in those that run when it is imported itself."""
+    found, waiting = set(), [ast.parse(path.read_text())]
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are absolute here"
-            found |= {submodule(f"{node.module}.{alias.name}") or node.module for alias in node.names}
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in modules() else node.module for name in names}
         elif everywhere or not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
             waiting += ast.iter_child_nodes(node)
     return found
 
 
-def submodule(name: str) -> str | None:
-    """Give the name back if it is one of our modules and not something inside one."""
-    place = ROOT.joinpath(*name.split("."))
-    return name if place.with_suffix(".py").is_file() or place.is_dir() else None
-
-
-def import_graph(everywhere: bool) -> dict[str, set[str]]:
-    """For each of our modules, which of our modules it imports."""
-    ours = modules()
-    return {name: (imports(path, everywhere) & ours.keys()) - {name} for name, path in ours.items()}
-
-
-# -------------------------------------------------------------------------------- what may import what
-
-
-def test_pybullet_is_named_only_under_sim():
-    named = {name for name, path in modules().items() if "pybullet" in imports(path, everywhere=True)}
-    assert named and all(name.startswith("labkit.sim.") for name in named), named
-
-
-def test_the_pipeline_imports_without_pybullet():
-    """Only labkit.sim needs it, and the demo, which shows the simulator."""
-    names = [
-        name for name in modules() if name.startswith("labkit") and not re.match(r"labkit\.(sim\b|apps\.demo)", name)
-    ]
-    code = (
-        f"import importlib, sys\nfor name in {names}: importlib.import_module(name)\nprint('pybullet' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert done.stdout.splitlines()[-1:] == ["False"], done.stderr
-
-
-def test_no_import_cycles():
-    for everywhere in (False, True):
-        TopologicalSorter(import_graph(everywhere)).prepare()  # raises CycleError, and names the cycle
-
-
-def test_of_labkit_only_commands_import_data_gen_and_only_when_they_run():
-    for name, path in modules().items():
-        if name.startswith("labkit"):
-            in_functions = name.startswith("labkit.apps.")
-            named = {found.split(".")[0] for found in imports(path, everywhere=not in_functions)}
-            assert "data_gen" not in named, name
-
-
-def test_no_module_imports_tests_or_notebooks():
-    for name, path in modules().items():
-        named = {found.split(".")[0] for found in imports(path, everywhere=True)}
-        assert not named & {"tests", "lessons", "labs", "solutions"}, name
-
-
-def test_arrows_between_rooms_point_one_way():
-    """Inside functions, too; only `labkit.check` itself, the door of the labs, reaches up."""
-    for name, found in import_graph(everywhere=True).items():
-        room = name.split(".")[1:2]
-        if name.startswith("labkit.") and room:
+def test_arrows_between_rooms_point_one_way_and_in_no_circle():
+    """Inside functions, too. Only `labkit.check` itself reaches up, and only commands reach data_gen, when they run."""
+    graphs = {name: imports(path) for name, path in modules().items()}
+    eager = {name: imports(path, everywhere=False) for name, path in modules().items()}
+    for graph in (graphs, eager):
+        TopologicalSorter({name: (found & graph.keys()) - {name} for name, found in graph.items()}).prepare()
+    for name, found in graphs.items():
+        roots = {other.split(".")[0] for other in found}
+        assert not roots & {"tests", "lessons", "labs", "solutions"}, name
+        assert "pybullet" not in roots or name.startswith("labkit.sim."), f"{name}: PyBullet belongs in labkit.sim"
+        if name.startswith("labkit."):
+            own = name.split(".")[1]
             entered = {other.split(".")[1] for other in found if other.startswith("labkit.")}
-            upward = entered - ROOMS[room[0]] - set(room)
-            assert not upward, f"{name} imports {sorted(upward)}"
+            assert not entered - {own, *BELOW[own]}, f"{name} imports {sorted(entered - {own, *BELOW[own]})}"
+            loaded = roots if own != "apps" else {other.split(".")[0] for other in eager[name]}
+            assert "data_gen" not in loaded, name
+
+
+def imported_without(missing: set[str], names: list[str]) -> subprocess.CompletedProcess:
+    """Import modules in a process in which some packages cannot be imported."""
+    code = f"import sys\nfor name in {sorted(missing)}: sys.modules[name] = None\n"
+    code += f"import importlib\nfor name in {names}: importlib.import_module(name)"
+    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+
+
+def test_the_library_imports_without_jupyter_and_without_the_simulator():
+    """Nothing but the course asks for Jupyter, and nothing but labkit.sim and the demo for PyBullet."""
+    library = [name for name in modules() if re.match(r"labkit(?!\.course|\.sim|\.apps\.demo|\.node\.bags)", name)]
+    named = {"pybullet", "IPython", "ipywidgets", "jupyterlab", "nbformat", "nbgrader", "traitlets", "rosbags", "onnx"}
+    done = imported_without(named, library)
+    assert done.returncode == 0, done.stderr
 
 
 # --------------------------------------------------------------------------------- what the files hold
-
-
-def test_every_module_says_what_it_is():
-    assert all(ast.get_docstring(ast.parse(path.read_text())) for path in modules().values())
 
 
 def test_no_file_names_a_registry_or_a_place_of_one_machine():
@@ -228,12 +195,17 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def set_up(checkout: Path) -> tuple[int, list[str]]:
+def set_up(checkout: Path, target: str = ".venv/installed") -> tuple[int, list[str]]:
     """Run the setup; return make's status and what Python was asked to do."""
     log = checkout / "log"
     log.write_text("")
-    done = make(checkout, ".venv/installed", f"PYTHON={checkout / 'bin/python3.11'}")
+    done = make(checkout, target, f"PYTHON={checkout / 'bin/python3.11'}")
     return done.returncode, log.read_text().splitlines()
+
+
+def extras(asked: list[str]) -> set[str]:
+    """The extras that the last line asks pip for."""
+    return set(re.search(r"-e \.\[(.*)\]", asked[-1])[1].split(","))
 
 
 def test_setup_runs_once_and_again_when_the_pins_change(checkout):
@@ -257,10 +229,28 @@ def test_an_unfinished_setup_is_made_again_from_nothing(checkout):
     assert status == 0 and asked[0] == "-m venv .venv"
 
 
-def test_setup_installs_every_extra_but_the_peers(checkout):
-    _, asked = set_up(checkout)
-    named = re.search(r"-e \.\[(.*)\]", asked[-1])[1].split(",")
-    assert set(named) == EXTRAS.keys() - {"bench"}
+def test_each_environment_gets_its_extras(checkout):
+    assert extras(set_up(checkout)[1]) == EXTRAS.keys() - {"bench"}
+    assert extras(set_up(checkout, ".venv-bench/installed")[1]) == EXTRAS.keys()
+
+
+def test_make_lab_installs_what_students_need_and_uses_what_is_there(checkout):
+    """The toy Python is `jupyter`, too: it writes down that it was asked to run JupyterLab."""
+    (checkout / "bin/jupyter").symlink_to("python3.11")
+    (checkout / ".venv/bin").mkdir(parents=True)
+    shutil.copy(checkout / "bin/python3.11", checkout / ".venv/bin/jupyter")
+    shutil.copy(checkout / "bin/python3.11", checkout / ".venv/bin/python")
+    _, asked = set_up(checkout, "lab")
+    assert asked[-1] == "lab" and extras(asked[:-1]) == {"course", "stacks"}
+    assert set_up(checkout, "lab")[1] == ["lab"]
+    assert extras(set_up(checkout)[1]) == EXTRAS.keys() - {"bench"}
+    assert set_up(checkout, "lab")[1] == ["lab"]
+
+
+def test_students_packages_hold_no_grader_and_no_test_tools():
+    students = {name for extra in ("course", "stacks") for name in requirements("labkit", extra)}
+    assert not students & {"nbgrader", "pytest", "nbval", "hypothesis", "ruff", "playwright", "distributed"}
+    assert not requirements("labkit").keys() & {"jupyterlab", "ipywidgets", "notebook", "ipykernel"}
 
 
 @pytest.mark.parametrize("arguments", [[], ["PYTHON=./python3.12"]])
@@ -290,8 +280,9 @@ def test_import_with_the_wrong_python_says_which_one_is_needed():
 def test_every_target_runs_something_and_readme_commands_exist():
     targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)[1].split()
     assert set(targets) >= {"demo", "test", "lab", "train", "bench", "clean"}
+    environments = (".venv/installed", ".venv/installed-lab", ".venv-bench/installed")
     for target in targets:
-        planned = make(ROOT, "-n", "-o", ".venv/installed", "-o", ".venv/installed-bench", target)
+        planned = make(ROOT, "-n", *(f"--old-file={name}" for name in environments), target)
         assert planned.returncode == 0 and planned.stdout.strip(), target
     for target in re.findall(r"(?:`|^    )make ([a-z]+)\b", (ROOT / "README.md").read_text(), re.MULTILINE):
         assert target in targets
@@ -310,11 +301,31 @@ def test_clean_removes_what_was_generated_and_nothing_else(checkout):
     assert files == {*kept, "Makefile", "pyproject.toml", "constraints.txt", "bin/python3.11"}
 
 
-def test_ci_runs_the_readmes_test_command():
-    script = (ROOT / ".ci/run").read_text()
-    assert os.access(ROOT / ".ci/run", os.X_OK)
-    assert script.rstrip().splitlines()[-1] == "make test" and "set -e" in script
-    assert "make test" in (ROOT / "README.md").read_text()
+def test_the_suite_goes_on_where_a_part_fails_and_names_it(checkout):
+    """In a checkout where ruff and every pytest are toys, of which those that meet a word in their arguments fail."""
+    (checkout / "tests").mkdir()
+    (checkout / ".venv/bin").mkdir(parents=True)
+    shutil.copy(ROOT / "tests/run", checkout / "tests")
+    for name in ("ruff", "python"):
+        (checkout / ".venv/bin" / name).write_text('#!/bin/bash\n[[ " $* " != *" $FAILS "* ]]\n')
+        (checkout / ".venv/bin" / name).chmod(0o755)
+
+    def suite(word: str) -> tuple[int, list[str]]:
+        done = subprocess.run(
+            [checkout / "tests/run"], env=os.environ | {"FAILS": word}, capture_output=True, text=True
+        )
+        return done.returncode, done.stdout.splitlines()
+
+    status, said = suite("nothing")
+    assert status == 0 and len(said) == 6 and said[-1] == "=== all parts passed"
+    status, said = suite("lessons")
+    assert status == 1 and len(said) == 6 and said[-1] == "=== FAILED: lessons and solutions; the other parts passed"
+    status, said = suite("pytest")
+    assert status == 1 and said[-1].startswith("=== FAILED: pytest; lessons and solutions; labs;")
+
+
+def test_the_fresh_run_reads_its_commands_in_the_readme():
+    assert runpy.run_path(str(ROOT / "tests/fresh/run"))["readme_commands"]() == ["make demo", "make test"]
 
 
 # ---------------------------------------------------------------------------- what a machine does not have

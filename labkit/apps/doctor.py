@@ -17,6 +17,15 @@ ROOT = Path(__file__).resolve().parents[2]  # the checkout, when labkit is insta
 NEEDED_GB = 2.0  # free disk for a data set to train on, checkpoints and pictures
 NEEDED_RENDER_MM = 0.1
 
+# Who needs the packages of an extra.
+USERS = {
+    "course": "`make lab` needs",
+    "instructor": "`labkit release` and `labkit grade` need",
+    "stacks": "`labkit export` and `labkit node --bag` need",
+    "test": "`make test` needs",
+    "bench": "`make bench` needs, which sets up .venv-bench for",
+}
+
 OK, NOTE, WRONG = "ok", "note", "WRONG"
 
 
@@ -95,7 +104,7 @@ def compare(title: str, installed: dict[str, str | None], pins: dict[str, Requir
     problems += [f"other versions: {', '.join(differing)}"] if differing else []
     if not problems:
         return Finding(title, OK, f"{len(installed)}, all there" + (" at their pinned versions" if pins else ""))
-    purpose = f" (only `make {extra}` needs them)" if extra else ""
+    purpose = f" (only {USERS[extra]} them)" if extra else ""
     return Finding(title, WRONG if missing and not extra else NOTE, "; ".join(problems) + purpose, mend)
 
 

@@ -61,6 +61,10 @@ def test_a_missing_package_is_wrong_unless_only_an_extra_needs_it():
     assert optional.state == NOTE and "make bench" in optional.found and ".[bench]" in optional.mend
 
 
+def test_every_extra_has_somebody_who_needs_it():
+    assert doctor.USERS.keys() == set(packages.metadata.metadata("labkit").get_all("Provides-Extra"))
+
+
 def test_this_environment_has_every_package_at_its_pin():
     findings = {finding.name: finding for finding in doctor.check_packages()}
     assert findings["packages"].state == findings["[test]"].state == OK, findings
