@@ -21,7 +21,7 @@ NEEDED_RENDER_MM = 0.1
 USERS = {
     "course": "`make lab` needs",
     "instructor": "`labkit release` and `labkit grade` need",
-    "stacks": "`labkit export` and `labkit node --bag` need",
+    "stacks": "`labkit export` and the engines of topic 09 need",
     "test": "`make test` needs",
     "bench": "`make bench` needs, which sets up .venv-bench for",
 }
