@@ -1,95 +1,145 @@
-"""A close look at grips: measured on the points themselves, compiled by numba; `labkit.grasp` scores the numbers."""
+"""A close look at grips, measured on the points themselves and compiled by numba. `planner` scores the numbers."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from labkit.grasp.search_kernels import CELL, Grip, search
+from labkit.grasp.search_kernels import GRIP, SLIPPERY, search
 
-SKIN = 0.004  # metres: what lies this close behind the outermost point is touched by the pad too
+STEEPEST = 0.5  # tangent: between two faces that each lean by more than this to the same side, the target slips out
+
+# Of a grip, in metres: where the middle of the jaws is along their closing direction (a), how far they open, how far the
+# tips reach below the top, the target's width, the air beside it, the distance from the target's middle, how far unseen
+# things may stand up into the hand, how much of the pads touches, how far apart across the pads the two touches are,
+# and how far the target may go on behind what was seen.
+MEASURES = np.dtype(
+    [(name, float) for name in "middle opening depth width clearance offset shadow patch skew unseen".split()]
+)
 
 
-@njit(cache=True, nogil=True)
-def measure(grips, target, hidden, centre, hand, spare, least):
-    """Measure grips on the points themselves; a row each: a of the hand, opening, and what `labkit.grasp` scores.
+class Contact(NamedTuple):
+    """What a pad meets: length and middle of the patch across the pad, its top over the tips, rise and slope.
 
-    An opening of 0 says that the grip does not fit after all. All in metres.
+    rise: how much the target still rises towards its edge; a face that leans to the camera and ends there has a back
+    that nobody saw. slope: how fast the face recedes across the pad, as a tangent.
     """
-    x, y = centre
-    out = np.zeros((len(grips), 10))
-    T, H = np.empty_like(target), np.empty_like(hidden)
-    for n in range(len(grips)):
-        g = grips[n]
-        grip = Grip(g[0], g[1], g[2], g[3], g[4], g[5], g[6])
-        turn(target, x, y, grip.yaw, grip.b, T)
-        left, right, start, end = jaws(T, grip, hand, spare, least)
-        if not 0.0 < right - left <= hand.opening:
-            continue
-        turn(hidden, x, y, grip.yaw, grip.b, H)
-        patch_left, middle_left, top_left, rise_left = contact(T, grip.tip, hand.pad, start, -1)
-        patch_right, middle_right, top_right, rise_right = contact(T, grip.tip, hand.pad, end, 1)
-        dark_left = shadow_height(H, grip.tip, hand.finger, left - hand.thickness, left)
-        dark_right = shadow_height(H, grip.tip, hand.finger, right, right + hand.thickness)
-        middle = (left + right) / 2
-        palm = (middle - hand.palm_reach, middle + hand.palm_reach)
-        dark_palm = shadow_height(H, grip.tip + hand.palm, hand.palm_half, palm[0], palm[1])
-        out[n, 0] = middle
-        out[n, 1] = right - left
-        out[n, 2] = min(top_left, top_right)  # depth
-        out[n, 3] = end - start  # width
-        out[n, 4] = min(start - left, right - end)  # clearance
-        out[n, 5] = np.sqrt(((start + end) / 2) ** 2 + grip.b**2)  # offset
-        out[n, 6] = (dark_left + dark_right) / 2 + dark_palm  # shadow
-        out[n, 7] = (patch_left + patch_right) / 2  # patch
-        out[n, 8] = abs(middle_left - middle_right)  # skew
-        out[n, 9] = max(min(dark_left, rise_left), min(dark_right, rise_right))  # unseen
-    return out
+
+    patch: float
+    middle: float
+    top: float
+    rise: float
+    slope: float
 
 
 @njit(cache=True, nogil=True)
-def turn(points, x, y, yaw, b, out):
-    """Coordinates of points along and across the jaws, relative to (x, y) and to b."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
+def find_grips(target, scene, hidden, centre, yaws, lowest, hand, weights, enough, most):
+    """Search, then measure grips in the order of their rough costs until `most` of them hold.
+
+    Returns GRIPs, their MEASURES, and counts of what was dropped and why.
+    """
+    found, costs, dropped = search(target, scene, hidden, centre, yaws, lowest, hand, weights, enough)
+    grips, measures = np.empty(most, GRIP), np.zeros(most, MEASURES)
+    T, H = np.empty_like(target), np.empty_like(hidden)
+    n = 0
+    for i in np.argsort(costs, kind="mergesort"):  # stable: equals stay in their order
+        if n == most or costs[i] == np.inf:
+            break
+        grip = found[i]
+        turn(target, centre, grip, T)
+        turn(hidden, centre, grip, H)
+        if measure(grip, T, H, hand, measures[n], dropped):
+            grips[n] = grip
+            n += 1
+    return grips[:n], measures[:n], dropped
+
+
+@njit(cache=True, nogil=True)
+def turn(points, centre, grip, out):
+    """Coordinates of points along and across the jaws, relative to the target's middle and the grip's row."""
+    x, y = centre
+    cos, sin = np.cos(grip.yaw), np.sin(grip.yaw)
     for i in range(len(points)):
         dx, dy = points[i, 0] - x, points[i, 1] - y
-        out[i, 0], out[i, 1], out[i, 2] = dx * cos + dy * sin, dy * cos - dx * sin - b, points[i, 2]
+        out[i, 0], out[i, 1], out[i, 2] = dx * cos + dy * sin, dy * cos - dx * sin - grip.b, points[i, 2]
 
 
 @njit(cache=True, nogil=True)
-def jaws(P, grip, hand, spare, least):
+def measure(grip, T, H, hand, m, dropped):
+    """Measure a grip into `m`, given target and hidden points turned to it; say whether it fits and would hold."""
+    left, right, start, end = jaws(T, grip, hand)
+    if not 0.0 < right - left <= hand.opening:
+        return False
+    at_left, at_right = contact(T, grip.tip, hand, start, -1), contact(T, grip.tip, hand, end, 1)
+    # Where both faces recede to the same side, as at a corner, the jaws squeeze the target out. Two parallel faces
+    # recede to opposite sides: they only turn between the jaws.
+    if abs(np.arctan(at_left.slope) + np.arctan(at_right.slope)) > 2.0 * np.arctan(STEEPEST):
+        dropped[SLIPPERY] += 1
+        return False
+    dark_left = shadow_height(H, grip.tip, hand.finger, left - hand.thickness, left)
+    dark_right = shadow_height(H, grip.tip, hand.finger, right, right + hand.thickness)
+    m.middle, m.opening = (left + right) / 2, right - left
+    dark_palm = shadow_height(
+        H, grip.tip + hand.palm, hand.palm_half, m.middle - hand.palm_reach, m.middle + hand.palm_reach
+    )
+    m.depth = min(at_left.top, at_right.top)
+    m.width = end - start
+    m.clearance = min(start - left, right - end)
+    m.offset = np.sqrt(((start + end) / 2) ** 2 + grip.b**2)
+    m.shadow = (dark_left + dark_right) / 2 + dark_palm
+    m.patch = (at_left.patch + at_right.patch) / 2
+    m.skew = abs(at_left.middle - at_right.middle)
+    m.unseen = max(min(dark_left, at_left.rise), min(dark_right, at_right.rise))
+    return True
+
+
+@njit(cache=True, nogil=True)
+def jaws(P, grip, hand):
     """Where to open the jaws around what stands between them: left and right pad, left and right edge of the target.
 
-    P: the target along and across the jaws. Both pads stand off equally, by `spare` if there is room; without room for
-    `least` the right pad comes out left of the left one.
+    P: the target along and across the jaws. Both pads stand off equally, by `hand.spare` if there is room; without
+    room for `hand.least` the right pad comes out left of the left one.
     """
     start, end = np.inf, -np.inf
     for a, b, z in P:
-        if abs(b) <= hand.finger and z > grip.tip and grip.left_near - CELL < a < grip.right_near + CELL:
+        if abs(b) <= hand.finger and z > grip.tip and grip.left_near - hand.cell < a < grip.right_near + hand.cell:
             start, end = min(start, a), max(end, a)
     room = min(start - grip.left_far, grip.right_far - end, (hand.opening - (end - start)) / 2)
-    if not room >= least:
+    if not room >= hand.least:
         return 0.0, -1.0, start, end
-    off = min(room, spare)
+    off = min(room, hand.spare)
     return min(grip.left_near, start - off), max(grip.right_near, end + off), start, end
 
 
 @njit(cache=True, nogil=True)
-def contact(P, tip, half, edge, side):
-    """What a pad meets at an edge of the target (side -1 left, 1 right).
-
-    Returns the length of the patch across the pad, its middle, the height of its top over the tips, and how much the
-    target still rises towards the edge: a face that leans to the camera and ends there has a back that nobody saw.
-    """
+def contact(P, tip, hand, edge, side):
+    """Look at what a pad meets at an edge of the target (side -1 left, 1 right)."""
     low, high, top, inner = np.inf, -np.inf, -np.inf, -np.inf
+    outline = np.full(4, np.inf)  # how far inside the edge the target begins: beside the pad, its two halves, beside it
     for a, b, z in P:
         depth = (edge - a) * side
-        if abs(b) <= half and z > tip and depth >= 0.0:
-            if depth <= SKIN:
+        if z <= tip or abs(b) >= 2 * hand.pad or depth < -2 * hand.pad:
+            continue
+        i = int(b / hand.pad + 2.0)
+        outline[i] = min(outline[i], depth)
+        if abs(b) <= hand.pad and 0.0 <= depth <= 3 * hand.cell:
+            if depth <= hand.cell:  # the pad touches this too
                 low, high, top = min(low, b), max(high, b), max(top, z)
-            elif depth <= 3 * SKIN:
+            else:
                 inner = max(inner, z)
+    slope = slope_beyond(outline[1], outline[2], outline[3]) - slope_beyond(outline[2], outline[1], outline[0])
     if high < low:  # what reaches out furthest passes beside the pad
-        return 0.0, float(side), 0.0, 0.0
-    return high - low, (low + high) / 2, top - tip, top - max(inner, tip)
+        return Contact(0.0, float(side), 0.0, 0.0, slope / hand.pad)
+    return Contact(high - low, (low + high) / 2, top - tip, top - max(inner, tip), slope / hand.pad)
+
+
+@njit(cache=True, nogil=True)
+def slope_beyond(inner, outer, beside):
+    """How much further out a face gets from one half of a pad to the other, if it goes on so beside the pad; else 0.
+
+    Only then the pad's border rests on an inclined face. inner is infinite where the target has a corner in the pad.
+    """
+    return max(min(inner - outer, outer - beside), 0.0) if outer < np.inf and beside < np.inf else 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -100,11 +150,3 @@ def shadow_height(P, height, half, low, high):
         if low < P[i, 0] < high and abs(P[i, 1]) <= half:
             z = max(z, P[i, 2] - height)
     return z
-
-
-@njit(cache=True, nogil=True)
-def find_grips(target, scene, hidden, centre, yaws, lowest, hand, weights, most, spare, least):
-    """Search, and measure the `most` best by their rough costs: grips, their measures, and what was dropped and why."""
-    grips, costs, dropped = search(target, scene, hidden, centre, yaws, lowest, hand, weights)
-    grips = grips[np.argsort(costs, kind="mergesort")[:most]]  # stable: equals stay in their order
-    return grips, measure(grips, target, hidden, centre, hand, spare, least), dropped

@@ -39,7 +39,6 @@ WEIGHTS = {
     "skew": 0.5,
     "unseen": 0.5,
 }
-ROUGH = np.array([WEIGHTS[name] for name in ("shallow", "wide", "offset", "tight", "shadow")])
 
 
 @dataclass(frozen=True)
@@ -219,32 +218,46 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     target = target[target[:, 2] > lowest]
     if len(target) == 0:
         return "the target is too flat: nothing of it is higher than the lowest tips"
-    hand = _hand(gripper, kernels)
+    hand, enough = _hand(gripper, kernels), _enough(gripper, kernels)
+    weights = kernels.Shortcomings(**WEIGHTS)
     camera = np.zeros(0) if camera_position is None else camera_position
-    centre, near, hidden = kernels.surroundings(target, scene, RADIUS, camera, lowest)
-    around = (near, hidden, centre, _yaws(target), lowest, hand)
-    grips, measures, dropped = find_grips(target, *around, ROUGH, MEASURED, SPARE, LEAST)
+    centre, near, hidden = kernels.surroundings(target, scene, camera, lowest, hand)
+
+    def find(scene, hidden):
+        return find_grips(target, scene, hidden, centre, _yaws(target), lowest, hand, weights, enough, MEASURED)
+
+    grips, measures, dropped = find(near, hidden)
     if len(grips) == 0:
-        return _why_none(dropped, kernels)
-    fits = measures[:, 1] > 0.0
-    if not fits.any():
+        _, _, alone = found_alone = find(target, hidden[:0])
+        if len(found_alone[0]) == 0:
+            too_wide = alone[kernels.WIDE] or alone[kernels.SLIPPERY]
+            return "too wide for the gripper in every direction" if too_wide else "the target is too flat to be gripped"
+        if dropped[kernels.PALM]:
+            return "no room for the palm: something beside the target is too high"
         return "no room for the fingers beside the target"
-    grips, measures = grips[fits], measures[fits]
-    scores = _score(measures)
+    scores = _score(measures, weights, enough)
     best = np.argsort(-scores)[:RANKED]
-    yaw, b, tip = grips[best, :3].T
-    a, width = measures[best, :2].T
-    across = np.stack([a * np.cos(yaw) - b * np.sin(yaw), a * np.sin(yaw) + b * np.cos(yaw)], axis=1)
-    T = _frames(yaw, centre + across, tip + gripper.tips_below_grasp)
-    return [Grasp(T[i], float(width[i]), float(scores[best[i]]), number) for i in range(len(best))]
+    grips, measures, scores = grips[best], measures[best], scores[best]
+    cos, sin = np.cos(grips["yaw"]), np.sin(grips["yaw"])
+    a, b = measures["middle"], grips["b"]
+    xy = centre + np.stack([a * cos - b * sin, a * sin + b * cos], axis=1)
+    T = _frames(grips["yaw"], xy, grips["tip"] + gripper.tips_below_grasp)
+    found = zip(T, measures["opening"].tolist(), scores.tolist(), strict=True)
+    return [Grasp(T, width, score, number) for T, width, score in found]
 
 
 def _hand(gripper: Gripper, kernels):
-    """The gripper with its margins, as the kernels take it."""
-    outwards = np.arange(0.0, gripper.root_thickness + FINGER_MARGIN, kernels.CELL)
-    rise = gripper.root_above_tips / (gripper.root_thickness - gripper.tip_thickness)
+    """The gripper with its margins, as the kernels take it, and the size of the maps that it needs."""
+    cell = gripper.max_opening / kernels.CELLS
+    outwards = np.arange(0.0, gripper.root_thickness + FINGER_MARGIN, cell)
+    rise = gripper.root_above_tips / max(gripper.root_thickness - gripper.tip_thickness, 1e-6)
     underside = (outwards - gripper.tip_thickness - FINGER_MARGIN) * rise
+    palm_reach, body_half = gripper.palm_length / 2 + HAND_MARGIN, gripper.body_width / 2 + HAND_MARGIN
     return kernels.Hand(
+        cell=cell,
+        columns=2 * (kernels.OUTWARDS + int(np.ceil(palm_reach / cell))),
+        rows=2 * (kernels.REACH + int(np.ceil(body_half / cell))) + 1,
+        slot=int(np.ceil((gripper.tip_thickness + HAND_MARGIN) / cell)),
         opening=gripper.max_opening,
         pad=gripper.pad_width / 2,
         finger=gripper.finger_width / 2 + FINGER_MARGIN,
@@ -252,9 +265,26 @@ def _hand(gripper: Gripper, kernels):
         underside=np.clip(underside, 0.0, gripper.root_above_tips).astype(np.float32),
         palm=gripper.palm_above_tips - HAND_MARGIN,
         palm_half=gripper.palm_width / 2 + HAND_MARGIN,
+        palm_reach=palm_reach,
         body=gripper.body_above_tips - HAND_MARGIN,
-        body_half=gripper.body_width / 2 + HAND_MARGIN,
-        palm_reach=gripper.palm_length / 2 + HAND_MARGIN,
+        body_half=body_half,
+        spare=SPARE,
+        least=LEAST,
+    )
+
+
+def _enough(gripper: Gripper, kernels):
+    """From which length on, in metres, a shortcoming is as bad as can be (or, for depth, air and touch, is gone)."""
+    opening, pad = gripper.max_opening, gripper.pad_width
+    return kernels.Shortcomings(
+        shallow=opening / 4,
+        wide=opening,
+        tight=SPARE,
+        offset=opening / 2,
+        shadow=opening / 4,
+        short=0.92 * pad,
+        skew=pad / 2,
+        unseen=opening / 8,
     )
 
 
@@ -265,29 +295,16 @@ def _yaws(target) -> Float[np.ndarray, "Y"]:
     return np.concatenate([axes, axes + np.pi / 2, np.arange(FAN) * np.pi / FAN])
 
 
-def _score(measures: Float[np.ndarray, "n _"]) -> Float[np.ndarray, "n"]:
-    """1 minus the weighted mean of the shortcomings."""
-    depth, width, clearance, offset, shadow, patch, skew, unseen = measures[:, 2:10].T
-    shortcomings = [
-        1.0 - depth / 0.02,
-        width / 0.08,
-        1.0 - clearance / SPARE,
-        offset / 0.04,
-        shadow / 0.02,
-        1.0 - patch / 0.016,
-        skew / 0.0087,
-        unseen / 0.01,
-    ]
-    weights = np.array(list(WEIGHTS.values()))
-    return 1.0 - weights @ np.minimum(np.maximum(shortcomings, 0.0), 1.0) / weights.sum()
-
-
-def _why_none(dropped, kernels) -> str:
-    """In words: what the candidates that came furthest, else most of them, failed at."""
-    if dropped[kernels.PALM]:
-        return "no room for the palm: something beside the target is too high"
-    if dropped[kernels.FINGERS] > dropped[kernels.WIDE]:
-        return "no room for the fingers beside the target"
-    if dropped[kernels.WIDE]:
-        return "too wide for the gripper in every direction"
-    return "the target is too flat to be gripped"
+def _score(m, weights, enough) -> Float[np.ndarray, "n"]:
+    """1 minus the weighted mean of the shortcomings, each from 0 to 1."""
+    shortcomings = type(weights)(
+        shallow=1.0 - m["depth"] / enough.shallow,
+        wide=m["width"] / enough.wide,
+        tight=1.0 - m["clearance"] / enough.tight,
+        offset=m["offset"] / enough.offset,
+        shadow=m["shadow"] / enough.shadow,
+        short=1.0 - m["patch"] / enough.short,
+        skew=m["skew"] / enough.skew,
+        unseen=m["unseen"] / enough.unseen,
+    )
+    return 1.0 - np.array(weights) @ np.clip(shortcomings, 0.0, 1.0) / sum(weights)
