@@ -23,6 +23,7 @@ from labkit.geometry import (
     pixel_rays,
     principal_axes,
     project,
+    projection,
     remove_outliers,
     transform_points,
 )
@@ -100,6 +101,14 @@ def test_a_pixel_without_a_reading_has_no_point_in_any_frame(hole):
     for P in (back_project(depth, K), back_project_to_base(depth, K, pose(0))):
         assert np.isfinite(P[0, 0]).all()
         assert np.isnan(P[0, 1]).all()
+
+
+def test_a_batch_of_images_gives_each_ones_points():
+    depths = np.stack([depth_with_holes(seed) for seed in range(6)]).reshape(2, 3, 13, 21)
+    T = pose(1)
+    np.testing.assert_array_equal(back_project(depths, K)[1, 2], back_project(depths[1, 2], K))
+    np.testing.assert_array_equal(back_project_to_base(depths, K, T)[0, 1], back_project_to_base(depths[0, 1], K, T))
+    assert back_project(depths[:0], K).shape == (0, 3, 13, 21, 3)
 
 
 def test_an_image_without_any_reading_has_only_nan_points():
@@ -229,7 +238,7 @@ def test_the_cache_is_bounded():
     depth = np.ones((2, 3), np.float32)
     for seed in range(30):
         back_project_to_base(depth, K, pose(seed))
-    info = geometry._base_rays.cache_info()
+    info = projection._base_rays.cache_info()
     assert info.currsize <= info.maxsize < 10
 
 

@@ -9,12 +9,20 @@ from labkit.grasp.search_kernels import GRIP, SLIPPERY, search
 
 STEEPEST = 0.5  # tangent: between two faces that each lean by more than this to the same side, the target slips out
 
-# Of a grip, in metres: where the middle of the jaws is along their closing direction (a), how far they open, how far the
-# tips reach below the top, the target's width, the air beside it, the distance from the target's middle, how far unseen
-# things may stand up into the hand, how much of the pads touches, how far apart across the pads the two touches are,
-# and how far the target may go on behind what was seen.
+# What is measured of a grip, in metres.
 MEASURES = np.dtype(
-    [(name, float) for name in "middle opening depth width clearance offset shadow patch skew unseen".split()]
+    [
+        ("middle", float),  # of the jaws, along their closing direction
+        ("opening", float),  # of the jaws
+        ("depth", float),  # how far the tips reach below the top of what they touch
+        ("width", float),  # of the target there
+        ("clearance", float),  # air beside it
+        ("offset", float),  # from the target's middle
+        ("shadow", float),  # how far unseen things may stand up into fingers and palm
+        ("patch", float),  # how much of a pad touches, across
+        ("skew", float),  # how far apart, across, the two pads touch
+        ("unseen", float),  # how far the target may go on behind what the camera saw
+    ]
 )
 
 

@@ -1,16 +1,16 @@
-"""Top-down grasps with two parallel jaws, from what one camera saw (the text's sections 4 and 5).
+"""Top-down grasps with two parallel jaws, from what one camera saw (topic 07).
 
-The text ends with a centroid and a covariance, "heuristic top-down grasps aligned with principal directions"; that
-is `principal_axis_grasp`. `plan_grasps` starts there and looks around first: it turns the hand through many yaws, lets
-it down beside every part of the target, and keeps what fits between the points of the scene, above the table, and as
-far as possible outside the shadows that the camera could not look into. Nothing but points, the camera's position, the
-table's height and the gripper's measures goes in.
+`principal_axis_grasp` is the simplest: at the centroid of the target's cloud, closing along its shorter principal
+direction. `plan_grasps` starts there and looks around: it turns the hand through many yaws, lets it down beside every
+part of the target, and keeps what fits between the points of the scene, above the table, and as far as possible outside
+the shadows that the camera could not look into. It knows points, the camera's position, the table's height and the
+gripper's measures, and nothing else.
 """
 
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 
 import cv2
@@ -18,17 +18,19 @@ import numpy as np
 from jaxtyping import Float
 
 from labkit.geometry import centroid_and_covariance
-from labkit.support.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_height, check_shape
 
-TIP_CLEARANCE = 0.004  # metres of air between the tips and the table
-FINGER_MARGIN, HAND_MARGIN = 0.0015, 0.004  # metres around fingers and palm that must be free
-SPARE, LEAST = 0.010, 0.002  # metres beside the target: what an open jaw should leave, and the least
+# Metres that sensor and arm may be wrong by, whatever the gripper.
+TIP_CLEARANCE = 0.004  # of air between the tips and the table
+FINGER_MARGIN, HAND_MARGIN = 0.0015, 0.004  # around fingers and palm that must be free
+SPARE, LEAST = 0.010, 0.002  # beside the target: what an open jaw should leave, and the least
+MAX_POSITION = 20.0  # from the base; a larger number is a length in millimetres
+
 FAN = 10  # yaws tried besides those of the target's axes
-RADIUS = 0.17  # metres around a target in which the scene matters
 MEASURED = 20  # grips of a target that are looked at closely
 RANKED = 10  # grasps of a target that are reported
 
-# What makes a grip bad, and how bad at worst. Each shortcoming is 0 (none) to 1; `_score` says of what.
+# How much each shortcoming of a grip counts; labkit.grasp.search_kernels.Shortcomings says what they are.
 WEIGHTS = {
     "shallow": 1.0,
     "wide": 0.4,
@@ -43,14 +45,18 @@ WEIGHTS = {
 
 @dataclass(frozen=True)
 class Gripper:
-    """The Panda's hand, metres; the defaults are read off the collision meshes of PyBullet's Panda.
+    """The measures of a parallel jaw, metres; the defaults are those of the Panda's hand.
 
-    Heights count from the fingertips upwards. A finger is thin at its tip and thickens evenly up to `root_above_tips`;
-    the palm is the underside of the hand, and the body behind it is wider. `tips_below_grasp`: from panda_grasptarget,
-    the origin of a grasp, to the tips.
+    max_opening: between the pads. pad_width: of the flat pad that touches, across the closing direction. finger_width:
+    of the whole finger, likewise. tip_thickness, root_thickness: of a finger along the closing direction, at its tip
+    and at its thickest, which it reaches evenly at the height root_above_tips. palm_above_tips: height of the hand's
+    underside over the tips; palm_length along and palm_width across the closing direction. body_above_tips,
+    body_width: the wider part of the hand behind the palm, likewise. tips_below_grasp: from the origin of the grasp
+    frame down to the tips. Raises ValueError for a length that is not above 0 or is as large as one in millimetres.
 
-    >>> Gripper().max_opening
-    0.08
+    >>> wide = Gripper(max_opening=0.14, palm_length=0.25)
+    >>> wide.pad_width  # what is not given is the Panda's
+    0.0174
     """
 
     max_opening: float = 0.08
@@ -66,20 +72,41 @@ class Gripper:
     body_above_tips: float = 0.066
     body_width: float = 0.0634
 
+    def __post_init__(self):
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (np.ndim(value) == 0 and 0.0 <= value < 1.0) or (value == 0.0 and field.name != "tips_below_grasp"):
+                raise ValueError(
+                    f"{field.name}: expected metres above 0 and below 1, got {value}; multiply millimetres by 0.001"
+                )
+        for smaller, larger in (("tip_thickness", "root_thickness"), ("pad_width", "finger_width")):
+            if getattr(self, smaller) > getattr(self, larger):
+                raise ValueError(
+                    f"{smaller}: expected at most {larger}, {getattr(self, larger)}, got {getattr(self, smaller)}"
+                )
+
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
     """Where to close the jaws.
 
     T_base_grasp: (4, 4), the grasp frame in the base frame: z = approach, y = the direction in which the jaws close,
-    x = across the pads, origin = the point between the pads (panda_grasptarget). width: metres between the pads to
-    come down with. score: 1 for a grip without a shortcoming, less for others. target: number of the cloud.
+    x = across the pads, origin = the point between the pads (the Panda's panda_grasptarget). width: metres between the
+    pads to come down with. score: 1 for a grip without a shortcoming, less for others. target: number of the cloud.
     """
 
     T_base_grasp: Float[np.ndarray, "4 4"]
     width: float
     score: float = 0.0
     target: int = 0
+
+    def __repr__(self) -> str:
+        x, y, z = self.T_base_grasp[:3, 3]
+        yaw = np.degrees(np.arctan2(*self.T_base_grasp[1::-1, 1])) % 180.0
+        return (
+            f"Grasp(at ({x:.3f}, {y:.3f}, {z:.3f}), closing at {yaw:.0f} degrees, {1000.0 * self.width:.0f} mm open, "
+            f"score {self.score:.2f})"
+        )
 
 
 @dataclass(frozen=True)
@@ -88,6 +115,10 @@ class GraspPlan:
 
     grasps: tuple[Grasp, ...] = ()
     reason: str = ""
+
+    def __repr__(self) -> str:
+        grasps = f"{len(self.grasps)} grasps, the best {self.grasps[0]}" if self.grasps else f"no grasp: {self.reason}"
+        return f"GraspPlan({grasps})"
 
 
 def plan_grasps(
@@ -100,9 +131,9 @@ def plan_grasps(
     """Rank top-down grasps of one or several targets among everything that the camera saw.
 
     targets: a cloud each. scene: the points of targets, table and obstacles. table_z: height of the table.
-    camera_position: where the camera stands; without it nothing is known of shadows. Metres, base frame. No candidate
-    is a reason in words, not an error. Raises ValueError for an argument that is not finite or of another shape.
-    Sections 4 and 5 of the text.
+    camera_position: where the camera stands; without it nothing is known of shadows. gripper: the hand, the Panda's by
+    default. Metres, base frame. Without any grasp the plan says why. Raises ValueError for an argument that is not
+    finite, of another shape, or in millimetres. Topic 07.
 
     >>> x, y, z = np.meshgrid(np.arange(0.48, 0.521, 0.002), np.arange(-0.01, 0.011, 0.002), np.arange(0, 0.031, 0.002))
     >>> box = np.stack([x, y, z], axis=-1).reshape(-1, 3)  # 4 cm long in x, 2 cm wide in y
@@ -114,10 +145,9 @@ def plan_grasps(
     """
     scene = _cloud("scene", scene)
     targets = [_cloud(f"targets[{i}]", target) for i, target in enumerate(targets)]
-    table_z = float(check_finite("table_z", check_shape("table_z", table_z, ())))
+    table_z = check_height("table_z", table_z)
     if camera_position is not None:
-        camera_position = check_finite("camera_position", check_shape("camera_position", camera_position, (3,)))
-        camera_position = camera_position.astype(np.float64)
+        camera_position = _cloud("camera_position", check_shape("camera_position", camera_position, (3,))[None])[0]
 
     def plan_one(number: int) -> list[Grasp] | str:
         return _plan_one(number, targets[number], scene, table_z, camera_position, gripper)
@@ -153,8 +183,8 @@ def top_down_grasp(
 ) -> Grasp:
     """Give the best grasp of one cloud; where the planner finds none, the one of its principal axis, with score 0.
 
-    scene: what else is there, default nothing; table_z: default the cloud's lowest point. Raises ValueError for an
-    empty cloud, which has no centroid. Section 4 of the text.
+    scene: what else is there, default nothing. table_z: default the cloud's lowest point. The other arguments are those
+    of `plan_grasps`. Raises ValueError for an empty cloud, which has no centroid. Topic 07.
 
     >>> stick = np.array([[0.5, 0.001 * i, 0.05] for i in range(100)])
     >>> T = top_down_grasp(stick, table_z=0.03).T_base_grasp
@@ -171,22 +201,30 @@ def top_down_grasp(
 def principal_axis_grasp(
     cloud: Float[np.ndarray, "N 3"], table_z: float | None = None, gripper: Gripper = Gripper()
 ) -> Grasp:
-    """Grasp as the text suggests: at the centroid, closing across the longer principal direction seen from above.
+    """Grasp a cloud at its centroid, closing across the longer of its principal directions seen from above.
 
-    The jaws start fully open, the tips end as low as palm and table (if its height is given) let them. Nobody looks
-    what is in the way, so the score is 0. Raises ValueError for an empty cloud. Section 4 of the text.
+    The jaws start fully open; the tips end as low as palm and table (if its height is given) let them. This grasp takes
+    no account of what stands in the way, so its score is 0. Raises ValueError for an empty cloud. Topic 07.
     """
     cloud = _cloud("cloud", cloud)
     mu, _ = centroid_and_covariance(cloud)
     tip = max(cloud[:, 2].max() - gripper.palm_above_tips + HAND_MARGIN, cloud[:, 2].min())
     if table_z is not None:
-        tip = max(tip, table_z + TIP_CLEARANCE)
+        tip = max(tip, check_height("table_z", table_z) + TIP_CLEARANCE)
     T = _frames(np.array([_principal_yaw(cloud) + np.pi / 2]), mu[None, :2], np.array([tip + gripper.tips_below_grasp]))
     return Grasp(T[0], gripper.max_opening)
 
 
 def _cloud(name: str, points) -> Float[np.ndarray, "N 3"]:
-    return np.ascontiguousarray(check_finite(name, check_shape(name, points, (None, 3))), dtype=np.float64)
+    """Return points in metres as float64, in one block of memory."""
+    points = np.ascontiguousarray(check_shape(name, points, (None, 3)), dtype=np.float64)
+    if len(points) and not (points.min() >= -MAX_POSITION and points.max() <= MAX_POSITION):  # NaN fails too
+        check_finite(name, points)
+        raise ValueError(
+            f"{name}: expected metres, got a coordinate of {np.abs(points).max():.6g}, which looks like millimetres: "
+            "multiply by 0.001"
+        )
+    return points
 
 
 def _principal_yaw(P: Float[np.ndarray, "N 3"]) -> float:
@@ -198,13 +236,12 @@ def _principal_yaw(P: Float[np.ndarray, "N 3"]) -> float:
 
 def _frames(yaw, xy, z) -> Float[np.ndarray, "n 4 4"]:
     """Grasp frames: y (the closing direction) at an angle yaw from the base's x axis, z down."""
-    T = np.zeros((len(yaw), 4, 4))
-    T[:, 0, 1] = T[:, 1, 0] = np.cos(yaw)
-    T[:, 1, 1] = np.sin(yaw)
-    T[:, 0, 0] = -np.sin(yaw)
-    T[:, 2, 2] = -1.0
-    T[:, :2, 3], T[:, 2, 3], T[:, 3, 3] = xy, z, 1.0
-    return T
+    s, c, o, i = np.sin(yaw), np.cos(yaw), np.zeros(len(yaw)), np.ones(len(yaw))
+    x, y = xy.T
+    return np.array([[-s, c,  o, x],
+                     [ c, s,  o, y],
+                     [ o, o, -i, z],
+                     [ o, o,  o, i]]).transpose(2, 0, 1)  # fmt: skip
 
 
 def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[Grasp] | str:
@@ -228,13 +265,8 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
 
     grips, measures, dropped = find(near, hidden)
     if len(grips) == 0:
-        _, _, alone = found_alone = find(target, hidden[:0])
-        if len(found_alone[0]) == 0:
-            too_wide = alone[kernels.WIDE] or alone[kernels.SLIPPERY]
-            return "too wide for the gripper in every direction" if too_wide else "the target is too flat to be gripped"
-        if dropped[kernels.PALM]:
-            return "no room for the palm: something beside the target is too high"
-        return "no room for the fingers beside the target"
+        alone, _, dropped_alone = find(target, hidden[:0])
+        return _why_none(dropped, len(alone) > 0, dropped_alone, kernels)
     scores = _score(measures, weights, enough)
     best = np.argsort(-scores)[:RANKED]
     grips, measures, scores = grips[best], measures[best], scores[best]
@@ -308,3 +340,13 @@ def _score(m, weights, enough) -> Float[np.ndarray, "n"]:
         unseen=m["unseen"] / enough.unseen,
     )
     return 1.0 - np.array(weights) @ np.clip(shortcomings, 0.0, 1.0) / sum(weights)
+
+
+def _why_none(dropped, fits_alone: bool, dropped_alone, kernels) -> str:
+    """Say in words why a target has no grasp, given what happens among the scene and if it stood alone."""
+    if not fits_alone:
+        too_wide = dropped_alone[kernels.WIDE] or dropped_alone[kernels.SLIPPERY]
+        return "too wide for the gripper in every direction" if too_wide else "the target is too flat to be gripped"
+    if dropped[kernels.PALM]:
+        return "no room for the palm: something beside the target is too high"
+    return "no room for the fingers beside the target"

@@ -70,8 +70,18 @@ class Hand(NamedTuple):
     least: float
 
 
-# A grip found on the map: yaw, middle of its row, height of the tips, and from where to where each pad may start.
-GRIP = np.dtype([(name, float) for name in "yaw b tip left_near left_far right_near right_far".split()])
+# A grip found on the map, in radians and metres; a and b count from the target's middle.
+GRIP = np.dtype(
+    [
+        ("yaw", float),  # direction in which the jaws close
+        ("b", float),  # across the jaws
+        ("tip", float),  # height of the tips
+        ("left_near", float),  # where the left pad may be, nearest to the target
+        ("left_far", float),
+        ("right_near", float),
+        ("right_far", float),
+    ]
+)
 
 
 @njit(cache=True, nogil=True)
@@ -270,9 +280,7 @@ def search(target, scene, hidden, centre, yaws, lowest, hand, weights, enough):
             i = n * bands + (offset + REACH) // BAND
             grips[i].yaw = yaw
             row = hand.rows // 2 + offset
-            costs[i] = search_row(
-                maps, lines, row, lowest, highest, hand, weights, enough, costs[i], grips[i], dropped
-            )
+            costs[i] = search_row(maps, lines, row, lowest, highest, hand, weights, enough, costs[i], grips[i], dropped)
     return grips, costs, dropped
 
 

@@ -83,6 +83,14 @@ def check_depth(name: str, depth) -> np.ndarray:
     return depth
 
 
+def check_points(name: str, P) -> np.ndarray:
+    """Return points, floating point (..., 3): x, y, z on the last axis; NaN is fine."""
+    P = np.asarray(P)
+    if P.ndim == 0 or P.shape[-1] != 3 or P.dtype.kind != "f":
+        raise ValueError(f"{name}: expected floating-point x, y, z on the last axis, got {P.dtype} {P.shape}")
+    return P
+
+
 def check_K(name: str, K) -> np.ndarray:
     """Return an intrinsic matrix as float64 (3, 3): upper triangular, last row 0 0 1, positive focal lengths."""
     K = check_finite(name, check_shape(name, K, (3, 3))).astype(np.float64)

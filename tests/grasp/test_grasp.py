@@ -320,7 +320,7 @@ def test_hidden_points_lie_on_the_rays_that_graze_a_wall():
     y = np.arange(-0.2, 0.2, 0.002)
     wall = np.column_stack([np.full(len(y), 0.55), y, np.full(len(y), top)])
     before = table()[table()[:, 0] > 0.55]  # of the table behind the wall the camera sees nothing here
-    hidden = kernels.hidden_points(np.vstack([wall, before]), 0.5, 0.0, 0.1, camera, 0.001)
+    hidden = kernels.hidden_points(np.vstack([wall, before]), 0.5, 0.0, 0.1, 0.004, camera, 0.001)
     behind = hidden[:, 0] < 0.54
     assert behind.sum() > 500
     share = (camera[0] - hidden[behind, 0]) / (camera[0] - 0.55)  # along the ray, from the camera over the wall's top
@@ -331,7 +331,7 @@ def test_what_is_seen_is_not_hidden():
     camera = np.array([1.0, 0.0, 0.6])
     fine = np.stack(np.meshgrid(np.arange(0.39, 0.61, 0.002), np.arange(-0.11, 0.11, 0.002)), -1).reshape(-1, 2)
     ground = np.column_stack([fine, np.full(len(fine), TABLE)])
-    assert len(kernels.hidden_points(ground, 0.5, 0.0, 0.1, camera, TABLE + 0.001)) == 0
+    assert len(kernels.hidden_points(ground, 0.5, 0.0, 0.1, 0.004, camera, TABLE + 0.001)) == 0
 
 
 @settings(max_examples=10, deadline=None)
@@ -350,7 +350,7 @@ def test_nothing_taller_can_hide_than_the_bound_says(height, azimuth, elevation)
     ground = np.column_stack([ground, np.full(len(ground), TABLE)])
     dark = covered(ground)
     seen = np.vstack([box((0.04, 0.04, height)), ground[~dark]])
-    hidden = kernels.hidden_points(seen, 0.5, 0.0, 0.17, camera, TABLE + 0.004)
+    hidden = kernels.hidden_points(seen, 0.5, 0.0, 0.17, 0.004, camera, TABLE + 0.004)
     lit = cKDTree(np.vstack([ground[~dark], box((0.04, 0.04, height))])[:, :2])
     deep = dark & (lit.query(ground[:, :2])[0] > 0.006) & (abs(ground[:, :2] - (0.5, 0.0)) < 0.16).all(axis=1)
     assert deep.any()

@@ -1,0 +1,50 @@
+"""From pixels with depth to points in the robot's base frame, and what a cloud of points says (topic 06).
+
+`projection` goes from pixels to points and back, and moves points between frames; `clouds` finds centroid, axes, plane,
+outliers and separate objects. Metres throughout. Every function checks what it is given: a ValueError names the
+argument, what was expected and what came.
+"""
+
+from labkit.geometry.clouds import (
+    Plane,
+    PrincipalAxes,
+    centroid_and_covariance,
+    cluster,
+    cluster_indices,
+    fit_plane,
+    inliers,
+    principal_axes,
+    remove_outliers,
+)
+from labkit.geometry.projection import (
+    back_project,
+    back_project_to_base,
+    back_projection_jacobian,
+    back_projection_noise,
+    backproject_to_base,
+    invert_transform,
+    pixel_rays,
+    project,
+    transform_points,
+)
+
+__all__ = [
+    "Plane",
+    "PrincipalAxes",
+    "back_project",
+    "back_project_to_base",
+    "back_projection_jacobian",
+    "back_projection_noise",
+    "backproject_to_base",
+    "centroid_and_covariance",
+    "cluster",
+    "cluster_indices",
+    "fit_plane",
+    "inliers",
+    "invert_transform",
+    "pixel_rays",
+    "principal_axes",
+    "project",
+    "remove_outliers",
+    "transform_points",
+]
