@@ -1,6 +1,13 @@
-"""The two networks of the kit, their weights on disk, and class probabilities (the text's sections 3 and 6)."""
+"""The two networks of the kit, their weights on disk, and any PyTorch network as an engine (topic 03).
+
+A network of one's own, any nn.Module that maps images to logits, runs and trains like these. What it takes, if not
+RGB in 0..1 of any size, it states in an attribute `takes` (`labkit.inference.NetworkInput`).
+"""
 
 import io
+from collections.abc import Mapping
+from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -9,23 +16,23 @@ from jaxtyping import Float, UInt8
 from torch import nn
 from torch.nn import functional as F
 
+from labkit.frame import RGBDFrame
+from labkit.inference import Engine, NetworkInput
 from labkit.labels import CLASSES
 from labkit.support.files import write_atomically
-from labkit.support.validation import check_rgb
 
 
 class SmallSegNet(nn.Module):
-    """The text's compact encoder-decoder: two poolings, two transposed convolutions, 134,436 weights (section 6).
+    """A compact encoder-decoder: two poolings, two transposed convolutions, 134,436 weights (topic 03).
 
     A pixel's logits depend on about 20 pixels around it, so it knows colours and edges but not the shape of an object.
-    Height and width must be divisible by 4 (the text does not say so): else ValueError. `predict_probabilities` takes
-    any size, since it pads and crops.
+    Height and width must be divisible by 4: else ValueError. `predict_probabilities` takes any size: it pads and crops.
 
     >>> SmallSegNet()(torch.zeros(1, 3, 8, 12)).shape
     torch.Size([1, 4, 8, 12])
     """
 
-    divisor = 4  # of height and width
+    takes = NetworkInput(divisor=4)
 
     def __init__(self, num_classes: int = len(CLASSES)):
         super().__init__()
@@ -40,7 +47,7 @@ class SmallSegNet(nn.Module):
 
     def forward(self, x: Float[torch.Tensor, "N 3 H W"]) -> Float[torch.Tensor, "N C H W"]:
         """Map images in [0, 1] to logits of the same height and width."""
-        if x.shape[-2] % 4 or x.shape[-1] % 4:
+        if x.shape[-2] % self.takes.divisor or x.shape[-1] % self.takes.divisor:
             raise ValueError(f"x: expected height and width divisible by 4, got {tuple(x.shape[-2:])}")
         x = self.pool(F.relu(self.conv1(x)))  # (N, 32, H/2, W/2)
         x = self.pool(F.relu(self.conv2(x)))  # (N, 64, H/4, W/4)
@@ -76,16 +83,14 @@ class UNet(nn.Module):
 
     Its stem halves the image at once, since convolutions at full resolution cost most and know least. An encoder goes
     down to 1/16, where a pixel sees the whole object and its neighbours; a decoder comes back up and adds the
-    encoder's features at each scale, which know where the edges are. Any height and width: the image is padded to
-    a multiple of 16 by repeating its border, and the logits are cropped.
+    encoder's features at each scale, which know where the edges are. Any height and width: what is not divisible by
+    16 is padded by repeating its border, and the logits are cropped.
 
-    widths: channels at 1/2, 1/4, 1/8 and 1/16. blocks: residual blocks there. Section 3 of the text.
+    widths: channels at 1/2, 1/4, 1/8 and 1/16. blocks: residual blocks there. Topic 03.
 
     >>> UNet(num_classes=4).eval()(torch.zeros(1, 3, 37, 61)).shape
     torch.Size([1, 4, 37, 61])
     """
-
-    divisor = 1  # of height and width
 
     def __init__(
         self,
@@ -95,7 +100,7 @@ class UNet(nn.Module):
     ):
         super().__init__()
         self.num_classes = num_classes
-        self.stride = 2 ** len(widths)
+        self.takes = NetworkInput(divisor=2 ** len(widths))
         # A 6x6 kernel of stride 2 sees a pixel's 2x2 cell and two pixels around it, so that the stem loses no detail.
         encoder = [nn.Sequential(convolution(3, widths[0], 6, 2), *[Residual(widths[0]) for _ in range(blocks[0])])]
         for below, above, count in zip(widths[:-1], widths[1:], blocks[1:], strict=True):
@@ -109,10 +114,9 @@ class UNet(nn.Module):
     def forward(self, x: Float[torch.Tensor, "N 3 H W"]) -> Float[torch.Tensor, "N C H W"]:
         """Map images in [0, 1] to logits of the same height and width."""
         height, width = x.shape[-2:]
-        return self.on_grid(pad_to_multiple(x, self.stride))[..., :height, :width]
-
-    def on_grid(self, x: Float[torch.Tensor, "N 3 H W"]) -> Float[torch.Tensor, "N C H W"]:
-        """Do the same for a height and width divisible by `stride`: nothing to pad or crop, so an export is plain."""
+        down, right = -height % self.takes.divisor, -width % self.takes.divisor
+        if down or right:
+            return self(F.pad(x, (0, right, 0, down), mode="replicate"))[..., :height, :width]
         x = x - 0.5
         skips = []
         for stage in self.encoder:
@@ -129,17 +133,8 @@ ARCHITECTURES = {"smallsegnet": SmallSegNet, "unet": UNet}
 
 
 def architecture_of(model: nn.Module) -> str:
-    """Name of a model's architecture, a key of ARCHITECTURES."""
-    names = [name for name, kind in ARCHITECTURES.items() if type(model) is kind]
-    if not names:
-        raise ValueError(f"model: expected one of {sorted(ARCHITECTURES)}, got {type(model).__name__}")
-    return names[0]
-
-
-def pad_to_multiple(x: Float[torch.Tensor, "N C H W"], multiple: int) -> Float[torch.Tensor, "N C H2 W2"]:
-    """Repeat an image's last row and column until its height and width are multiples of `multiple`."""
-    down, right = -x.shape[-2] % multiple, -x.shape[-1] % multiple
-    return F.pad(x, (0, right, 0, down), mode="replicate") if down or right else x
+    """Name of a model's architecture: a key of ARCHITECTURES, or for others the name of its class."""
+    return next((name for name, kind in ARCHITECTURES.items() if type(model) is kind), type(model).__name__)
 
 
 def save_model(model: nn.Module, path, **meta) -> None:
@@ -150,7 +145,7 @@ def save_model(model: nn.Module, path, **meta) -> None:
     """
     checkpoint = {
         "architecture": architecture_of(model),
-        "num_classes": model.num_classes,
+        "num_classes": getattr(model, "num_classes", None),
         "state_dict": {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()},
         "meta": meta,
     }
@@ -180,32 +175,38 @@ def read_checkpoint(name: str, path) -> dict:
     return checkpoint
 
 
-def load_model(path, num_classes: int = len(CLASSES)) -> SmallSegNet | UNet:
-    """Load either network from a file of `save_model`, or a bare state_dict as in the text; in eval mode, on the CPU.
+def load_model(path, num_classes: int = len(CLASSES), model: nn.Module | None = None) -> nn.Module:
+    """Load a network from a file of `save_model`, or a bare state_dict; in eval mode, on the CPU.
 
-    The architecture is the one that the file records, or else told from the names of its weights. Nothing is ever
-    unpickled (weights_only=True). Raises FileNotFoundError for a missing file, ValueError for one that is truncated,
-    holds no weights, or weights for another number of classes. Section 6 of the text.
+    The architecture is the one that the file records, or else told from the names of its weights; model: a network of
+    one's own to load the weights into instead. Nothing is ever unpickled (weights_only=True). Raises FileNotFoundError
+    for a missing file, ValueError for one that is truncated, holds no weights, or weights of another network or for
+    another number of classes. Topic 03.
     """
     checkpoint = read_checkpoint("path", path)
     state = checkpoint.get("state_dict", checkpoint)
     if not isinstance(state, dict) or not all(isinstance(value, torch.Tensor) for value in state.values()):
         raise ValueError(f"path: expected weights by name in {path}, got other things")
-    architecture = checkpoint.get("architecture", "smallsegnet" if "conv1.weight" in state else "unet")
-    if architecture not in ARCHITECTURES:
+    if model is None:
+        architecture = checkpoint.get("architecture", "smallsegnet" if "conv1.weight" in state else "unet")
+        if architecture not in ARCHITECTURES:
+            names = ", ".join(ARCHITECTURES)
+            raise ValueError(f"path: expected weights of {names}, or `model`, for {path} of {architecture!r}")
+        model = ARCHITECTURES[architecture](num_classes)
+        bias = state.get("logits.bias")
+        if bias is not None and bias.shape != (num_classes,):
+            raise ValueError(
+                f"num_classes: expected {len(bias)}, the classes that {path} was trained for, got {num_classes}"
+            )
+    expected = model.state_dict()
+    strange = len(state.keys() - expected.keys())
+    fitting = sum(name in state and state[name].shape == weight.shape for name, weight in expected.items())
+    if strange or fitting < len(expected):
         raise ValueError(
-            f"path: expected an architecture among {sorted(ARCHITECTURES)} in {path}, got {architecture!r}"
+            f"path: expected the weights of {architecture_of(model)}, {len(expected)} arrays, got {fitting} that fit "
+            f"and {strange} of other names in {path}"
         )
-    model = ARCHITECTURES[architecture](num_classes)
-    bias = state.get("logits.bias")
-    if bias is not None and bias.shape != (num_classes,):
-        raise ValueError(
-            f"num_classes: expected {len(bias)}, the classes that {path} was trained for, got {num_classes}"
-        )
-    try:
-        model.load_state_dict(state)
-    except RuntimeError as error:
-        raise ValueError(f"path: the weights in {path} do not fit {architecture}: {error}") from error
+    model.load_state_dict(state)
     return model.to(memory_format=torch.channels_last).eval()
 
 
@@ -218,34 +219,67 @@ def weights_path(model: str) -> Path:
     return WEIGHTS / f"{model}.pt" if model in ARCHITECTURES else Path(model)
 
 
-def predict_logits(model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[torch.Tensor, "C H W"]:
-    """Run a network on one RGB image; any height and width (padded as needed, and cropped).
+class TorchEngine(Engine):
+    """Any PyTorch network, run here: `TorchEngine(model)(rgb)` gives class probabilities.
 
-    Raises ValueError if `rgb` is no RGB image. Float32, channels_last: on a CPU two to three times as fast as NCHW.
+    model: a module that maps its arrays, (N, channels, H, W), to logits (N, C, H, W), or to a dict with them as "out".
+    takes: what it takes; None asks the model's own attribute `takes`, else it gets RGB in 0..1. It runs in eval mode,
+    and is left in the mode that it was in. Raises ValueError for logits of another shape.
+
+    >>> mine = nn.Sequential(nn.Conv2d(3, 8, 3, padding=1), nn.ReLU(), nn.Conv2d(8, 2, 1))
+    >>> TorchEngine(mine, NetworkInput(mean=127.5, std=127.5))(np.zeros((5, 7, 3), np.uint8)).shape
+    (5, 7, 2)
     """
-    rgb = check_rgb("rgb", rgb)
-    weight = next(model.parameters())
-    with torch.inference_mode():
-        # (H, W, 3) bytes seen as (1, 3, H, W) are channels_last as they stand.
-        x = torch.from_numpy(np.ascontiguousarray(rgb)).to(weight.device)[None].permute(0, 3, 1, 2)
-        x = pad_to_multiple(x.to(weight.dtype) / 255.0, getattr(model, "divisor", 1))
-        return model(x)[0, :, : rgb.shape[0], : rgb.shape[1]].float()
+
+    def __init__(self, model: nn.Module, takes: NetworkInput | None = None):
+        super().__init__(takes or getattr(model, "takes", NetworkInput()), getattr(model, "num_classes", None))
+        self.model = model
+
+    def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
+        """Run the network where its weights are, in their precision; gives logits in float32."""
+        held = chain(self.model.parameters(), self.model.buffers())
+        weight = next((tensor for tensor in held if tensor.is_floating_point()), torch.zeros(()))
+        with torch.inference_mode(), evaluating(self.model):
+            x = [torch.from_numpy(array).to(weight.device, weight.dtype) for array in arrays]
+            z = self.model(*(each.contiguous(memory_format=torch.channels_last) for each in x))
+        z = logits_of(z)
+        size = tuple(arrays[0].shape[-2:])
+        if not isinstance(z, torch.Tensor) or z.ndim != 4 or tuple(z.shape[-2:]) != size:
+            got = tuple(z.shape) if isinstance(z, torch.Tensor) else type(z).__name__
+            raise ValueError(f"model: expected logits (N, C, H, W) with H, W = {size}, got {got}")
+        return z.float().cpu().numpy()
+
+
+def logits_of(result) -> torch.Tensor:
+    """Take the logits out of what a network returns: torchvision's networks give a dict, with the logits as "out"."""
+    return result.get("out") if isinstance(result, Mapping) else result
+
+
+@contextmanager
+def evaluating(model: nn.Module):
+    """Put a model into eval mode, and each of its parts back afterwards: some may be frozen in it for good."""
+    training = [part for part in model.modules() if part.training]
+    try:
+        yield model.eval()
+    finally:
+        for part in training:
+            part.training = True
+
+
+def predict_logits(model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[torch.Tensor, "C H W"]:
+    """Run a network on one RGB image of any height and width. Raises ValueError if `rgb` is no RGB image."""
+    return torch.from_numpy(TorchEngine(model).logits(rgb))
 
 
 def predict_probabilities(
-    model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = False
+    model: nn.Module, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
 ) -> Float[np.ndarray, "H W C"]:
-    """Give each pixel's class probabilities, float32, the softmax of the network's logits (section 3 of the text).
+    """Give each pixel's class probabilities, float32: the softmax of the network's logits (topic 03).
 
-    mirror: average them with those of the mirrored image, mirrored back: two opinions, of twice the price, whose
-    errors differ. `model` is in eval mode. Raises ValueError if `rgb` is no RGB image.
+    picture: a frame, or an RGB image for a network that needs no more. mirror: average them with those of the mirrored
+    picture, mirrored back. Raises ValueError if the picture is not what the network takes.
 
-    >>> predict_probabilities(SmallSegNet().eval(), np.zeros((5, 7, 3), np.uint8)).shape
+    >>> predict_probabilities(SmallSegNet(), np.zeros((5, 7, 3), np.uint8)).shape
     (5, 7, 4)
     """
-    with torch.inference_mode():
-        p = F.softmax(predict_logits(model, rgb).permute(1, 2, 0), dim=-1)
-        if mirror:
-            mirrored = predict_logits(model, rgb[:, ::-1].copy())
-            p = 0.5 * (p + F.softmax(mirrored.permute(1, 2, 0), dim=-1).flip(1))
-        return p.cpu().numpy()
+    return TorchEngine(model)(picture, mirror)

@@ -14,8 +14,9 @@ from jaxtyping import Float, Integer, UInt8
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, cluster_indices, inliers
 from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
+from labkit.inference import Engine
 from labkit.labels import IGNORE, TARGET
-from labkit.stacks.engines import Engine, open_engine
+from labkit.stacks.engines import open_engine
 from labkit.support.validation import (
     check_finite,
     check_height,
@@ -94,12 +95,11 @@ class Pipeline:
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
         grasp: Callable[..., GraspPlan] | None = None,
     ):
-        if engine is not None:
-            model = open_engine(engine, model)
+        model = as_engine(model) if engine is None else open_engine(engine, model)
         if model is not None and not callable(model):
             raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
-        if isinstance(target_class, bool) or target_class not in range(getattr(model, "num_classes", IGNORE)):
-            classes = getattr(model, "num_classes", IGNORE)
+        classes = getattr(model, "num_classes", None) or IGNORE
+        if isinstance(target_class, bool) or target_class not in range(classes):
             raise ValueError(f"target_class: expected a class in 0 to {classes - 1}, got {target_class!r}")
         if grasp is not None and gripper is not None:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
@@ -117,33 +117,16 @@ class Pipeline:
 
     def run(self, frame: RGBDFrame) -> Perception:
         """From a frame to grasps: `perceive`, then `locate`."""
-        seconds = {}
-        labels, probabilities = self.perceive(frame, seconds)
+        frame, seconds = self._on_table(frame), {}
+        labels, probabilities = self._perceive(frame, seconds)
         return self._locate(frame, _check_labels_of(frame, labels), probabilities, seconds)
 
-    def perceive(
-        self, frame: RGBDFrame, seconds: dict[str, float] | None = None
-    ) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"]]:
+    def perceive(self, frame: RGBDFrame) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"]]:
         """Label every pixel: labels, and the class probabilities that they were chosen by.
 
-        seconds: gets the time of each stage, if given. Raises ValueError without a model, or for one that does not give
-        probabilities or has no such class as the target.
+        Raises ValueError without a model, or for one that gives no probabilities or has no such class as the target.
         """
-        if self.model is None:
-            raise ValueError("model: expected one to perceive with, got None; `locate` takes labels from elsewhere")
-        seconds = {} if seconds is None else seconds
-        with _timed(seconds, "network"):
-            probabilities = class_probabilities(self.model, frame.rgb, self.mirror)
-        if self.target_class >= probabilities.shape[-1]:
-            raise ValueError(
-                f"target_class: expected one of the model's {probabilities.shape[-1]} classes, got {self.target_class}"
-            )
-        with _timed(seconds, "labels"):
-            labels = most_probable(probabilities)
-        if self.crf:
-            with _timed(seconds, "crf"):
-                labels = self.crf(probabilities, frame)
-        return labels, probabilities
+        return self._perceive(self._on_table(frame), {})
 
     def locate(
         self,
@@ -159,16 +142,36 @@ class Pipeline:
         labels = _check_labels_of(frame, labels)
         if probabilities is not None:
             probabilities = check_probabilities(probabilities, labels.shape, self.target_class)
-        return self._locate(frame, labels, probabilities, {})
+        return self._locate(self._on_table(frame), labels, probabilities, {})
+
+    def _on_table(self, frame: RGBDFrame) -> RGBDFrame:
+        """The frame with the height of the table that counts: this pipeline's, or else its own, or else 0."""
+        known = frame.table_z if self.table_z is None else self.table_z
+        return replace(frame, table_z=known or 0.0)
+
+    def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
+        if self.model is None:
+            raise ValueError("model: expected one to perceive with, got None; `locate` takes labels from elsewhere")
+        with _timed(seconds, "network"):
+            probabilities = class_probabilities(self.model, frame, self.mirror)
+        if self.target_class >= probabilities.shape[-1]:
+            raise ValueError(
+                f"target_class: expected one of the model's {probabilities.shape[-1]} classes, got {self.target_class}"
+            )
+        with _timed(seconds, "labels"):
+            labels = most_probable(probabilities)
+        if self.crf:
+            with _timed(seconds, "crf"):
+                labels = self.crf(probabilities, frame)
+        return labels, probabilities
 
     def _locate(self, frame: RGBDFrame, labels, probabilities, seconds: dict[str, float]) -> Perception:
-        table_z = next(z for z in (self.table_z, frame.table_z, 0.0) if z is not None)
         with _timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
         with _timed(seconds, "clouds"):
-            pixels, clouds, scene = self.targets(labels, points, table_z)
+            pixels, clouds, scene = self.targets(labels, points, frame.table_z)
         with _timed(seconds, "grasps"):
-            plan = self.plan(clouds, scene, table_z, frame.T_base_cam[:3, 3])
+            plan = self.plan(clouds, scene, frame.table_z, frame.T_base_cam[:3, 3])
             certainty = tuple(1.0 for _ in pixels)
             if probabilities is not None:
                 of_target = probabilities[..., self.target_class].reshape(-1)
@@ -214,22 +217,29 @@ def _timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-def class_probabilities(model, rgb: UInt8[np.ndarray, "H W 3"], mirror: bool = False) -> Float[np.ndarray, "H W C"]:
-    """Class probabilities of an RGB image from a network, an engine or a function; checks that they are some.
-
-    mirror: as in `labkit.network.predict_probabilities`; a function decides for itself. Raises ValueError
-    if they are not of shape (H, W, C), or not finite (a network with NaN weights, say).
-    """
+def as_engine(model):
+    """Make a PyTorch network an engine (`labkit.network.TorchEngine`); give anything else back as it is."""
     torch = sys.modules.get("torch")  # heavy: a pipeline around a plain function does without it
-    if torch is not None and isinstance(model, torch.nn.Module):
-        from labkit.network import predict_probabilities
+    if torch is None or not isinstance(model, torch.nn.Module):
+        return model
+    from labkit.network import TorchEngine
 
-        p = predict_probabilities(model, rgb, mirror)
-    elif isinstance(model, Engine):
-        p = model(rgb, mirror)
-    else:
-        p = model(check_rgb("rgb", rgb))
-    return check_probabilities(p, rgb.shape[:2])
+    return TorchEngine(model)
+
+
+def class_probabilities(
+    model, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+) -> Float[np.ndarray, "H W C"]:
+    """Class probabilities of a frame or an RGB image from a network, an engine or a function of the RGB image.
+
+    mirror: as in `labkit.inference.Engine`; a function decides for itself. Raises ValueError if what comes is not
+    finite (a network with NaN weights, say), or a function's result is no probabilities.
+    """
+    model = as_engine(model)
+    if not isinstance(model, Engine):
+        rgb = picture.rgb if isinstance(picture, RGBDFrame) else check_rgb("rgb", picture)
+        return check_probabilities(model(rgb), rgb.shape[:2])
+    return check_finite("probabilities", model(picture, mirror))
 
 
 def check_probabilities(p, size: tuple[int, int], target_class: int = 0) -> Float[np.ndarray, "H W C"]:

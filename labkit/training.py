@@ -1,4 +1,4 @@
-"""Training a network on labelled images: fast on a CPU, seeded, stopped and resumed at will (the text's section 3).
+"""Training a network on labelled images: fast on a CPU, seeded, stopped and resumed at will (topics 03 and 05).
 
 A run is a function of its configuration and its data. Step s of it draws its randomness from (seed, s) and the order of
 epoch e from (seed, e), so that nothing has to be replayed: weights, optimiser and the number of steps done are all
@@ -8,6 +8,7 @@ that a checkpoint holds, and a resumed run ends where an undisturbed one does.
 import copy
 import json
 import math
+import re
 import signal
 import threading
 from collections.abc import Sequence
@@ -17,13 +18,14 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import nn
+from torch.nn import functional as F
 from tqdm.auto import tqdm
 
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, IGNORE, TARGET
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
-from labkit.network import ARCHITECTURES, read_checkpoint, save_model, write_checkpoint
+from labkit.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
 from labkit.support.augment import augment
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_labels, check_rgb
@@ -33,9 +35,10 @@ from labkit.support.validation import check_labels, check_rgb
 class TrainConfig:
     """Everything that a run depends on besides its data.
 
-    model: "unet" or "smallsegnet". epochs: passes over the data; steps: optimiser steps instead, if given. lr: the
-    highest learning rate; weights: scheme of labkit.losses.class_weights. crop: (h, w) of the random window of each
-    image, or None for whole images. val_every: epochs between validations. Raises ValueError for a bad value.
+    model: "unet", "smallsegnet", or the name in the files' names of a network of one's own. epochs: passes over the
+    data; steps: optimiser steps instead, if given. lr: the highest learning rate; weights: scheme of
+    labkit.losses.class_weights. crop: (h, w) of the random window of each image, or None for whole images. val_every:
+    epochs between validations. Raises ValueError for a bad value.
 
     >>> TrainConfig(model="unet", epochs=2).batch
     8
@@ -60,7 +63,7 @@ class TrainConfig:
             if not fits:
                 raise ValueError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
 
-        need("model", self.model in ARCHITECTURES, f"one of {sorted(ARCHITECTURES)}")
+        need("model", re.fullmatch(r"[\w-]+", self.model), "a name of letters, digits, - and _")
         need("weights", self.weights in SCHEMES, f"one of {', '.join(SCHEMES)}")
         need("epochs", self.epochs >= 1, "at least 1")
         need("steps", self.steps is None or self.steps >= 1, "at least 1, or None")
@@ -178,13 +181,20 @@ class DeferredInterrupt:
 class Trainer:
     """One run: model, optimiser and position; `step` makes one step, `state` and `restore` save and load all of it."""
 
-    def __init__(self, data: ImagesInMemory, config: TrainConfig, device: torch.device):
+    def __init__(self, data: ImagesInMemory, config: TrainConfig, device: torch.device, model: nn.Module | None = None):
         self.data, self.config, self.device = data, config, device
         self.batches = math.ceil(len(data) / config.batch)  # in an epoch
         self.total = config.steps if config.steps is not None else config.epochs * self.batches
-        with torch.random.fork_rng():
-            torch.manual_seed(config.seed)
-            model = ARCHITECTURES[config.model](config.num_classes)
+        if model is None:
+            if config.model not in ARCHITECTURES:
+                names = ", ".join(ARCHITECTURES)
+                raise ValueError(f"model: expected {names}, or a network of your own, got {config.model!r} alone")
+            with torch.random.fork_rng():
+                torch.manual_seed(config.seed)
+                model = ARCHITECTURES[config.model](config.num_classes)
+        self.takes = TorchEngine(model).takes
+        if self.takes.arrays != ("image",):
+            raise ValueError(f"model: expected a network that takes images only, got one of {self.takes.arrays}")
         self.model = model.to(device=device, memory_format=torch.channels_last)
         self.optimiser = torch.optim.AdamW(
             self.model.parameters(), lr=config.lr, weight_decay=config.weight_decay, fused=True
@@ -197,16 +207,21 @@ class Trainer:
         self.history: list[dict] = []
 
     def batch_of_step(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
-        """Images (N, 3, h, w) in [0, 1] and labels (N, h, w) of a step: a function of the seed and the step."""
+        """Images (N, 3, h, w), as the network takes them, and labels (N, h, w): a function of the seed and the step."""
         config, (H, W) = self.config, self.data.y.shape[1:]
         epoch, place = divmod(step, self.batches)
         order = torch.randperm(len(self.data), generator=generator_for(config.seed, 0, epoch))
         chosen = order[place * config.batch : (place + 1) * config.batch]
         rgb, y = self.data.rgb[chosen], self.data.y[chosen]
-        if not config.augment:
-            return rgb.permute(0, 3, 1, 2).float().div_(255.0), y
-        size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
-        return augment(rgb, y, size, generator_for(config.seed, 1, step))
+        if config.augment:
+            size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
+            x, y = augment(rgb, y, size, generator_for(config.seed, 1, step))
+        else:
+            x = rgb.permute(0, 3, 1, 2).float().div_(255.0)
+        mean, std = (torch.tensor(value).float().reshape(-1, 1, 1) for value in (self.takes.mean, self.takes.std))
+        x = x * (255.0 / std) - mean / std
+        edges = (0, -y.shape[2] % self.takes.divisor, 0, -y.shape[1] % self.takes.divisor)
+        return F.pad(x, edges, mode="replicate"), F.pad(y, edges, value=IGNORE)
 
     def step(self) -> float:
         """Make one optimiser step and return its loss."""
@@ -215,7 +230,7 @@ class Trainer:
             group["lr"] = self.config.learning_rate(self.done, self.total)
         self.model.train()
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
-            logits = self.model(x.to(self.device))
+            logits = logits_of(self.model(x.to(self.device)))
         loss = segmentation_loss(logits, y.to(self.device), self.weights)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
@@ -245,8 +260,8 @@ class Trainer:
         if differ:
             raise ValueError(
                 f"config: {source} is of another run, which differs in {', '.join(differ)}: expected "
-                f"{[theirs.get(key) for key in differ]}, got {[ours[key] for key in differ]}; "
-                "delete it or use resume=False to start anew"
+                f"{[theirs.get(key) for key in differ]}, got {[ours[key] for key in differ]}; its learning rates "
+                "were for that run: choose another folder, or start anew with resume=False (--no-resume)"
             )
         self.model.load_state_dict(state["model"])
         self.optimiser.load_state_dict(state["optimiser"])
@@ -255,39 +270,39 @@ class Trainer:
 
 def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int, batch: int = 8) -> np.ndarray:
     """Pool one confusion matrix (C, C) over all images of `data`, whole, with the model in eval mode."""
-    device = next(model.parameters()).device
+    engine, device = TorchEngine(model), next((weight.device for weight in model.parameters()), torch.device("cpu"))
     n = np.zeros((num_classes, num_classes), np.int64)
-    model.eval()
-    with torch.inference_mode(), torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
+    with torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
         for first in range(0, len(data), batch):
-            x = data.rgb[first : first + batch].permute(0, 3, 1, 2).to(device).float().div_(255.0)
-            predicted = model(x).argmax(dim=1).to(torch.uint8).cpu().numpy()
-            n += confusion_matrix(data.y[first : first + batch].numpy(), predicted, num_classes)
+            z = engine.padded([engine.takes.scaled(data.rgb[first : first + batch].numpy())])
+            n += confusion_matrix(data.y[first : first + batch].numpy(), z.argmax(axis=1), num_classes)
     return n
 
 
 def train(
-    train_set: Sequence,
-    val_set: Sequence | None,
+    train_set: Sequence | ImagesInMemory,
+    val_set: Sequence | ImagesInMemory | None,
     config: TrainConfig,
     out,
     resume: bool = True,
     device: str = "auto",
     progress: bool = True,
+    model: nn.Module | None = None,
 ) -> list[dict]:
-    """Train a network and return its history: one dict an epoch (epoch, steps, loss, and mean_iou and iou by class).
+    """Train a network and return its history: one dict per epoch (epoch, steps, loss, and mean_iou and iou by class).
 
-    train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. In the folder
-    `out` are written, atomically: NAME.pt, the weights for load_model, after each validation; NAME.checkpoint.pt, from
-    which `resume` goes on, after each epoch and at Ctrl-C (which then raises KeyboardInterrupt); NAME.history.json.
-    On one machine, with as many threads, a resumed run ends with the very weights of an undisturbed one.
-    Raises ValueError for data that do not fit, or a checkpoint of another configuration. Section 3 of the text.
+    train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. model: a network
+    of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. In the folder `out` are
+    written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json; NAME.checkpoint.pt,
+    from which `resume` goes on. The checkpoint is written at Ctrl-C, too, which then raises KeyboardInterrupt and says
+    where it is. On one machine, with as many threads, a resumed run ends with the very weights of an undisturbed one.
+    Raises ValueError for data that do not fit, or a checkpoint of another configuration. Topics 03 and 05.
     """
     out, where = Path(out), choose_device(device)
     train_data = in_memory(train_set, config.num_classes, "train_set", progress)
     val_data = None if val_set is None else in_memory(val_set, config.num_classes, "val_set", progress)
     checkpoint = out / f"{config.model}.checkpoint.pt"
-    trainer = Trainer(train_data, config, where)
+    trainer = Trainer(train_data, config, where, model)
     if resume and checkpoint.is_file():
         trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
 
@@ -302,7 +317,9 @@ def train(
                 write_checkpoint(checkpoint, trainer.state())
             if interrupt.pending:
                 write_checkpoint(checkpoint, trainer.state())
-                raise KeyboardInterrupt
+                raise KeyboardInterrupt(
+                    f"stopped after {trainer.done} of {trainer.total} steps; the same command goes on from {checkpoint}"
+                )
     if val_data is not None and "weights_undone" not in trainer.history[-1]:
         finish_run(trainer, val_data, out)
         write_checkpoint(checkpoint, trainer.state())
@@ -325,11 +342,14 @@ def undo_weights(
 ) -> tuple[float, np.ndarray]:
     """Lower each class's last bias by share * log w, with the share in 0..1 that gives the best mean IoU on val_data.
 
-    Weighted training moves the optimum from p_c to w_c p_c / sum(w p) (problem 5 of the text), so that a rare class
+    Weighted training moves the optimum from p_c to w_c p_c / sum(w p) (topic 05), so that a rare class
     wins pixels along its edges that are more likely not its own. Subtracting log w from the logits moves it back.
-    Returns the share and the confusion matrix that it gives; the model's bias is changed in place.
+    Returns the share and the confusion matrix that it gives; the model's bias, `logits.bias`, is changed in place. A
+    model that has none stays as it is.
     """
-    bias = model.logits.bias
+    bias = getattr(getattr(model, "logits", None), "bias", None)
+    if bias is None or (weights == weights[0]).all():
+        return 0.0, evaluate(model, val_data, num_classes, batch)
     trained = bias.detach().clone()
     log_w = torch.log(weights.to(bias))
     best = None
@@ -358,8 +378,7 @@ def finish_epoch(trainer: Trainer, val_data: ImagesInMemory | None, out: Path) -
         n = evaluate(trainer.model, val_data, config.num_classes, config.batch)
         row |= {"mean_iou": mean_iou(n), "iou": iou(n).tolist()}
     trainer.history.append(row)
-    if last or "mean_iou" in row:
-        save_model(trainer.model, out / f"{config.model}.pt", **row, config=asdict(config))
+    save_model(trainer.model, out / f"{config.model}.pt", **row, config=asdict(config))
     write_atomically(out / f"{config.model}.history.json", json.dumps(trainer.history, indent=1).encode())
 
 
@@ -369,5 +388,5 @@ def progress_line(loss: float, history: list[dict]) -> str:
     if not scored:
         return f"loss {loss:.3f}"
     row = scored[-1]
-    target = f", target {row['iou'][TARGET]:.3f}" if len(row["iou"]) > TARGET else ""
+    target = f", target {row['iou'][TARGET]:.3f}" if len(row["iou"]) == len(CLASSES) else ""
     return f"loss {loss:.3f}, val mIoU {row['mean_iou']:.3f}{target}"

@@ -246,8 +246,6 @@ def test_the_channel_order_is_the_callers_word():
 
 
 class Broken(nn.Module):
-    divisor = 1
-
     def __init__(self):
         super().__init__()
         self.scale = nn.Parameter(torch.tensor(float("nan")))

@@ -13,6 +13,7 @@ import torch
 from torch import nn
 
 from labkit.frame import RGBDFrame
+from labkit.inference import NetworkInput
 from labkit.losses import class_weights, segmentation_loss
 from labkit.metrics import mean_iou
 from labkit.network import SmallSegNet, load_model, predict_probabilities
@@ -146,11 +147,34 @@ def test_a_window_larger_than_the_image(generator):
 # A run
 
 
-@pytest.mark.parametrize("model", ["smallsegnet", "unet"])
-def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, tmp_path, monkeypatch):
+class OwnNetwork(nn.Module):
+    """Another scale, logits in a dict, two classes more than there are."""
+
+    takes = NetworkInput(mean=127.5, std=127.5)
+
+    def __init__(self):
+        super().__init__()
+        torch.manual_seed(0)
+        self.layers = nn.Sequential(nn.Conv2d(3, 16, 3, padding=1), nn.ReLU(), nn.Conv2d(16, 6, 1))
+
+    def forward(self, x):
+        assert x.min() >= -1.0 and x.max() <= 1.0 and x.min() < -0.5, "it is given what it states"
+        return {"out": self.layers(x)}
+
+
+@pytest.mark.parametrize(("model", "make"), [("smallsegnet", None), ("unet", None), ("mine", OwnNetwork)])
+def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, make, tmp_path, monkeypatch):
     """Stopped by a real SIGINT in the middle of an epoch, once in each of three steps, and gone on with each time."""
-    config, data, val = replace(CONFIG, model=model, epochs=2, crop=None), scenes(7), scenes(2)
-    expected = train(data, val, config, tmp_path / "a", progress=False)
+    config, data, val = (
+        replace(CONFIG, model=model, epochs=2, crop=None, num_classes=6 if make else 4),
+        scenes(7),
+        scenes(2),
+    )
+
+    def run(folder):
+        return train(data, val, config, tmp_path / folder, progress=False, model=make and make())
+
+    expected = run("a")
     plain_step, handler = Trainer.step, signal.getsignal(signal.SIGINT)
 
     def interrupted_step(self):
@@ -160,10 +184,10 @@ def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, tmp_pa
         return loss
 
     monkeypatch.setattr(Trainer, "step", interrupted_step)
-    for _ in range(3):
-        with pytest.raises(KeyboardInterrupt):
-            train(data, val, config, tmp_path / "b", progress=False)
-    assert train(data, val, config, tmp_path / "b", progress=False) == expected
+    for steps in (1, 3, 5):
+        with pytest.raises(KeyboardInterrupt, match=rf"stopped after {steps} of 8 steps.*{model}\.checkpoint\.pt"):
+            run("b")
+    assert str(run("b")) == str(expected)  # NaN, where a class is in no image, is not equal to itself
     assert_same_weights(weights_of(tmp_path / "a", model), weights_of(tmp_path / "b", model))
     assert signal.getsignal(signal.SIGINT) is handler
 
@@ -205,6 +229,31 @@ def test_a_run_learns_and_writes_what_it_says(tmp_path):
     model = load_model(tmp_path / "smallsegnet.pt", 4)
     right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in val]
     assert np.concatenate(right).mean() > 0.8
+
+
+def test_a_network_of_ones_own_learns_and_loads(tmp_path):
+    config, data = replace(CONFIG, model="mine", num_classes=6, epochs=25, lr=1e-2, augment=False), scenes(8)
+    history = train(data, data[:2], config, tmp_path, progress=False, model=OwnNetwork())
+    assert history[-1]["mean_iou"] > 0.6 and history[-1]["weights_undone"] == 0.0
+    model = load_model(tmp_path / "mine.pt", model=OwnNetwork())
+    right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in data]
+    assert np.concatenate(right).mean() > 0.8
+    with pytest.raises(ValueError, match="model: expected smallsegnet, unet, or a network of your own, got 'mine'"):
+        train(data, None, config, tmp_path / "b", progress=False)
+
+
+def test_weights_are_there_before_the_end_without_validation(tmp_path, monkeypatch):
+    plain_step = Trainer.step
+
+    def fails_in_the_second_epoch(self):
+        if self.done == self.batches:
+            raise RuntimeError("power cut")
+        return plain_step(self)
+
+    monkeypatch.setattr(Trainer, "step", fails_in_the_second_epoch)
+    with pytest.raises(RuntimeError, match="power cut"):
+        train(scenes(4), None, CONFIG, tmp_path, progress=False)
+    assert load_model(tmp_path / "smallsegnet.pt") is not None
 
 
 def test_the_loss_of_a_step_is_the_weighted_loss_of_its_batch():
@@ -275,7 +324,7 @@ def test_frames_and_tensors_are_datasets_too():
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("model", "resnet"),
+        ("model", "../unet"),
         ("epochs", 0),
         ("steps", 0),
         ("batch", 0),
@@ -324,7 +373,7 @@ def test_data_that_do_not_fit(tmp_path):
 def test_a_checkpoint_of_another_run_or_a_damaged_one(tmp_path):
     config, data = replace(CONFIG, epochs=1), scenes(2)
     train(data, None, config, tmp_path, progress=False)
-    with pytest.raises(ValueError, match=r"config: .* differs in batch, seed"):
+    with pytest.raises(ValueError, match=r"config: .* differs in batch, seed.* another folder, .*--no-resume"):
         train(data, None, replace(config, batch=1, seed=4), tmp_path, progress=False)
     with pytest.raises(ValueError, match=r"config: .* differs in images"):
         train(scenes(3), None, config, tmp_path, progress=False)
@@ -360,6 +409,20 @@ def test_bf16_is_used_only_where_it_is_native(monkeypatch, able, native):
     assert bf16_is_native(torch.device("cpu")) is native
     trainer = Trainer(ImagesInMemory(scenes(1), progress=False), CONFIG, torch.device("cpu"))
     assert trainer.bf16 is native
+
+
+@pytest.mark.parametrize("crop", [None, (18, 22)])
+@pytest.mark.parametrize("augmented", [False, True])
+def test_sizes_that_the_network_does_not_take_are_padded(crop, augmented, tmp_path):
+    """SmallSegNet takes multiples of 4; what is padded is nobody's error."""
+    data = ImagesInMemory(scenes(3, 20, 24), progress=False)
+    data.rgb, data.y = data.rgb[:, :18, :23].contiguous(), data.y[:, :18, :23].contiguous()
+    config = replace(CONFIG, crop=crop, augment=augmented, epochs=1)
+    x, y = Trainer(data, config, torch.device("cpu")).batch_of_step(0)
+    assert x.shape[2:] == y.shape[1:] == (20, 24)
+    assert (y[:, 18:] == 255).all() and (y[:, :18, 2:20] != 255).all()
+    assert torch.equal(x[:, :, 18], x[:, :, 17])
+    assert "mean_iou" in train(data, data, config, tmp_path, progress=False)[-1]
 
 
 class OnePixelRule(nn.Module):

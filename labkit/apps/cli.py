@@ -38,7 +38,7 @@ def doctor() -> None:
 def train(
     data: Annotated[Path, typer.Argument(help="Data set to train on, as data_gen writes it.")] = Path("data/train"),
     val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
-    model: Annotated[Literal["unet", "smallsegnet"], typer.Option(help="Which network.")] = "unet",
+    model: Annotated[str, typer.Option(help="Which network: unet or smallsegnet.")] = "unet",
     epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
     seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
@@ -51,10 +51,16 @@ def train(
     import data_gen
     from labkit import training
 
+    if model not in training.RECIPES:
+        raise ValueError(f"model: expected {' or '.join(training.RECIPES)}, got {model!r}")
     recipe = training.RECIPES[model]
     config = replace(recipe, seed=seed, epochs=recipe.epochs if epochs is None else epochs)
     val_set = None if val is None else data_gen.load(val)
-    history = training.train(data_gen.load(data), val_set, config, out, resume=resume, device=device)
+    try:
+        history = training.train(data_gen.load(data), val_set, config, out, resume=resume, device=device)
+    except KeyboardInterrupt as stop:  # it says where the checkpoint is
+        typer.echo(f"labkit: {stop}", err=True)
+        raise typer.Exit(130) from stop
     last = history[-1]
     scores = f", validation mIoU {last['mean_iou']:.3f}" if "mean_iou" in last else ""
     typer.echo(f"{out / f'{model}.pt'}: {last['epoch']} epochs, loss {last['loss']:.3f}{scores}")

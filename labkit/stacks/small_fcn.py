@@ -22,8 +22,6 @@ class SmallFCN(nn.Module):
     torch.Size([1, 4, 5, 7])
     """
 
-    divisor = 1  # of height and width
-
     def __init__(self, num_classes: int = len(CLASSES)):
         super().__init__()
         self.num_classes = num_classes

@@ -93,7 +93,7 @@ def test_doctor_fails_only_when_something_needed_is_missing(monkeypatch, capsys,
 
 @pytest.mark.parametrize(
     "arguments, name",
-    [(["train", "--model", "x"], "--model"), (["train", "--epochs", "x"], "--epochs"), (["lift"], "lift")],
+    [(["train", "--model", "x"], "model"), (["train", "--epochs", "x"], "--epochs"), (["lift"], "lift")],
 )
 def test_wrong_usage_is_status_2_and_names_the_option(monkeypatch, capsys, arguments, name):
     assert run(monkeypatch, *arguments) == 2
@@ -153,6 +153,7 @@ def test_ctrl_c_ends_training_with_status_130_and_a_checkpoint(data, tmp_path):
             assert character, said
             said += character
         process.send_signal(signal.SIGINT)
-        process.stderr.read()
+        said = process.stderr.read()
     assert process.returncode == 130
     assert (tmp_path / "unet.checkpoint.pt").is_file()
+    assert f"goes on from {tmp_path / 'unet.checkpoint.pt'}" in said.splitlines()[-1]

@@ -10,15 +10,13 @@ import cv2
 import numpy as np
 import onnx
 import pytest
-import torch
 
 import data_gen
 from labkit.apps import cli
-from labkit.network import SmallSegNet, UNet, load_model, predict_logits, predict_probabilities, weights_path
-from labkit.pipeline import Pipeline, most_probable, segment_rgb_image
+from labkit.network import load_model, predict_logits, weights_path
+from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.stacks.engines import ENGINES, export, labels_of_scores, open_engine, segment_like_cpp
 
-OTHERS = ("opencv", "onnxruntime")
 FRAMES = 5
 SYSTEM_PYTHON = Path("/usr/bin/python3")
 
@@ -44,74 +42,21 @@ def frames():
     return [data_gen.render(data_gen.sample_scene(seed, "test"), (320, 240)) for seed in seeds]
 
 
-# -------------------------------------------------------------------------------- the same numbers everywhere
+# -------------------------------------------------------------------------------- the same answer everywhere
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_an_engine_gives_the_logits_and_labels_of_plain_torch(name, unet, frames):
-    engine = open_engine(name, unet)
-    worst, equal = 0.0, []
+def test_the_shipped_network_gives_the_same_labels_and_grasps_in_every_engine(name, unet, frames, file):
+    engines = [open_engine(name, model) for model in [unet] + [file] * (name != "torch")]
     for frame in frames:
-        with torch.inference_mode():
-            x = torch.from_numpy(frame.rgb.transpose(2, 0, 1)[None] / np.float32(255))
-            expected = unet(x)[0].numpy()
-        z = engine.logits(frame.rgb)
-        worst = max(worst, float(np.abs(z - expected).max()))
-        equal.append(z.argmax(axis=0) == expected.argmax(axis=0))
-    print(f"{name}: {len(frames)} frames, logits within {worst:.1e}, equal labels {np.mean(equal):.6%}")
-    assert worst < 1e-4 and np.mean(equal) >= 0.9999
-
-
-@pytest.mark.parametrize("name", ENGINES)
-@pytest.mark.parametrize("size", [(33, 18), (37, 61), (96, 112), (250, 333)])
-@pytest.mark.parametrize("kind", [UNet, SmallSegNet])
-def test_any_size_of_image_gives_what_the_network_gives(kind, size, name):
-    torch.manual_seed(0)
-    model = kind().eval()
-    rgb = np.random.default_rng(1).integers(0, 256, (*size, 3), dtype=np.uint8)
-    expected = predict_logits(model, rgb).numpy()
-    z = open_engine(name, model).logits(rgb)
-    assert z.shape == expected.shape == (4, *size)
-    assert np.abs(z - expected).max() < 1e-4
-
-
-@pytest.mark.parametrize("name", ENGINES)
-@pytest.mark.parametrize("size", [(1, 1), (1, 40), (16, 16), (40, 3)])
-def test_a_sliver_of_an_image_is_seen_as_if_its_border_went_on(unet, size, name):
-    """OpenCV's engine pads to two cells of the network where one would do; see the comment there."""
-    rgb = np.random.default_rng(4).integers(0, 256, (*size, 3), dtype=np.uint8)
-    engine = open_engine(name, unet)
-    least = 16 * engine.cells
-    padding = [(0, max(0, least - side)) for side in size]
-    padded = np.pad(rgb, [*padding, (0, 0)], mode="edge")
-    expected = predict_logits(unet, padded).numpy()[:, : size[0], : size[1]]
-    z = engine.logits(rgb)
-    assert z.shape == (4, *size) and np.abs(z - expected).max() < 1e-4
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_one_engine_takes_one_size_after_another(name, file, unet):
-    engine = open_engine(name, file)
-    rng = np.random.default_rng(2)
-    for size in ((48, 64), (33, 97), (48, 64), (128, 32)):
-        rgb = rng.integers(0, 256, (*size, 3), dtype=np.uint8)
-        assert np.abs(engine.logits(rgb) - predict_logits(unet, rgb).numpy()).max() < 1e-4
-
-
-@pytest.mark.parametrize("name", ENGINES)
-def test_probabilities_are_the_networks_with_and_without_the_mirror(name, unet, frames):
-    engine, rgb = open_engine(name, unet), frames[0].rgb[:101, :203]
-    for mirror in (False, True):
-        assert np.abs(engine(rgb, mirror) - predict_probabilities(unet, rgb, mirror)).max() < 1e-5
-
-
-@pytest.mark.parametrize("name", ENGINES)
-def test_a_pipeline_on_an_engine_finds_the_same_grasps(name, unet, frames, file):
-    frame = frames[1]
-    expected = Pipeline(unet).run(frame)
-    assert expected.plan.grasps
-    for model in [unet] + [file] * (name in OTHERS):
-        p = Pipeline(model, engine=name).run(frame)
+        expected = predict_logits(unet, frame.rgb).numpy()
+        for engine in engines:
+            z = engine.logits(frame.rgb)
+            assert np.abs(z - expected).max() < 1e-4
+            assert np.mean(z.argmax(axis=0) == expected.argmax(axis=0)) >= 0.9999
+    expected = Pipeline(unet).run(frames[1])
+    for model in [unet] + [file] * (name != "torch"):
+        p = Pipeline(model, engine=name).run(frames[1])
         assert np.mean(p.labels == expected.labels) >= 0.9999
         assert np.allclose(p.plan.grasps[0].T_base_grasp, expected.plan.grasps[0].T_base_grasp, atol=1e-3)
 
@@ -127,6 +72,9 @@ def test_the_file_stands_alone_and_says_what_it_is(file):
         "architecture": "UNet",
         "classes": "4",
         "divisor": "16",
+        "arrays": '["image"]',
+        "mean": "0.0",
+        "std": "255.0",
     }
     assert not {node.op_type for node in proto.graph.node} & {"Shape", "Gather", "Slice", "Pad"}, "a plain graph"
 
@@ -197,7 +145,6 @@ def test_errata_the_cpp_listing_reads_an_nchw_blob_as_nhwc(unet, frames):
     truth = segment_rgb_image(unet, frame.rgb[:64, :96])
     assert np.mean(right == truth) > 0.999
     assert np.mean(listing == truth) < 0.7, "most classes are another pixel's"
-    assert np.array_equal(listing, read_as_the_listing_does(scores.copy())), "and it is no accident of memory"
     as_nhwc = scores.ravel().reshape(64, 96, 4)
     assert np.array_equal(listing, as_nhwc.argmax(axis=-1)), "what it takes the memory for"
 
@@ -212,7 +159,7 @@ def test_the_flow_of_the_cpp_node(unet, frames):
     rgb = np.ascontiguousarray(np.tile(frames[2].rgb, (2, 2, 1)))[:480, :500]  # other proportions than the blob's
     bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     small = cv2.resize(rgb, (320, 240), interpolation=cv2.INTER_LINEAR)
-    labels = most_probable(predict_probabilities(unet, small))
+    labels = segment_rgb_image(unet, small)
     rows = np.arange(480) * 240 // 480
     columns = np.floor(np.arange(500) * 320 / 500).astype(int)
     for name in ENGINES:
@@ -229,9 +176,8 @@ def test_the_flow_of_the_cpp_node(unet, frames):
     "arguments, says",
     [
         (("tensorrt", None), r"engine: expected one of torch, opencv, onnxruntime, got 'tensorrt'"),
-        (("torch", "unet.onnx"), "model: expected a network"),
-        (("opencv", np.asarray), "model: expected a network"),
-        (("torch", torch.nn.Conv2d(3, 4, 1)), "model: expected a network"),
+        (("torch", "unet.onnx"), "model: expected a PyTorch network, got 'unet.onnx'"),
+        (("opencv", np.asarray), "model: expected a PyTorch network"),
     ],
 )
 def test_an_engine_that_there_is_not(arguments, says):
@@ -239,7 +185,7 @@ def test_an_engine_that_there_is_not(arguments, says):
         open_engine(*arguments)
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", ["opencv", "onnxruntime"])
 def test_a_file_that_is_no_export(name, tmp_path):
     with pytest.raises(FileNotFoundError, match="absent"):
         open_engine(name, tmp_path / "absent.onnx")
@@ -254,13 +200,9 @@ def test_a_file_that_is_no_export(name, tmp_path):
 @pytest.mark.bad_input
 def test_images_and_sizes_that_do_not_fit(unet):
     engine = open_engine("torch", unet)
-    with pytest.raises(ValueError, match=r"rgb: expected uint8"):
-        engine.logits(np.zeros((4, 4, 3), np.float32))
     with pytest.raises(ValueError, match=r"bgr: expected shape"):
         segment_like_cpp(engine, np.zeros((4, 4), np.uint8))
-    with pytest.raises(ValueError, match=r"size: .*multiples of 16, got \(100, 80\)"):
+    with pytest.raises(ValueError, match=r"size: .*divisible by 16, got \(100, 80\)"):
         segment_like_cpp(engine, np.zeros((4, 4, 3), np.uint8), (100, 80))
     with pytest.raises(ValueError, match="scores: expected shape"):
         labels_of_scores(np.zeros((4, 2, 3)))
-    with pytest.raises(ValueError, match="engine"):
-        Pipeline(unet, engine="tensorrt")
