@@ -25,8 +25,9 @@ demo: .venv/installed
 test: .venv/installed
 	tests/run $(ARGS)
 
-# Settings of JupyterLab for the course. A .venv that has everything is used as it is.
+# JupyterLab with the course's settings and kernel. A .venv that has everything is used as it is.
 lab: export JUPYTER_CONFIG_PATH := $(CURDIR)/labkit/course/jupyter
+lab: export JUPYTER_PATH := $(JUPYTER_CONFIG_PATH)
 lab: $(or $(wildcard .venv/installed),.venv/installed-lab)
 	$(BIN)/jupyter lab $(ARGS)
 

@@ -51,7 +51,7 @@ def test_there_is_such_a_page():
 def test_the_commands_grade_and_formgrader_shows_it(clone):
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     given = commands(PAGES[0])
-    assert given[0].startswith("make ") and given[-1] == "jupyter lab"
+    assert given[0].startswith("make ") and given[-1] == "make lab"
     for command in given[1:-1]:
         if command.startswith("export PATH"):
             continue
