@@ -1,14 +1,14 @@
-"""Grading a folder of submissions: what changed is graded, by threads here or on a Dask cluster, and kept as it comes.
+"""Grading submissions: what changed is graded, by threads here or on a Dask cluster, and kept as it comes.
 
 Each finished submission is a record, a file of its own that is written at once; a run that was killed is taken up by
 the next one. The record's key tells what it depends on: the lab, the submission, the secret, the limits and this code.
+The secret belongs to a round of grading: late work is graded with the same one until a new round begins.
 """
 
 import hashlib
 import json
-import os
 import secrets
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
@@ -19,12 +19,11 @@ from tqdm.auto import tqdm
 from labkit.course import questions
 from labkit.course.grading import sandbox
 from labkit.course.grading.grade import Result, grade_submission
-from labkit.course.grading.reading import Lab, Submission, find_submissions, imported_roots, read_submission
+from labkit.course.grading.reading import Lab, Submission, imported_roots
 from labkit.course.grading.sandbox import Limits
 from labkit.support.files import write_atomically
 
 SECRET_FILE = "secret_seed"
-LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Batch:
     """How to grade: what is said of these in `labkit grade --help`."""
 
     lab: Lab
-    submissions: Path
+    submissions: Sequence[Submission]
     out: Path
     secret: str
     workers: int = 1
@@ -67,49 +66,43 @@ class Batch:
     limits: Limits = field(default_factory=Limits)
 
 
-def grade_folder(batch: Batch, progress: bool = True) -> tuple[list[Record], int]:
-    """Grade the submissions of a folder; returns a record of each student, by name, and how many were graded now.
+def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]:
+    """Grade the submissions of a batch; returns a record of each, in their order, and how many were graded now.
 
-    Raises ValueError if there is no such folder, or if no sandbox can be made.
+    Raises ValueError if no sandbox can be made.
     """
     if not batch.unsafe and batch.dask is None:
         sandbox.probe(imported_roots(batch.lab.setup), batch.limits)
-    found = list(find_submissions(batch.submissions, batch.lab.topic))
+    code, total = code_digest(), len(batch.submissions)
+    keys = {submission.student: key_of(batch, submission, code) for submission in batch.submissions}
     records: dict[str, Record] = {}
-    waiting = []
-    code = code_digest()
-    for student, place in found:
-        submission = read_submission(student, place, batch.lab)
-        key = key_of(batch, submission, code)
+    for student, key in keys.items():
         old = None if batch.force else read_record(record_path(batch.out, student))
         if old is not None and old.key == key:
             records[student] = old
-        else:
-            waiting.append((student, place))
-    bar = tqdm(total=len(found), initial=len(records), desc=batch.lab.topic, unit="student", disable=not progress)
+    waiting = [submission for submission in batch.submissions if submission.student not in records]
+    bar = tqdm(total=total, initial=len(records), desc=batch.lab.topic, unit="student", disable=not progress)
     with bar, executor_of(batch) as (executor, width):
         for submission, results in graded(executor, width, batch, waiting):
-            key = key_of(batch, submission, code)
-            record = Record(submission.student, submission.reason, tuple(results), not batch.unsafe, key)
-            write_record(batch.out, record)
-            records[submission.student] = record
+            student = submission.student
+            records[student] = Record(student, submission.reason, results, not batch.unsafe, keys[student])
+            write_record(batch.out, records[student])
             bar.update()
-    return [records[student] for student, _ in found], len(waiting)
+    return [records[submission.student] for submission in batch.submissions], len(waiting)
 
 
 def graded(
-    executor: Executor, width: int, batch: Batch, waiting: Iterable
-) -> Iterator[tuple[Submission, list[Result]]]:
-    """Grade submissions, a few at a time so that no more of them are in memory; gives them as they are ready."""
+    executor: Executor, width: int, batch: Batch, waiting: Iterable[Submission]
+) -> Iterator[tuple[Submission, tuple[Result, ...]]]:
+    """Grade submissions, a few at a time; gives each with its results, as they are ready."""
     lab = replace(batch.lab, notebook={})  # which grading does not need, and a cluster would be sent
     pending: dict[Future, Submission] = {}
     queue = iter(waiting)
     try:
         while True:
-            for student, place in queue:
-                submission = read_submission(student, place, batch.lab)
+            for submission in queue:
                 if submission.reason:
-                    yield submission, []
+                    yield submission, ()
                     continue
                 task = (lab, submission, batch.secret, batch.limits, batch.unsafe)
                 pending[executor.submit(grade_submission, *task)] = submission
@@ -118,7 +111,7 @@ def graded(
             if not pending:
                 return
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                yield pending.pop(future), future.result()
+                yield pending.pop(future), tuple(future.result())
     finally:
         for future in pending:
             future.cancel()
@@ -128,8 +121,11 @@ def graded(
 def executor_of(batch: Batch) -> Iterator[tuple[Executor, int]]:
     """Threads, each of which waits for a worker of its own, or a Dask cluster; and how many tasks to keep in flight."""
     if batch.dask is None:
-        with ThreadPoolExecutor(batch.workers) as executor:
-            yield executor, 2 * batch.workers
+        try:
+            with ThreadPoolExecutor(batch.workers) as executor:
+                yield executor, 2 * batch.workers
+        finally:
+            sandbox.servers.close()
         return
     from distributed import Client
 
@@ -153,16 +149,9 @@ def code_digest() -> str:
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 
-def file_name(student: str) -> str:
-    """A student's name as the name of a file: itself, unless it would not do as one."""
-    if student.isprintable() and len(student.encode()) <= LONGEST_NAME and not set(student) & set('/\\:*?"<>|'):
-        return student
-    return f"odd-name-{hashlib.sha256(student.encode()).hexdigest()[:12]}"
-
-
 def record_path(out: Path, student: str) -> Path:
     """Where a student's record is kept."""
-    return Path(out) / "records" / f"{file_name(student)}.json"
+    return Path(out) / "records" / f"{student}.json"
 
 
 def write_record(out: Path, record: Record) -> None:
@@ -179,11 +168,16 @@ def read_record(path: Path) -> Record | None:
         return None
 
 
-def secret_for(out: Path, given: str | None, draw: Callable[[], str] = lambda: secrets.token_hex(16)) -> str:
-    """The secret seed: the given one, else the one of the last run, else a new one. It is kept for the next run."""
+def secret_for(out: Path, given: str | None, new_round: bool = False) -> str:
+    """The secret seed of the round of grading in OUT: the kept one, else the given one, else a new one, which is kept.
+
+    new_round: forget the kept one. Raises ValueError if another one is given in the middle of a round.
+    """
     path = Path(out) / SECRET_FILE
-    if given is None:
-        given = path.read_text().strip() if path.is_file() else draw()
-    write_atomically(path, f"{given}\n".encode())
-    os.chmod(path, 0o600)
-    return given
+    kept = path.read_text().strip() if path.is_file() and not new_round else None
+    if kept is not None and given not in (None, kept):
+        raise ValueError(f"seed: expected that of the round in {path}; --new-round grades everybody with another one")
+    secret = kept or given or secrets.token_hex(16)
+    if secret != kept:
+        write_atomically(path, f"{secret}\n".encode())
+    return secret

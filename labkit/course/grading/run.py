@@ -1,27 +1,34 @@
 """What `labkit grade` does, from the folder of submissions to the gradebook."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from labkit.course.grading.batch import Batch, Record, grade_folder, secret_for, write_record
+from labkit.course.grading.batch import Batch, Record, grade_batch, secret_for, write_record
 from labkit.course.grading.gradebook import write_gradebook
 from labkit.course.grading.outputs import write_outputs
-from labkit.course.grading.reading import Lab, find_submissions, read_lab, read_submission
+from labkit.course.grading.reading import Lab, read_lab, read_submissions
 from labkit.course.grading.sandbox import Limits
 
 
 @dataclass(frozen=True)
 class Graded:
-    """The records of all students, by name, and how many were graded in this run."""
+    """The records of all students, by name, and how many were graded in this run.
+
+    failures: what could not be written into the gradebook, by student.
+    """
 
     lab: Lab
     records: list[Record]
     graded_now: int
+    failures: dict[str, str]
 
     @property
     def needs_a_look(self) -> bool:
         """Whether something is for a person to judge."""
-        return any(record.needs_a_look for record in self.records)
+        return bool(self.failures) or any(record.needs_a_look for record in self.records)
 
 
 def grade_course(
@@ -30,26 +37,49 @@ def grade_course(
     submissions: Path | None = None,
     out: Path | None = None,
     seed: str | None = None,
+    new_round: bool = False,
     limits: Limits | None = None,
     progress: bool = True,
     **how,
 ) -> Graded:
-    """Grade the submissions of a lab, and write tables, pages and the gradebook.
+    """Grade the submissions of a lab, and write tables, pages and the gradebook, for nobody else to read.
 
     course: folder with labs/ and gradebook.db. submissions: course/submitted by default; out: course/grades/TOPIC.
-    seed: the secret one. how: workers, dask, force, unsafe, as `Batch` has them. Raises ValueError for a topic, lab or
-    folder that there is not, and where no sandbox can be made.
+    seed: the secret one; new_round: take another one, and grade everybody anew. how: workers, dask, force, unsafe, as
+    `Batch` has them. Raises ValueError for a topic, lab or folder that there is not, for another seed than the round's,
+    and where no sandbox can be made.
     """
     course = Path(course)
     lab, _ = read_lab(course, topic)
-    submissions = course / "submitted" if submissions is None else Path(submissions)
+    read = read_submissions(course / "submitted" if submissions is None else Path(submissions), lab)
     out = course / "grades" / topic if out is None else Path(out)
-    places = dict(find_submissions(submissions, topic))
-    batch = Batch(lab, submissions, out, secret_for(out, seed), limits=limits or Limits(), **how)
-    records, graded_now = grade_folder(batch, progress)
-    write_outputs(out, lab, records)
-    news = [record for record in records if not record.in_gradebook]
-    read = ((record, read_submission(record.student, places[record.student], lab)) for record in news)
-    triples = ((record, submission, places[record.student]) for record, submission in read)
-    write_gradebook(course, lab, triples, lambda record: write_record(out, replace(record, in_gradebook=True)))
-    return Graded(lab, records, graded_now)
+    with private():
+        secret = secret_for(out, seed, new_round)
+        batch = Batch(lab, read, out, secret, limits=limits or Limits(), **how)
+        records, graded_now = grade_batch(batch, progress)
+        write_outputs(out, lab, records)
+        news = [pair for pair in zip(records, read, strict=True) if not pair[0].in_gradebook]
+        failures = write_gradebook(course, lab, news)
+        for record, _ in news:
+            if record.student not in failures:
+                write_record(out, replace(record, in_gradebook=True))
+        close_to_others(course, out)
+    return Graded(lab, records, graded_now, failures)
+
+
+@contextmanager
+def private() -> Iterator[None]:
+    """Let the files that are written be read by their owner only: files 0600, folders 0700."""
+    before = os.umask(0o077)
+    try:
+        yield
+    finally:
+        os.umask(before)
+
+
+def close_to_others(course: Path, out: Path) -> None:
+    """Take the rights of others away from what earlier runs, or nbgrader, may have left open."""
+    for folder in (out, *(path for path in out.rglob("*") if path.is_dir()), course / "autograded"):
+        if folder.is_dir():
+            folder.chmod(0o700)
+    (course / "gradebook.db").chmod(0o600)

@@ -1,18 +1,23 @@
-"""What a worker sees and may use: bubblewrap around it, limits inside, and nothing but Python and a few packages.
+"""What an answer sees and may use: bubblewrap around it, limits inside, and nothing but Python and a few packages.
 
-In the sandbox there are the interpreter, the standard library, the packages that answers may use, the worker's own
-file and an empty /tmp of limited size: no course, no labkit, no home, no /proc, no network, and no other process.
-Where the caller is root, the worker becomes another user; elsewhere it has a user namespace of its own.
+In the sandbox there are the interpreter, the standard library, the packages that answers may use and the worker's own
+file, all of it read-only: no course, no labkit, no home, no /proc, no network, and no other process that it could
+reach. A server in it loads the packages once; each answer runs in a child of its own (`worker`). Where the caller is
+root, the child becomes another user; elsewhere the sandbox has a user namespace of its own.
 """
 
+import base64
+import collections
 import functools
 import itertools
 import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -23,7 +28,7 @@ from labkit.support.packages import requirements
 
 PACKAGES = "/packages"
 LOADERS = ("/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1")
-FIRST_UID, UIDS = 61184, 4000  # of systemd's range for short-lived users: never a person's
+FIRST_UID, UIDS, UIDS_OF_ONE = 61184, 4000, 50  # of systemd's range for short-lived users: never a person's
 ENVIRONMENT = {
     "HOME": "/tmp",
     "LANG": "C.UTF-8",
@@ -33,70 +38,185 @@ ENVIRONMENT = {
     "TMPDIR": "/tmp",
 }
 NO_SANDBOX = "graded WITHOUT a sandbox: a submission could read and change anything here, grades and this file included"
+FAREWELL_S = 10.0  # for the server to kill a child
 counter = itertools.count(os.getpid())
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What one worker may use. Seconds are of the clock; MB of memory are address space, with torch or without it."""
+    """What one answer may use. Seconds are of the clock; MB of memory are address space, with torch or without it.
+
+    case_s: for one call; question_s: for all cases of a question.
+    """
 
     start_s: float = 120.0
     case_s: float = 10.0
-    submission_s: float = 60.0
+    question_s: float = 20.0
     memory_mb: int = 1024
     torch_memory_mb: int = 3072
     file_mb: int = 16
-    tmp_mb: int = 64
     threads: int = 32
 
 
-def start(packages: Sequence[str], limits: Limits, unsafe: bool = False) -> Worker:
-    """Start a worker that has loaded some packages, and has no others. unsafe: as a plain process.
+def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
+    """What the worker's program is told, as its argument."""
+    return json.dumps(
+        {
+            "first_uid": None if os.getuid() else FIRST_UID + next(counter) * UIDS_OF_ONE % UIDS,
+            "uids": UIDS_OF_ONE,
+            "path": site_folders() if unsafe else [PACKAGES],
+            "load": list(packages),
+            "only": list(allowed_roots(packages)) if unsafe else None,
+            "memory": (limits.torch_memory_mb if "torch" in packages else limits.memory_mb) << 20,
+            "file_size": limits.file_mb << 20,
+            "threads": None if unsafe else limits.threads,
+            "cpu_s": int(limits.question_s) + 5,
+            "filter": "" if unsafe else base64.b64encode(seccomp.program()).decode(),
+        }
+    )
+
+
+class Server:
+    """A sandbox with some packages loaded, in which `fork` starts a fresh child for each answer, one at a time."""
+
+    def __init__(self, packages: Sequence[str], limits: Limits):
+        self.packages, self.limits = tuple(packages), limits
+        ours, theirs = socket.socketpair()
+        with theirs:
+            command = [*bubblewrap(self.packages), options_for(packages, limits, unsafe=False)]
+            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            self.process = subprocess.Popen(command, stdin=theirs, **quiet)
+        self.control = ours
+        if not self.hears(b"r", limits.start_s):
+            self.close()
+            raise ValueError(f"sandbox: a worker with {', '.join(packages)} does not start")
+
+    def hears(self, word: bytes, seconds: float) -> bool:
+        """Whether the server says a word in time."""
+        self.control.settimeout(seconds)
+        with suppress(OSError):
+            return self.control.recv(1) == word
+        return False
+
+    def fork(self) -> Worker:
+        """Start a child that has the packages and the limits, and has run nothing yet."""
+        requests, to_child = os.pipe()
+        from_child, replies = os.pipe()
+        try:
+            socket.send_fds(self.control, [b"f"], [requests, replies])
+        except OSError:
+            self.close()
+        finally:
+            os.close(requests)
+            os.close(replies)
+        return Worker(os.fdopen(to_child, "wb"), os.fdopen(from_child, "rb"), self.kill)
+
+    def kill(self) -> None:
+        """Kill the child; kill the whole sandbox if the server does not say in time that the child is dead."""
+        with suppress(OSError):
+            self.control.send(b"k")
+        if not self.hears(b"d", FAREWELL_S):
+            self.close()
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can still fork."""
+        return self.process.poll() is None
+
+    def close(self) -> None:
+        """End the sandbox and everything in it."""
+        self.process.kill()
+        self.control.close()
+        self.process.wait()
+
+
+class Servers:
+    """Servers that wait for the next answer, by packages and limits; threads take them and give them back."""
+
+    def __init__(self):
+        self.idle: dict[tuple, collections.deque[Server]] = collections.defaultdict(collections.deque)
+
+    def take(self, packages: Sequence[str], limits: Limits) -> Server:
+        """Give a server that is idle, or start one."""
+        idle = self.idle[tuple(packages), limits]
+        while True:
+            try:
+                server = idle.pop()
+            except IndexError:
+                return Server(packages, limits)
+            if server.alive:
+                return server
+            server.close()
+
+    def give_back(self, server: Server) -> None:
+        """Keep a server for the next answer, unless it has ended."""
+        if server.alive:
+            self.idle[server.packages, server.limits].append(server)
+        else:
+            server.close()
+
+    def close(self) -> None:
+        """End all servers that are idle."""
+        for idle in self.idle.values():
+            while idle:
+                idle.pop().close()
+
+
+servers = Servers()
+
+
+@contextmanager
+def fresh_worker(packages: Sequence[str], limits: Limits, unsafe: bool = False) -> Iterator[Worker]:
+    """A worker in which no answer has run yet; it is killed at the end. unsafe: as a plain process.
 
     Raises ValueError if no sandbox can be made here, or if the packages do not load in it.
     """
-    options = {
-        "uid": None if unsafe or os.getuid() else FIRST_UID + next(counter) % UIDS,
-        "path": site_folders() if unsafe else [PACKAGES],
-        "load": list(packages),
-        "only": list(allowed_roots(packages)) if unsafe else None,
-        "memory": (limits.torch_memory_mb if "torch" in packages else limits.memory_mb) << 20,
-        "file_size": limits.file_mb << 20,
-        "threads": None if unsafe else limits.threads,
-        "cpu_s": int(limits.submission_s) + 5,
-    }
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     if unsafe:
-        command = [sys.executable, "-I", "-B", worker.__file__, json.dumps(options)]
-        process = subprocess.Popen(command, **pipes, cwd=tempfile.gettempdir(), env=dict(ENVIRONMENT))
-    else:
-        reading, writing = os.pipe()
-        try:
-            os.write(writing, seccomp.program())
-            os.close(writing)
-            command = [*bubblewrap(tuple(packages), limits.tmp_mb << 20, reading), json.dumps(options)]
-            process = subprocess.Popen(command, **pipes, pass_fds=(reading,))
-        finally:
-            os.close(reading)
-    started = Worker(process)
+        with plain_worker(packages, limits) as started:
+            yield started
+        return
+    server = servers.take(packages, limits)
+    try:
+        with server.fork() as started:
+            started.greet(limits.start_s)
+            yield started
+    finally:
+        servers.give_back(server)
+
+
+def plain_worker(packages: Sequence[str], limits: Limits) -> Worker:
+    """Start a worker without any sandbox, a process of its own."""
+    process = subprocess.Popen(
+        [sys.executable, "-I", "-B", worker.__file__, options_for(packages, limits, unsafe=True)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        cwd=tempfile.gettempdir(),
+        env=dict(ENVIRONMENT),
+    )
+
+    def kill() -> None:
+        process.kill()
+        process.wait()
+
+    started = Worker(process.stdin, process.stdout, kill)
     try:
         started.greet(limits.start_s)
-    except WorkerLost as lost:
-        raise ValueError(f"sandbox: a worker with {', '.join(packages)} does not start: {lost.problem.says}") from None
+    except WorkerLost:
+        raise ValueError(f"a worker with {', '.join(packages)} does not start") from None
     return started
 
 
 def probe(packages: Sequence[str], limits: Limits) -> None:
-    """Start a worker to see whether the sandbox works here; raises bwrap.NoSandbox, a ValueError with a remedy."""
+    """Start a server to see whether the sandbox works here; raises bwrap.NoSandbox, a ValueError with a remedy."""
     bwrap.executable()
-    start(packages, limits).close()
+    servers.give_back(servers.take(packages, limits))
 
 
-def bubblewrap(packages: tuple[str, ...], tmp_bytes: int, filter_fd: int) -> list[str]:
+def bubblewrap(packages: tuple[str, ...]) -> list[str]:
     """The command line up to the worker's file; its options follow."""
     python, shown = shown_files(packages)
     command = [bwrap.executable(), *bwrap.namespaces(), "--clearenv", "--hostname", "sandbox"]
-    command += ["--seccomp", str(filter_fd)]
     for name, value in ENVIRONMENT.items():
         command += ["--setenv", name, value]
     made = set()
@@ -109,7 +229,7 @@ def bubblewrap(packages: tuple[str, ...], tmp_bytes: int, filter_fd: int) -> lis
             command += ["--size", "4096", "--tmpfs", place, "--remount-ro", place]
         else:
             command += ["--dev-bind" if place.startswith("/dev/") else "--ro-bind", source, place]
-    command += ["--perms", "1777", "--size", str(tmp_bytes), "--tmpfs", "/tmp", "--chdir", "/tmp", "--remount-ro", "/"]
+    command += ["--perms", "0755", "--dir", "/tmp", "--chdir", "/tmp", "--remount-ro", "/"]
     return [*command, python, "-I", "-S", "-B", "/worker.py"]
 
 

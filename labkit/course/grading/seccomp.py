@@ -1,8 +1,9 @@
-"""The system calls that a worker is refused, as the filter program that the kernel takes (seccomp, classic BPF).
+"""The system calls that an answer is refused, as the filter program that the kernel takes (seccomp, classic BPF).
 
-Namespaces and limits leave three ways to use up a machine: more processes, memory that belongs to no process (shared
-memory segments, file systems of a new user namespace), and the kernel's less trodden corners. Answers need none of
-these, so they fail here with EPERM. Threads stay allowed.
+Namespaces and limits leave some ways to use up a machine: more processes, memory that belongs to no process (shared
+memory segments, file systems of a new user namespace), and the kernel's less trodden corners. Others would let one
+answer leave something for the next in the same sandbox: signals and limits of other processes, and sockets, whose
+ports stay in use for a minute. Answers need none of these, so they fail here with EPERM. Threads stay allowed.
 """
 
 import errno
@@ -40,7 +41,29 @@ REFUSED = {
     "perf_event_open": (298, 241),
     "io_uring_setup": (425, 425),
     "userfaultfd": (323, 282),
+    "kill": (62, 129),
+    "tkill": (200, 130),
+    "tgkill": (234, 131),
+    "rt_sigqueueinfo": (129, 138),
+    "rt_tgsigqueueinfo": (297, 240),
+    "pidfd_open": (434, 434),
+    "pidfd_getfd": (438, 438),
+    "pidfd_send_signal": (424, 424),
+    "process_madvise": (440, 440),
+    "process_mrelease": (448, 448),
+    "kcmp": (312, 272),
+    "setpriority": (141, 140),
+    "ioprio_set": (251, 30),
+    "sched_setaffinity": (203, 122),
+    "sched_setscheduler": (144, 119),
+    "sched_setparam": (142, 118),
+    "sched_setattr": (314, 274),
+    "migrate_pages": (256, 238),
+    "move_pages": (279, 239),
+    "socket": (41, 198),
+    "syslog": (103, 116),
 }
+PRLIMIT = (302, 261)  # refused for any process but the own one, which has the number 0 here
 CLONE, CLONE3 = (56, 220), (435, 435)
 CLONE_THREAD = 0x00010000
 X32_CALLS = 0x40000000  # the x32 calls of an x86-64 kernel: other numbers for the same things
@@ -71,6 +94,8 @@ def program(machine: str | None = None) -> bytes:
     for numbers in REFUSED.values():
         if numbers[column] is not None:
             lines += [(JUMP_IF_EQUAL, 0, 1, numbers[column]), (RETURN, 0, 0, refuse(errno.EPERM))]
+    lines += [(JUMP_IF_EQUAL, 0, 4, PRLIMIT[column]), (LOAD, 0, 0, FIRST_ARGUMENT), (JUMP_IF_EQUAL, 0, 1, 0)]
+    lines += [(RETURN, 0, 0, ALLOW), (RETURN, 0, 0, refuse(errno.EPERM))]
     # The flags of clone3 are in memory, where a filter cannot look; told that there is no such call, libc uses clone.
     lines += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, refuse(errno.ENOSYS))]
     lines += [(JUMP_IF_EQUAL, 1, 0, CLONE[column]), (RETURN, 0, 0, ALLOW), (LOAD, 0, 0, FIRST_ARGUMENT)]
