@@ -96,8 +96,19 @@ def write(path: Path, content: dict) -> None:
     path.write_text(json.dumps(content))
 
 
+@functools.cache
+def _right_answers(topic: str) -> dict[str, str]:
+    cells = {name: [as_cell(a, name) for a in alternatives(q)] for name, q in of_topic(topic).items()}
+    return {name: next(cell for cell in written if "torch" not in cell) for name, written in cells.items()}
+
+
 def right_answers(topic: str) -> dict[str, str]:
-    """The reference of each question, as a student would write it."""
+    """An answer to each question that is right, and not the kit's own."""
+    return dict(_right_answers(topic))
+
+
+def copied_answers(topic: str) -> dict[str, str]:
+    """The reference of each question."""
     return {name: as_cell(question.reference, name) for name, question in of_topic(topic).items()}
 
 
@@ -228,7 +239,7 @@ def synthetic_class(topic: str) -> dict[str, tuple[dict[str, str], dict[str, boo
     other = {name: [as_cell(a, name) for a in alternatives(q)] for name, q in questions.items()}
     for cells in other.values():
         cells.sort(key=lambda cell: "torch" not in cell)  # torch takes a second to load: all of it in one submission
-    students = {"reference": (right, dict.fromkeys(right, True))}
+    students = {"reference": (copied_answers(topic), dict.fromkeys(right, True))}
     for kind, answers, is_right in (("misconception", wrong, False), ("alternative", other, True)):
         for i in range(max(map(len, answers.values()))):
             cells = {name: given[i] if i < len(given) else right[name] for name, given in answers.items()}

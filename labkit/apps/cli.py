@@ -5,6 +5,7 @@ input may raise ValueError or OSError anywhere below: `main` says it in one line
 """
 
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -268,7 +269,10 @@ def grade(
     submissions: Annotated[
         Path | None, typer.Option(help="Folder of STUDENT/TOPIC/TOPIC.ipynb; COURSE/submitted if not given.")
     ] = None,
-    seed: Annotated[str | None, typer.Option(help="Secret seed of the cases; drawn once, and kept in OUT.")] = None,
+    seed: Annotated[str | None, typer.Option(help="Secret seed of a round; drawn if not given; kept in OUT.")] = None,
+    new_round: Annotated[
+        bool, typer.Option("--new-round", help="Take another seed, and grade everybody with it; else late work joins.")
+    ] = False,
     workers: Annotated[int | None, typer.Option(help="Submissions at a time; one a core if not given.", min=1)] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
     course: Annotated[Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.")] = Path("."),
@@ -287,8 +291,10 @@ def grade(
 
     workers = workers or os.cpu_count() or 1
     how = {"workers": workers, "dask": dask, "force": force, "unsafe": unsafe}
-    graded = grade_course(topic, course, submissions, out, seed, **how)
+    graded = grade_course(topic, course, submissions, out, seed, new_round, **how)
     typer.echo(terminal_table(graded.lab, graded.records))
+    for student, failure in graded.failures.items():
+        typer.echo(f"{student}: {failure}", err=True)
     folder = out or course / "grades" / topic
     typer.echo(f"{len(graded.records)} students, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
     if unsafe:
@@ -300,11 +306,12 @@ def main() -> None:
     """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
     try:
         app(prog_name="labkit")
-    except (ValueError, OSError, ModuleNotFoundError) as error:
-        if "--debug" in sys.argv:
-            raise
-        print(f"labkit: {one_line(error)}", file=sys.stderr)
-        sys.exit(2)
+    except Exception as error:
+        if "--debug" in sys.argv or not isinstance(error, ValueError | OSError | ModuleNotFoundError):
+            traceback.print_exc()
+        else:
+            print(f"labkit: {one_line(error)}", file=sys.stderr)
+        sys.exit(2)  # not 1: by that commands say that something needs a look
 
 
 def one_line(error: Exception) -> str:

@@ -1,7 +1,7 @@
 """Submissions that are odd as files or as notebooks, with what should become of them.
 
 Each is a function that writes into a student's folder of 04_iou, and what is expected: a reason for which the whole
-submission is not graded, or the points of the question iou, the others being right.
+submission is not graded (its beginning), or whether iou is right, as the others are.
 """
 
 import copy
@@ -22,7 +22,7 @@ class Odd:
     name: str
     write: Callable[[Path, dict], None]
     reason: str = ""
-    points: float = 0.0
+    right: bool = False
     says: str = ""
 
 
@@ -112,6 +112,16 @@ def other_name(folder: Path, right: dict) -> None:
     (folder / "iou (1).ipynb").write_text(json.dumps(right))
 
 
+def with_time(text: str) -> Callable[[Path, dict], None]:
+    """Right answers that were handed in at a time of the student's making."""
+
+    def write(folder: Path, right: dict) -> None:
+        plain(folder, right)
+        (folder / "timestamp.txt").write_text(text)
+
+    return write
+
+
 def plain(folder: Path, right: dict) -> None:
     put(folder, json.dumps(right).encode())
 
@@ -124,14 +134,32 @@ ODD = (
     Odd("two_hundred_megabytes", sparse, "it is larger than 20 MB"),
     Odd("loose.ipynb", loose, "not in a student's folder; expected STUDENT/04_iou/04_iou.ipynb"),
     Odd("other_name", other_name, "the folder 04_iou holds no 04_iou.ipynb"),
-    Odd("line\nbreak", plain, "the student's folder has a name that is too long, not UTF-8 or not printable"),
-    Odd("long" * 50, plain, "the student's folder has a name that is too long, not UTF-8 or not printable"),
-    Odd("no_utf8_\udcff", plain, "the student's folder has a name that is too long, not UTF-8 or not printable"),
+    *(
+        Odd(name, plain, "rename the student's folder")
+        for name in (
+            "line\nbreak",
+            "long" * 50,
+            "no_utf8_\udcff",
+            "no_utf8_\\xff",  # what the one before would be written as
+            "odd-name-0123456789ab",  # what a page of an odd name might be called
+            "\x1b]0;a terminal's title\x07",
+            "right\u202eot left",
+            "<script>alert(1)<script>",
+            "x' onmouseover='alert(1)",
+            "ada;=1+1",
+        )
+    ),
     Odd("nothing", as_bytes(b""), "it is not JSON, so not a notebook"),
     Odd("half", as_bytes(b'{"cells": [{"cell_type": "code", "sou'), "it is not JSON, so not a notebook"),
     Odd("nested", as_bytes(b"[" * 200_000), "it is not JSON, so not a notebook"),
     Odd("long_number", as_bytes(b"1" * 1_000_000), "it is not JSON, so not a notebook"),
     Odd("utf16", lambda folder, right: put(folder, json.dumps(right).encode("utf-16")), "it is not UTF-8 text"),
+    Odd(
+        "many_empty_cells",
+        as_bytes(b'{"cells": [' + b"[]," * 6_000_000 + b"1]}"),
+        "it holds more than 1,000,000 values",
+    ),
+    Odd("many_cells", as_bytes(b'{"cells": [' + b"{}," * 6_000 + b"{}]}"), "it has more than 5,000 cells"),
     Odd("list", as_bytes(b"[]"), "it is not a notebook of format 4: there is no list of cells"),
     Odd(
         "format_3",
@@ -142,24 +170,29 @@ ODD = (
     Odd(
         "no_cells", as_notebook(lambda cells: [1, None, {}, []]), "it is not this lab: no cell has a grade id of 04_iou"
     ),
-    Odd("=HYPERLINK(1)", plain, points=2.0),
-    Odd("<script>alert(1)<script>", plain, points=2.0),
-    Odd("Zoë Ångström", plain, points=2.0),
-    Odd("byte_order_mark", lambda folder, right: put(folder, json.dumps(right).encode("utf-8-sig")), points=2.0),
-    Odd("other_order", as_notebook(lambda cells: cells[::-1]), points=2.0),
+    Odd("=HYPERLINK(1)", plain, right=True),
+    Odd("Zoë Ångström", plain, right=True),
+    *(
+        Odd(f"time_{i}", with_time(text), right=True)
+        for i, text in enumerate(
+            ("9" * 90, "99999-01-01", "0001-01-01", "1e308", "-1", "9999-12-31 23:59 -23:00", "\0")
+        )
+    ),
+    Odd("byte_order_mark", lambda folder, right: put(folder, json.dumps(right).encode("utf-8-sig")), right=True),
+    Odd("other_order", as_notebook(lambda cells: cells[::-1]), right=True),
     Odd(
         "list_of_lines",
         as_notebook(
             lambda cells: cell(cells, "iou").update(source=cell(cells, "iou")["source"].splitlines(keepends=True))
         ),
-        points=2.0,
+        right=True,
     ),
     Odd(
         "magics",
         as_notebook(
             lambda cells: cell(cells, "iou").update(source="%matplotlib inline\n" + cell(cells, "iou")["source"])
         ),
-        points=2.0,
+        right=True,
     ),
     Odd(
         "check_in_the_cell",
@@ -168,9 +201,9 @@ ODD = (
                 source=cell(cells, "iou")["source"] + '\niou = check("04_iou.iou", iou)\n'
             )
         ),
-        points=2.0,
+        right=True,
     ),
-    Odd("same_cell_twice", as_notebook(doubled(None)), points=2.0),
+    Odd("same_cell_twice", as_notebook(doubled(None)), right=True),
     Odd("two_answers", as_notebook(doubled(WRONG)), says="2 different cells have its grade id"),
     Odd("cell_removed", as_notebook(lambda cells: cells.remove(cell(cells, "iou"))), says="its cell is missing"),
     Odd("raw_cell", with_iou(cell_type="raw"), says="its cell is not a code cell with source"),

@@ -1,7 +1,7 @@
 """Grading: a student's answers run in a sandbox that holds nothing worth stealing, and are judged outside it.
 
 reading    a released lab and the submissions of it, read as data of strangers
-sandbox    what a worker sees and may use: bubblewrap, `seccomp`, limits
+sandbox    what an answer sees and may use: bubblewrap, `seccomp`, limits, a fresh process
 bwrap      which bubblewrap there is, and why it does not work where it does not
 worker     the program in the sandbox: takes cells and arguments, sends numbers back
 channel    the other end: sends, waits until a deadline, and takes nothing but numbers

@@ -1,7 +1,7 @@
 """The grader's end of a worker's pipes: requests out, replies in until a deadline; nothing that comes is believed.
 
-A reply is a number of bytes with a limit, a letter, and then numbers or a short word of known ones: never a pickle,
-never text of the student's own, so that nothing of the secret inputs finds its way into the feedback either.
+A reply is a number of bytes with a limit, a letter, and then numbers or a short printable text: never a pickle. Texts
+of replies to secret cases are for nobody to read: what students are told comes from public cases (`grade`).
 """
 
 import builtins
@@ -12,14 +12,23 @@ import re
 import struct
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
 
-from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_PARTS, ONE
+from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_MESSAGE, MOST_PARTS, ONE
 from labkit.course.questions.judge import Problem
 
 KINDS = {"c": "complex numbers", "O": "objects", "U": "text", "S": "bytes", "M": "dates", "m": "spans of time"}
+
+
+@dataclass(frozen=True)
+class Changed:
+    """An output of a call that changed one of its arguments, the one at this position."""
+
+    position: int
+    value: object
 
 
 class WorkerLost(Exception):
@@ -121,9 +130,11 @@ def decode(reply: bytes) -> object:
     letter, rest = reply[:1], reply[1:]
     if letter == b"V":
         return decode_values(rest)
+    if letter == b"C" and rest[1:2] == b"V":
+        return Changed(rest[0], decode_values(rest[2:]))
     if letter == b"E" and len(rest) >= 4:
         (line,) = struct.unpack("<I", rest[:4])
-        return Problem("exception", f"it raises {exception_name(rest[4:])}", ((line, ""),))
+        return Problem("exception", f"it raises {exception_text(rest[4:])}", ((line, ""),))
     if letter in (b"K", b"M", b"D"):
         return worded(letter, rest.decode("ascii", "replace"))
     fixed = {
@@ -151,11 +162,13 @@ def worded(letter: bytes, word: str) -> Problem:
     return Problem("kind", f"expected an array or a number, got {named}")
 
 
-def exception_name(name: bytes) -> str:
-    """The name of one of Python's own exceptions; any other is "an exception"."""
-    word = name.decode("ascii", "replace")
-    known = getattr(builtins, word, None)
-    return word if isinstance(known, type) and issubclass(known, BaseException) else "an exception"
+def exception_text(data: bytes) -> str:
+    """Name and message of an exception; the name of one of Python's own, any other is "an exception"."""
+    name, _, message = data.decode("utf-8", "replace")[: MOST_MESSAGE + 60].partition("\0")
+    known = getattr(builtins, name, None)
+    name = name if isinstance(known, type) and issubclass(known, BaseException) else "an exception"
+    message = "".join(c if c.isprintable() else " " for c in message).strip()
+    return f"{name}: {message}" if message else name
 
 
 def decode_values(data: bytes) -> object:

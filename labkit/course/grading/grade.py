@@ -1,33 +1,42 @@
-"""Grading one submission: each question on its secret cases, in a sandbox, whatever happens in the others.
+"""Grading one submission: each question in a process of its own, on secret cases first.
 
-Cases and expected outputs stay in this process; the worker gets the arguments of one case at a time. A worker that
-hangs, crashes or floods costs the question that it was busy with, and the others go on in a new one.
+Cases and expected outputs stay in this process; a worker gets the arguments of one case at a time. Secret cases decide
+the points and nothing else: what a student reads about a wrong answer comes from a second run, in another fresh worker,
+on the public cases that `check` uses. So nothing that an answer does with secret inputs can reach a student.
 """
 
 import functools
 import hashlib
+import pickle
 import re
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from labkit.course.grading import sandbox
-from labkit.course.grading.channel import Worker, WorkerLost
+import numpy as np
+
+from labkit.course.checking import PUBLIC_SEED
+from labkit.course.grading import copies, sandbox
+from labkit.course.grading.channel import Changed, Worker, WorkerLost
 from labkit.course.grading.reading import Lab, Submission, imported_roots
 from labkit.course.grading.sandbox import Limits
-from labkit.course.questions.judge import Case, Problem, Verdict, expected_cases, verdict
+from labkit.course.questions.judge import Case, Problem, Verdict, expected_cases, parts, verdict
 from labkit.course.questions.question import Question, of_topic
 
 ON_DEMAND = ("scipy", "torch")  # they take long to load, so only where an answer names them
-LONGEST_SHAPE = 24  # characters
 LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at
+ONLY_HIDDEN = (
+    "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
+)
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a question earned. says: what was right or wrong, without any expected value; hint: of a misconception;
+    """What a question earned. says: what was right or wrong, from public cases; hint: of a misconception.
 
-    flag: what the instructor should look at, "" if nothing.
+    flag: what the instructor should look at, "" if nothing. behaviour: the same for answers that give the same wrong
+    outputs, "" for a right one and for none.
     """
 
     question: str
@@ -36,6 +45,7 @@ class Result:
     says: str
     hint: str = ""
     flag: str = ""
+    behaviour: str = ""
 
 
 def grade_submission(
@@ -46,115 +56,136 @@ def grade_submission(
     secret: what the random cases are drawn from; the same gives the same cases. unsafe: without a sandbox.
     Raises ValueError if no sandbox can be made, or if the lab's own setup cell does not run in it.
     """
-    questions = of_topic(lab.topic)
-    limits = Limits() if limits is None else limits
-    end = time.monotonic() + limits.submission_s
-    groups: dict[tuple[str, ...], list[str]] = {}
-    for name in submission.cells:
-        if name in lab.answers:
-            groups.setdefault(packages_for(questions[name], lab, submission), []).append(name)
-    judged = {}
-    for packages, names in groups.items():
-        with Session(lab, submission, packages, limits, end, unsafe) as session:
-            for name in names:
-                cases = secret_cases(questions[name], secret)
-                judged[name] = result(lab, submission, questions[name], cases, session.outputs(name, cases))
-    return [judged.get(name) or not_graded(lab, name, submission.problems[name]) for name in lab.answers]
+    questions, limits = of_topic(lab.topic), limits or Limits()
+    runs = {name: Run(lab, submission, questions[name], limits, unsafe) for name in lab.answers}
+    return [
+        grade_question(runs[name], secret) if name in submission.cells else not_graded(lab, name, submission)
+        for name in lab.answers
+    ]
 
 
-def packages_for(question: Question, lab: Lab, submission: Submission) -> tuple[str, ...]:
-    """The packages that there are for a question: NumPy, what the lab's setup imports, and of ON_DEMAND what is named.
+def grade_question(run: "Run", secret: str) -> Result:
+    """Judge an answer on the secret cases, and say what is wrong with a wrong one by the public cases."""
+    question, source = run.question, run.submission.cells[run.question.function]
+    name, worth = question.function, run.lab.points[question.function]
+    hidden, _ = run.judged(cases_of(question, secret))
+    flags = [f"names {word}" for word in named_modules(source, question) if not named(word, run.lab.answers[name])]
+    flags += copies.found_in(source, question)
+    if hidden.problem is None:
+        return Result(
+            name, worth, worth, f"right in all {len(cases_of(question, secret))} cases", flag="; ".join(flags)
+        )
+    if hidden.problem.kind in LOOK_AT:
+        flags.append(hidden.problem.says)
+    public, outputs = run.judged(cases_of(question, None))
+    if public.problem is None:
+        return Result(name, 0.0, worth, ONLY_HIDDEN, flag="; ".join(flags), behaviour="wrong in secret cases only")
+    problem = with_line(public.problem, source)
+    blank = problem.kind == "unanswered"
+    says = problem.says if blank or problem.kind == "missing" else f"{problem.says} ({public.where})"
+    return Result(name, 0.0, worth, says, public.hint or "", "; ".join(flags), "" if blank else behaviour_of(outputs))
 
-    What the question forbids is left out, whole. Everything else is absent in any case.
-    """
-    answers = " ".join(submission.cells.get(name, "") for name in lab.answers)
-    wanted = {*imported_roots(lab.setup), *(package for package in ON_DEMAND if package in answers)}
-    forbidden = {name.partition(".")[0] for name in question.forbidden}
-    if not forbidden.isdisjoint(imported_roots(lab.setup)):
-        raise ValueError(f"{question.name}: forbids what its lab's setup cell imports, {', '.join(sorted(forbidden))}")
-    return tuple(sorted(wanted - forbidden))
+
+def not_graded(lab: Lab, name: str, submission: Submission) -> Result:
+    """The result of a question whose cell cannot be read."""
+    problem = submission.problems[name]
+    return Result(name, 0.0, lab.points[name], problem, flag=problem)
 
 
-@functools.lru_cache(maxsize=64)
-def _cases(topic: str, function: str, secret: str) -> tuple[Case, ...]:
-    question = of_topic(topic)[function]
-    seed = hashlib.sha256(f"{secret}\0{question.name}".encode()).digest()
-    return tuple(expected_cases(question, int.from_bytes(seed, "little")))
+# ------------------------------------------------------------------------------------------------ the cases
 
 
-def secret_cases(question: Question, secret: str) -> tuple[Case, ...]:
-    """The cases of a question that belong to a secret; computed once in a process."""
+def cases_of(question: Question, secret: str | None) -> tuple[Case, ...]:
+    """The cases of a question that belong to a secret, or the public ones; computed once in a process."""
     return _cases(question.topic, question.function, secret)
 
 
-class Session:
-    """A submission's cells in a worker, and in another one when that is lost. A context manager."""
+@functools.lru_cache(maxsize=64)
+def _cases(topic: str, function: str, secret: str | None) -> tuple[Case, ...]:
+    question, seed = of_topic(topic)[function], PUBLIC_SEED
+    if secret is not None:
+        seed = int.from_bytes(hashlib.sha256(f"{secret}\0{question.name}".encode()).digest(), "little")
+    return tuple(expected_cases(question, seed))
 
-    def __init__(
-        self, lab: Lab, submission: Submission, packages: tuple[str, ...], limits: Limits, end: float, unsafe: bool
-    ):
-        self.lab, self.submission, self.packages, self.unsafe = lab, submission, packages, unsafe
-        self.limits, self.end = limits, end
-        self.worker: Worker | None = None
-        self.cell_problems: dict[str, Problem] = {}
-        self.fatal: set[str] = set()  # cells that cost a worker: they are not run again
 
-    def __enter__(self) -> "Session":
-        return self
+# ---------------------------------------------------------------------------------------------- running it
 
-    def __exit__(self, *exception) -> None:
-        if self.worker is not None:
-            self.worker.close()
 
-    def outputs(self, name: str, cases: Sequence[Case]) -> list[object]:
-        """Call a function on the arguments of all cases: an output or a Problem for each.
+@dataclass(frozen=True)
+class Run:
+    """An answer to a question, and all that is needed to run it in a fresh worker."""
 
-        After a case that cost the worker, this function is not called again.
+    lab: Lab
+    submission: Submission
+    question: Question
+    limits: Limits
+    unsafe: bool
+
+    def judged(self, cases: Sequence[Case]) -> tuple[Verdict, list[object]]:
+        """The verdict on some cases, with the outputs; outputs that cannot even be compared are wrong."""
+        outputs = self.outputs(cases)
+        changed = frozenset(output.position for output in outputs if isinstance(output, Changed))
+        values = [output.value if isinstance(output, Changed) else output for output in outputs]
+        try:
+            judged = verdict(self.question, cases, values, changed)
+        except Exception as error:
+            problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
+            return Verdict(problem, 0, "some case", None, ()), values
+        if judged.passed and changed:
+            judged = replace(judged, problem=Problem("altered", judged.notes[0]), case=0, where="some case")
+        return judged, values
+
+    def outputs(self, cases: Sequence[Case]) -> list[object]:
+        """Call the answer on the arguments of all cases: an output or a Problem for each.
+
+        After a case that cost the worker, the answer is not called again.
         """
-        outputs = []
-        for case in cases:
-            try:
-                self.make_ready()
-                if name in self.fatal:
-                    raise WorkerLost(self.cell_problems[name])
-                output = self.worker.ask(("call", name, case.args), self.time_left())
-            except WorkerLost as lost:
-                if self.worker is not None and self.worker.process.returncode is not None:
-                    self.worker = None
-                return outputs + [lost.problem] * (len(cases) - len(outputs))
-            if isinstance(output, Problem) and output.kind == "missing":
-                output = self.cell_problems.get(name, output)
-            outputs.append(output)
+        outputs, end, name = [], time.monotonic() + self.limits.question_s, self.question.function
+        try:
+            with sandbox.fresh_worker(self.packages(), self.limits, self.unsafe) as worker:
+                run_setup(worker, self.lab, self.limits)
+                problem = self.run_cells(worker, end)
+                for case in cases:
+                    output = worker.ask(("call", name, pickle.dumps(case.args)), self.time_left(end))
+                    missing = isinstance(output, Problem) and output.kind == "missing"
+                    outputs.append(problem if missing and problem is not None else output)
+        except WorkerLost as lost:
+            outputs += [lost.problem] * (len(cases) - len(outputs))
         return outputs
 
-    def make_ready(self) -> None:
-        """See to it that there is a worker in which the setup and all cells were run that can be."""
-        while self.worker is None:
-            self.time_left()
-            worker = sandbox.start(self.packages, self.limits, self.unsafe)
-            self.worker = self.run_cells(worker)
+    def run_cells(self, worker: Worker, end: float) -> Problem | None:
+        """Run the answer's cell after those of the answers that it names; what is wrong with it, None if nothing."""
+        done = None
+        for name in self.needed(self.question.function):
+            done = worker.ask(("cell", name, self.submission.cells[name]), self.time_left(end))
+        return done if isinstance(done, Problem) else None
 
-    def run_cells(self, worker: Worker) -> Worker | None:
-        """Run the setup and the cells; None if one of them cost the worker, which is remembered."""
-        run_setup(worker, self.lab, self.limits)
-        for name in self.lab.answers:
-            if name not in self.submission.cells or name in self.fatal:
-                continue
-            try:
-                done = worker.ask(("cell", name, self.submission.cells[name]), self.time_left())
-            except WorkerLost as lost:
-                self.fatal.add(name)
-                self.cell_problems[name] = lost.problem
-                return None
-            if isinstance(done, Problem):
-                self.cell_problems[name] = done
-        return worker
+    def needed(self, name: str) -> list[str]:
+        """An answer, last, and the answers that it names, and so on; in the lab's order."""
+        found, waiting = {name}, [name]
+        while waiting:
+            source = self.submission.cells[waiting.pop()]
+            more = {other for other in self.lab.answers if other in self.submission.cells and named(other, source)}
+            waiting += more - found
+            found |= more
+        return [other for other in self.lab.answers if other in found - {name}] + [name]
 
-    def time_left(self) -> float:
-        """Seconds for the next request; raises WorkerLost when the submission has used up its time."""
-        left = self.end - time.monotonic()
+    def packages(self) -> tuple[str, ...]:
+        """NumPy, what the lab's setup imports, and of ON_DEMAND what the program names; not what is forbidden."""
+        setup = imported_roots(self.lab.setup)
+        program = " ".join(self.submission.cells[name] for name in self.needed(self.question.function))
+        wanted = {*setup, *(package for package in ON_DEMAND if package in program)}
+        forbidden = {name.partition(".")[0] for name in self.question.forbidden}
+        if not forbidden.isdisjoint(setup):
+            words = ", ".join(sorted(forbidden))
+            raise ValueError(f"{self.question.name}: forbids what its lab's setup cell imports, {words}")
+        return tuple(sorted(wanted - forbidden))
+
+    def time_left(self, end: float) -> float:
+        """Seconds for the next request; raises WorkerLost when the question has used up its time."""
+        left = end - time.monotonic()
         if left <= 0.0:
-            raise WorkerLost(Problem("time", f"the submission took more than {self.limits.submission_s:g} s in all"))
+            raise WorkerLost(Problem("time", f"all its cases together took more than {self.limits.question_s:g} s"))
         return min(left, self.limits.case_s)
 
 
@@ -165,45 +196,27 @@ def run_setup(worker: Worker, lab: Lab, limits: Limits) -> None:
     except WorkerLost as lost:
         done = lost.problem
     if done is not None:
-        worker.close()
         raise ValueError(f"{lab.topic}: its setup cell does not run where answers are graded: {done.says}")
 
 
-def result(lab: Lab, submission: Submission, question: Question, cases: Sequence[Case], outputs: list) -> Result:
-    """Judge a question's outputs and put the verdict into words and points."""
-    name, source = question.function, submission.cells[question.function]
-    judged = judged_safely(question, cases, outputs)
-    flags = [f"names {word}" for word in named_modules(source, question) if not named(word, lab.answers[name])]
-    if judged.problem is None:
-        says = f"right in all {len(cases)} cases"
-        return Result(name, lab.points[name], lab.points[name], says, flag="; ".join(flags))
-    problem = with_short_shape(with_line(judged.problem, source))
-    says = problem.says if problem.kind in ("unanswered", "missing") else f"{problem.says} ({judged.where})"
-    if problem.kind in LOOK_AT:
-        flags.append(problem.says)
-    return Result(name, 0.0, lab.points[name], says, judged.hint or "", "; ".join(flags))
+# ---------------------------------------------------------------------------------------------- in words
 
 
-def judged_safely(question: Question, cases: Sequence[Case], outputs: list) -> Verdict:
-    """The verdict; outputs that the comparison cannot even digest are wrong, and do not stop the batch."""
-    try:
-        return verdict(question, cases, outputs)
-    except Exception as error:
-        problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
-        return Verdict(problem, 0, "some case", None, ())
+def behaviour_of(outputs: Sequence[object]) -> str:
+    """A short name for wrong outputs: the same for answers that give the same, up to rounding."""
+    text = "\n".join(repr(output) if isinstance(output, Problem) else told(output) for output in outputs)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def with_short_shape(problem: Problem) -> Problem:
-    """Leave out a shape that is too long to be an honest one: many digits could tell the secret arguments."""
-    kept, got, shape = problem.says.rpartition("got ")
-    if problem.kind != "shape" or len(shape) <= LONGEST_SHAPE:
-        return problem
-    return replace(problem, says=f"{kept}{got}quite another shape")
-
-
-def not_graded(lab: Lab, name: str, problem: str) -> Result:
-    """The result of a question whose cell cannot be read."""
-    return Result(name, 0.0, lab.points[name], problem, flag=problem)
+def told(output: object) -> str:
+    """Kind, shape and rounded values of an output."""
+    found = []
+    for part in parts(output):
+        array = np.asarray(part)
+        with suppress(TypeError), np.errstate(all="ignore"):
+            array = array if array.dtype.kind == "b" else np.round(array.astype(float), 5) + 0.0
+        found.append(f"{array.shape} {array.tolist()}")
+    return "; ".join(found)
 
 
 def with_line(problem: Problem, source: str) -> Problem:

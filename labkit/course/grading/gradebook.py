@@ -20,8 +20,8 @@ from nbgrader.preprocessors import SaveCells
 from nbgrader.utils import parse_utc
 
 from labkit.course.grading.batch import Record
-from labkit.course.grading.outputs import lines_of
 from labkit.course.grading.markdown import harmless_markdown
+from labkit.course.grading.outputs import lines_of
 from labkit.course.grading.reading import Lab, Submission, grade_id, source_of
 from labkit.course.grading.sandbox import NO_SANDBOX
 from labkit.support.files import write_atomically

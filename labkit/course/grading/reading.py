@@ -151,8 +151,8 @@ def find_notebook(place: Path, topic: str) -> Path | None:
     if is_odd(place.name):
         unsafe = "".join(sorted(UNSAFE_IN_NAMES))
         raise Unreadable(
-            f"rename the student's folder, {ascii(place.name)[:LONGEST_NAME]}: expected at most {LONGEST_NAME} printable "
-            f"characters, none of {unsafe}, and no {ODD_NAME} at the beginning"
+            f"rename the student's folder, {ascii(place.name)[:LONGEST_NAME]}: expected at most {LONGEST_NAME} bytes, "
+            f"printable characters, none of {unsafe}, and no {ODD_NAME} at the beginning"
         )
     if not is_folder(place / topic, f"the folder {topic}"):
         return None

@@ -8,7 +8,8 @@ replies go out on stdout, each with its length before it; a request is a pickle 
     O                                    a cell that ran
     U                                    a blank: NotImplementedError raised in the student's own lines
     A                                    there is no function of that name
-    E line name                          an exception
+    C position ...                       an output, as above, of a call that changed its argument at that position
+    E line name message                  an exception
     M name                               a module that is not there
     K name, D kind, L, B                 a value that is no number, of a dtype that is none, too many, too big
 """
@@ -30,6 +31,7 @@ DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
 MOST_BYTES = 32 << 20
 MOST_PARTS = 16
 MOST_AXES = 8
+MOST_MESSAGE = 160  # characters of an exception's message
 ONE = 255  # the count of an output that is no tuple
 
 
@@ -83,7 +85,7 @@ def compiled(source: str, name: str):
 
 
 def answer(namespace: dict, request: tuple) -> bytes:
-    """Do what a request asks for, ("cell", name, source) or ("call", name, arguments), and write the reply."""
+    """Do what a request asks for, ("cell", name, source) or ("call", name, pickled arguments), and write the reply."""
     kind, name, content = request
     try:
         if kind == "cell":
@@ -91,7 +93,10 @@ def answer(namespace: dict, request: tuple) -> bytes:
             return b"O"
         if not callable(namespace.get(name)):
             return b"A"
-        return encode(namespace[name](*content))
+        given = pickle.loads(content)
+        reply = encode(namespace[name](*given))
+        changed = [i for i, pair in enumerate(zip(given, pickle.loads(content), strict=True)) if not same(*pair)]
+        return b"C" + bytes(changed[:1]) + reply if changed and reply[:1] == b"V" else reply
     except Refused as refusal:
         return refusal.args[0]
     except ModuleNotFoundError as error:
@@ -100,7 +105,24 @@ def answer(namespace: dict, request: tuple) -> bytes:
         line, last = own_line(error.__traceback__, f"<{name}>")
         if isinstance(error, NotImplementedError) and last:
             return b"U"
-        return b"E" + struct.pack("<I", line) + type(error).__name__.encode()[:60]
+        return b"E" + struct.pack("<I", line) + f"{type(error).__name__}\0{message_of(error)}".encode()
+
+
+def same(a: object, b: object) -> bool:
+    """Whether an argument is still what it was."""
+    if hasattr(a, "tobytes") and hasattr(b, "tobytes"):
+        return (a.shape, a.dtype) == (b.shape, b.dtype) and a.tobytes() == b.tobytes()
+    if isinstance(a, tuple | list):
+        return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
+    return bool(a == b or (a != a and b != b))
+
+
+def message_of(error: BaseException) -> str:
+    """The beginning of an exception's message in one line; "" if it cannot even be written."""
+    try:
+        return " ".join(str(error).split())[:MOST_MESSAGE]
+    except BaseException:
+        return ""
 
 
 def own_line(trace, cell: str) -> tuple[int, bool]:

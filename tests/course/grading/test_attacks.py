@@ -1,7 +1,10 @@
 """Hostile and odd submissions: none earns what it should not, none leaves anything outside, and the class is graded."""
 
 import csv
+import inspect
 import os
+import re
+import shutil
 import socket
 import time
 from pathlib import Path
@@ -11,15 +14,17 @@ import pytest
 from attacks.odd import ODD
 from attacks.table import ATTACKS
 
-from labkit.course.grading.batch import file_name
-from labkit.course.grading.reading import shown_name
+from labkit import metrics
+from labkit.course.grading import copies
+from labkit.course.grading.gradebook import opened
+from labkit.course.grading.reading import name_of
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
 from labkit.course.questions.question import of_topic
 
 TOPIC = "04_iou"
 SECRET_VARIABLE = "LABKIT_TEST_SECRET"
-LIMITS = Limits(case_s=2.0, submission_s=60.0, memory_mb=512)
+LIMITS = Limits(case_s=2.0, memory_mb=512)
 POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
 REST = sum(POINTS.values()) - POINTS["iou"]
 
@@ -90,13 +95,13 @@ def test_an_attack_earns_nothing_and_costs_nobody_else(hostile_class, attack):
 
 @pytest.mark.parametrize("odd", ODD, ids=lambda odd: ascii(odd.name)[:30])
 def test_an_odd_submission_is_graded_or_has_its_reason(hostile_class, odd):
-    record = hostile_class[2][shown_name(odd.name)]
-    assert record.reason == odd.reason
+    record = hostile_class[2][name_of(odd.name)]
+    assert record.reason.startswith(odd.reason) and bool(record.reason) == bool(odd.reason)
     if odd.reason:
         assert record.results == () and record.points == 0.0
         return
     earned = points(record)
-    assert earned.pop("iou") == odd.points and sum(earned.values()) == REST
+    assert earned.pop("iou") == POINTS["iou"] * odd.right and sum(earned.values()) == REST
     said = next(result.says for result in record.results if result.question == "iou")
     assert said.startswith(odd.says or "right in all")
 
@@ -104,11 +109,11 @@ def test_an_odd_submission_is_graded_or_has_its_reason(hostile_class, odd):
 def test_no_attack_and_no_odd_submission_is_accepted_or_rejected_falsely(hostile_class, capsys):
     records = hostile_class[2]
     accepted = [attack.name for attack in ATTACKS if points(records[attack.name])["iou"] > 0.0]
-    graded = {odd.name: points(records[shown_name(odd.name)]).get("iou", 0.0) for odd in ODD}
-    accepted += [odd.name for odd in ODD if graded[odd.name] > odd.points]
-    rejected = [odd.name for odd in ODD if graded[odd.name] < odd.points]
+    graded = {odd.name: points(records[name_of(odd.name)]).get("iou", 0.0) for odd in ODD}
+    accepted += [odd.name for odd in ODD if graded[odd.name] > 0.0 and not odd.right]
+    rejected = [odd.name for odd in ODD if graded[odd.name] == 0.0 and odd.right]
     with capsys.disabled():
-        right = sum(odd.points > 0.0 for odd in ODD)
+        right = sum(odd.right for odd in ODD)
         wrong = len(ATTACKS) + len(ODD) - right
         print(f"\n{len(ATTACKS)} attacks, {len(ODD)} odd submissions: ", end="")
         print(f"false accepts {len(accepted)} of {wrong}, false rejects {len(rejected)} of {right}")
@@ -121,8 +126,6 @@ def test_there_are_attacks_enough():
 
 
 def test_the_honest_student_keeps_the_grade(hostile_class):
-    from labkit.course.grading.gradebook import opened
-
     course, _, records, _ = hostile_class
     assert records["honest"].points == REST + POINTS["iou"]
     with opened(course) as gradebook:
@@ -153,13 +156,29 @@ def test_no_worker_outlives_the_batch(hostile_class):
     assert not left & workers_alive()
 
 
-def test_no_argument_reaches_what_students_read(hostile_class):
-    """The attacks tell_by_... raise and return what holds "ARGUMENTS" and these; only their own line is shown."""
-    records = hostile_class[2]
-    for name in ("tell_by_message", "tell_by_name", "tell_by_class", "tell_by_module", "tell_by_shape"):
-        said = next(result.says for result in records[name].results if result.question == "iou")
-        shown = said.partition(" in line ")[0]
-        assert "ARGUMENTS" not in shown and "[" not in shown and "6" not in shown, said
+def test_what_students_read_is_the_same_whatever_the_secret_is(hostile_class, tmp_path):
+    """The answers tell_... make all that they can of their arguments; under another secret nothing of it changes."""
+    course, _, records, _ = hostile_class
+    shutil.copytree(course / "labs", tmp_path / "labs")
+    told = [attack.name for attack in ATTACKS if attack.name.startswith("tell_")]
+    for name in (*told, "honest"):
+        shutil.copytree(course / "submitted" / name, tmp_path / "submitted" / name)
+    again = grade_course(TOPIC, tmp_path, seed="another", limits=LIMITS, workers=2, progress=False)
+    assert len(again.records) == len(told) + 1
+    for record in again.records:
+        assert points(record) == points(records[record.student])  # else what they read may differ
+        assert read_by(tmp_path, record.student) == read_by(course, record.student)
+
+
+def read_by(course: Path, student: str) -> tuple:
+    """All that a student gets to read: page, results, and what nbgrader's feedback is made of."""
+    out = course / "grades" / TOPIC
+    copied = (course / "autograded" / student / TOPIC / f"{TOPIC}.ipynb").read_bytes()
+    with opened(course) as gradebook:
+        comments = gradebook.find_submission_notebook(TOPIC, TOPIC, student).comments
+        said = sorted((comment.name, str(comment.comment)) for comment in comments)
+    page = (out / "feedback" / f"{student}.html").read_bytes()
+    return page, (out / "results" / student / "results.json").read_bytes(), copied, said
 
 
 def test_what_instructors_should_look_at_is_flagged(hostile_class):
@@ -183,4 +202,21 @@ def test_names_do_no_harm_in_tables_and_pages(hostile_class):
     assert "'=HYPERLINK(1)" in {row[0] for row in rows}
     for page in (course / "feedback").iterdir():
         assert "<script" not in page.read_text()
-    assert (course / "feedback" / f"{file_name('Zoë Ångström')}.html").name == "Zoë Ångström.html"
+    assert (course / "feedback" / "Zoë Ångström.html").is_file()
+
+
+def test_copies_of_the_kits_code_are_flagged_whatever_their_names_and_layout(tmp_path):
+    """The references with every variable renamed and comments put in, and a function of the library."""
+    copied = kit.copied_answers(TOPIC)
+    renamed = {name: re.sub(r"\bn\b", "counts", cell).replace("\n", "  # mine\n", 1) for name, cell in copied.items()}
+    library = inspect.getsource(metrics.boundary_counts).replace("boundary_counts", "boundary_band")
+    kit.write_lab(tmp_path, TOPIC)
+    kit.submit(tmp_path, "renamed", TOPIC, renamed)
+    kit.submit(tmp_path, "library", TOPIC, kit.right_answers(TOPIC) | {"boundary_band": library})
+    library, same = grade_course(TOPIC, tmp_path, seed="secret", progress=False).records
+    assert all("has a copy of the kit's" in result.flag for result in same.results)
+    flags = {result.question: result.flag for result in library.results}
+    assert "labkit.metrics.boundary_counts" in flags["boundary_band"] and not flags["iou"]
+    for question in of_topic(TOPIC).values():
+        for answer in kit.alternatives(question):
+            assert copies.found_in(kit.as_cell(answer, question.function), question) == []

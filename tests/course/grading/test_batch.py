@@ -2,9 +2,8 @@
 
 import csv
 import json
-import os
+import shutil
 import signal
-import stat
 import subprocess
 import sys
 import time
@@ -18,10 +17,11 @@ from typer.testing import CliRunner
 from labkit.apps.cli import app
 from labkit.course.grading import bwrap
 from labkit.course.grading.batch import read_record, record_path, secret_for
-from labkit.course.grading.grade import packages_for
+from labkit.course.grading.grade import Run, cases_of
 from labkit.course.grading.gradebook import opened
 from labkit.course.grading.reading import Submission, read_lab
 from labkit.course.grading.run import grade_course
+from labkit.course.grading.sandbox import Limits
 from labkit.course.questions.question import find, of_topic
 
 TOPIC = "04_iou"
@@ -92,12 +92,10 @@ def test_gradescope_reads_scores_of_each_question(course):
 
 
 def test_students_learn_no_seed_and_no_expected_value(course):
-    from labkit.course.grading.grade import secret_cases
-
     grade(course)
     told = for_students(course)
     assert len(told) == 6
-    drawn = [case for question in of_topic(TOPIC).values() for case in secret_cases(question, SECRET)]
+    drawn = [case for question in of_topic(TOPIC).values() for case in cases_of(question, SECRET)]
     values = {f"{float(value):.4f}" for case in drawn for value in kit.np.ravel(case.expected) if value % 1 > 0}
     assert len(values) > 20
     for name, data in told.items():
@@ -108,17 +106,17 @@ def test_students_learn_no_seed_and_no_expected_value(course):
 
 def test_the_secret_is_kept_for_the_next_run_and_private(tmp_path):
     first = secret_for(tmp_path, None)
-    assert len(first) == 32 and secret_for(tmp_path, None) == first
-    assert secret_for(tmp_path, "mine") == "mine" == secret_for(tmp_path, None)
-    assert stat.S_IMODE((tmp_path / "secret_seed").stat().st_mode) == 0o600
+    assert len(first) == 32 and secret_for(tmp_path, None) == first == secret_for(tmp_path, first)
+    with pytest.raises(ValueError, match=r"seed: expected that of the round.*--new-round"):
+        secret_for(tmp_path, "mine")
+    assert secret_for(tmp_path, "mine", new_round=True) == "mine" == secret_for(tmp_path, None)
+    assert secret_for(tmp_path, None, new_round=True) not in ("mine", first)
     assert secret_for(tmp_path / "other", None) != first
 
 
 def test_another_secret_draws_other_cases():
-    from labkit.course.grading.grade import secret_cases
-
     question = find("04_iou.iou")
-    one, two = secret_cases(question, "one"), secret_cases(question, "two")
+    one, two = cases_of(question, "one"), cases_of(question, "two")
     by_hand = len(question.by_hand)
     assert kit.np.array_equal(one[0].args[0], two[0].args[0])
     assert not any(kit.np.array_equal(a.args[0], b.args[0]) for a, b in zip(one[by_hand:], two[by_hand:], strict=True))
@@ -139,11 +137,13 @@ def test_again_grades_only_what_changed(course):
     assert grade(course, force=True).graded_now == 3
 
 
-def test_another_seed_or_lab_grades_everything_again(course):
+def test_a_new_round_or_lab_grades_everything_again_and_late_work_joins_the_round(course):
     grade(course)
-    assert grade(course, seed="another").graded_now == 3
+    assert grade(course, seed="another", new_round=True).graded_now == 3
+    kit.submit(course, "late", TOPIC, kit.right_answers(TOPIC))
+    assert grade(course, seed=None).graded_now == 1
     kit.write_lab(course, TOPIC, setup="import numpy as np  # and nothing else")
-    assert grade(course, seed="another").graded_now == 3
+    assert grade(course, seed=None).graded_now == 4
 
 
 def test_a_broken_record_is_made_again(course):
@@ -285,23 +285,29 @@ def test_a_time_of_submission_is_kept(course):
 # --------------------------------------------------------------------------------------------- the lab's side
 
 
+def packages(lab, question, cells: dict[str, str]) -> tuple[str, ...]:
+    """The packages that there are for the answer to a question, among some answers."""
+    blanks = {name: kit.blank(q) for name, q in of_topic(TOPIC).items()}
+    return Run(lab, Submission("s", blanks | cells, {}, "", ""), question, Limits(), unsafe=False).packages()
+
+
 def test_only_what_a_question_allows_is_there(course):
     lab, questions = read_lab(course, TOPIC)
-    plain = Submission("s", {"iou": "x = 1"}, {}, "", "")
-    with_torch = Submission("s", {"iou": "import torch"}, {}, "", "")
-    assert packages_for(questions["iou"], lab, plain) == ("numpy",)
-    assert packages_for(questions["iou"], lab, with_torch) == ("numpy", "torch")
-    with_scipy = Submission("s", {"iou": "x = 1", "mean_iou": "import scipy"}, {}, "", "")
-    assert packages_for(questions["iou"], lab, with_scipy) == ("numpy", "scipy")
-    assert packages_for(questions["boundary_band"], lab, with_scipy) == ("numpy",)  # which forbids it
-    strict = replace(questions["iou"], forbidden=("torch.nn.functional",))
-    assert packages_for(strict, lab, with_torch) == ("numpy",)
+    iou, band = questions["iou"], questions["boundary_band"]
+    assert packages(lab, iou, {"iou": "x = 1"}) == ("numpy",)
+    assert packages(lab, iou, {"iou": "import torch"}) == ("numpy", "torch")
+    assert packages(lab, iou, {"iou": "x = 1", "mean_iou": "import scipy"}) == ("numpy",)
+    assert packages(lab, questions["mean_iou"], {"iou": "import scipy", "mean_iou": "iou(1)"}) == ("numpy", "scipy")
+    assert packages(lab, band, {"boundary_band": "import scipy"}) == ("numpy",)  # which forbids it
+    assert packages(lab, replace(iou, forbidden=("torch.nn.functional",)), {"iou": "import torch"}) == ("numpy",)
+    with pytest.raises(ValueError, match="forbids what its lab's setup cell imports"):
+        packages(lab, replace(iou, forbidden=("numpy.linalg",)), {})
 
 
 def test_a_comparison_that_fails_is_a_wrong_answer_and_not_the_end(course, monkeypatch):
     from labkit.course.grading import grade as grading
 
-    def broken(question, cases, outputs):
+    def broken(question, cases, outputs, altered):
         raise OverflowError("as if an output were too odd to compare")
 
     monkeypatch.setattr(grading, "verdict", broken)
@@ -318,9 +324,6 @@ def test_wrong_labs_and_folders_are_said(course):
         grade_course("03_gradient", course)
     with pytest.raises(ValueError, match="submissions: expected a folder"):
         grade(course, submissions=course / "nowhere")
-    lab, questions = read_lab(course, TOPIC)
-    with pytest.raises(ValueError, match="forbids what its lab's setup cell imports"):
-        packages_for(replace(questions["iou"], forbidden=("numpy.linalg",)), lab, Submission("s", {}, {}, "", ""))
     kit.write_lab(course, TOPIC, setup="import numpy as np\n1 / 0")
     with pytest.raises(ValueError, match=r"setup cell does not run.*ZeroDivisionError"):
         grade(course)
@@ -337,7 +340,7 @@ def test_the_command_prints_a_table_and_says_by_its_status_what_to_look_at(cours
         name, *shown = line.split()[: len(points) + 1]
         assert name == student and list(map(float, shown)) == points
     assert "ended or crashed" in lines[3] and "3 students, 3 of them graded now" in lines[4]
-    os.remove(course / "submitted" / "eve" / TOPIC / f"{TOPIC}.ipynb")
-    os.rmdir(course / "submitted" / "eve" / TOPIC)
+    for student in ("ben", "eve"):
+        shutil.rmtree(course / "submitted" / student)
     done = runner.invoke(app, arguments)
-    assert done.exit_code == 0 and "2 students, 0 of them graded now" in done.stdout
+    assert done.exit_code == 0 and "1 students, 0 of them graded now" in done.stdout

@@ -1,5 +1,6 @@
 """Replies: what a worker writes comes back the same, and whatever else comes is refused without harm."""
 
+import pickle
 import struct
 
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from labkit.course.grading import worker
-from labkit.course.grading.channel import decode
+from labkit.course.grading.channel import Changed, decode
 from labkit.course.questions.judge import Problem
 
 NUMBERS = [dtype for code in "bhilqBHILQ" for dtype in (np.dtype(code),)] + [
@@ -60,11 +61,12 @@ def test_numbers_and_tensors_come_back_as_numbers_and_arrays():
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=80))
 def test_no_bytes_do_harm(data):
-    for reply in (data, b"V" + data, b"E" + data, b"K" + data, b"M" + data, b"D" + data):
+    for reply in (data, b"V" + data, b"E" + data, b"K" + data, b"M" + data, b"D" + data, b"C\0V" + data):
         try:
             got = decode(reply)
         except ValueError:
             continue
+        got = got.value if isinstance(got, Changed) else got
         parts = got if isinstance(got, tuple) else (got,)
         assert all(part is None or isinstance(part, Problem | np.generic | np.ndarray) for part in parts)
 
@@ -107,9 +109,12 @@ def test_truth_values_are_true_or_false():
 @pytest.mark.parametrize(
     ("reply", "says"),
     [
-        (b"E" + struct.pack("<I", 3) + b"IndexError", "it raises IndexError"),
-        (b"E" + struct.pack("<I", 3) + b"SecretIs42", "it raises an exception"),
-        (b"E" + struct.pack("<I", 3) + b"print", "it raises an exception"),
+        (b"E" + struct.pack("<I", 3) + b"IndexError\0", "it raises IndexError"),
+        (b"E" + struct.pack("<I", 3) + b"IndexError\0index 3 is out", "it raises IndexError: index 3 is out"),
+        (b"E" + struct.pack("<I", 3) + b"KeyError\0\x1b[31m\n\xff", "it raises KeyError: [31m \ufffd"),
+        (b"E" + struct.pack("<I", 3) + b"KeyError\0" + 999 * b"x", "it raises KeyError: " + 211 * "x"),
+        (b"E" + struct.pack("<I", 3) + b"SecretIs42\0", "it raises an exception"),
+        (b"E" + struct.pack("<I", 3) + b"print\0", "it raises an exception"),
         (b"Kdict", "expected an array or a number, got dict"),
         (b"KSecretIs42", "expected an array or a number, got something else"),
         (b"KNoneType", "it returns None: is a `return` missing?"),
@@ -119,5 +124,15 @@ def test_truth_values_are_true_or_false():
         (b"M<script>", "there is no module that where answers are graded"),
     ],
 )
-def test_only_known_words_are_repeated(reply, says):
+def test_only_known_words_and_short_messages_are_repeated(reply, says):
     assert decode(reply).says == says
+
+
+def test_a_call_that_changes_its_argument_says_so():
+    cell = "def f(a, b, c):\n    b[0] = 9.0\n    c[1].append(0)\n    return a + b\n"
+    namespace, arguments = {}, (np.ones(2), np.array([1.0, np.nan]), (1, [2]))
+    worker.answer(namespace, ("cell", "f", cell))
+    got = decode(worker.answer(namespace, ("call", "f", pickle.dumps(arguments))))
+    assert isinstance(got, Changed) and got.position == 1 and got.value[0] == 10.0
+    namespace["f"] = lambda a, b, c: a
+    assert same(decode(worker.answer(namespace, ("call", "f", pickle.dumps(arguments)))), arguments[0])
