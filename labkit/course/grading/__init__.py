@@ -6,7 +6,9 @@ bwrap      which bubblewrap there is, and why it does not work where it does not
 worker     the program in the sandbox: takes cells and arguments, sends numbers back
 channel    the other end: sends, waits until a deadline, and takes nothing but numbers
 grade      one submission: every question, whatever happens in the others
+copies     which answers hold the kit's own code
 batch      a folder of submissions: what changed is graded, here or on a Dask cluster
-outputs    grades.csv, results.json, and `feedback` a page a student
+outputs    grades.csv, results.json, and `feedback`, a page per student
+markdown   a stranger's Markdown, made harmless
 gradebook  nbgrader's database and the copies that formgrader shows
 """

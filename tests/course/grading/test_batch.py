@@ -2,8 +2,10 @@
 
 import csv
 import json
+import os
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -15,10 +17,9 @@ import pytest
 from typer.testing import CliRunner
 
 from labkit.apps.cli import app
-from labkit.course.grading import bwrap
+from labkit.course.grading import bwrap, gradebook, reading, run
 from labkit.course.grading.batch import read_record, record_path, secret_for
 from labkit.course.grading.grade import Run, cases_of
-from labkit.course.grading.gradebook import opened
 from labkit.course.grading.reading import Submission, read_lab
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
@@ -146,6 +147,69 @@ def test_a_new_round_or_lab_grades_everything_again_and_late_work_joins_the_roun
     assert grade(course, seed=None).graded_now == 4
 
 
+def test_what_appears_or_changes_while_a_run_grades_waits_for_the_next(course, monkeypatch):
+    """A new student and another notebook come after the folder was read: what is shown is what was graded."""
+    grade_all = run.grade_batch
+
+    def meanwhile(*arguments):
+        kit.submit(course, "dan", TOPIC, kit.right_answers(TOPIC))
+        kit.submit(course, "ben", TOPIC, kit.right_answers(TOPIC))
+        return grade_all(*arguments)
+
+    monkeypatch.setattr(run, "grade_batch", meanwhile)
+    graded = grade(course)
+    assert [record.student for record in graded.records] == ["ada", "ben", "eve"] and graded.records[1].points == 0.0
+    shown = (course / "autograded" / "ben" / TOPIC / f"{TOPIC}.ipynb").read_text()
+    assert json.dumps(misconceived(0)["iou"]) in shown
+    monkeypatch.undo()
+    again = grade(course)
+    assert again.graded_now == 2 and [record.points for record in again.records] == [TOTAL, TOTAL, TOTAL, BUT_IOU]
+
+
+def test_only_the_instructor_can_read_what_is_written(course):
+    (course / "gradebook.db").chmod(0o644)
+    (course / "grades").mkdir(mode=0o755)
+    grade(course)
+    for folder in ("grades", "autograded"):
+        for path in (course / folder).rglob("*"):
+            assert stat.S_IMODE(path.stat().st_mode) == (0o700 if path.is_dir() else 0o600), path
+    assert stat.S_IMODE((course / "gradebook.db").stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("broken", ["write_scores", "copy_for_formgrader"])
+def test_a_student_whom_the_gradebook_cannot_take_stops_nobody_else(course, monkeypatch, broken):
+    original = getattr(gradebook, broken)
+
+    def fails_for_ben(*arguments):
+        if any(getattr(argument, "student", "") == "ben" for argument in arguments):
+            raise OverflowError("as if something of theirs were too odd")
+        return original(*arguments)
+
+    monkeypatch.setattr(gradebook, broken, fails_for_ben)
+    graded = grade(course)
+    assert graded.failures == {"ben": "not in the gradebook: OverflowError"} and graded.needs_a_look
+    with gradebook.opened(course) as book:
+        assert book.find_submission(TOPIC, "ada").score == TOTAL and book.find_submission(TOPIC, "eve").score == BUT_IOU
+    monkeypatch.undo()
+    assert grade(course).failures == {}
+    with gradebook.opened(course) as book:
+        assert book.find_submission(TOPIC, "ben").score == 0.0
+
+
+def test_a_folder_that_cannot_be_entered_stops_nobody_else(course, monkeypatch):
+    """As an ordinary user would find it: a folder of mode 000."""
+    ask = os.lstat
+
+    def refuse(path, *rest, **more):
+        if "eve/" in str(path):
+            raise PermissionError(13, "Permission denied")
+        return ask(path, *rest, **more)
+
+    monkeypatch.setattr(reading.os, "lstat", refuse)
+    graded = grade(course)
+    assert [record.reason for record in graded.records] == ["", "", "it cannot be opened: Permission denied"]
+
+
 def test_a_broken_record_is_made_again(course):
     grade(course)
     path = record_path(course / "grades" / TOPIC, "ada")
@@ -218,7 +282,7 @@ def test_without_bubblewrap_nothing_is_graded(course, monkeypatch):
 
 def test_the_gradebook_has_the_scores_and_keeps_manual_ones(course):
     grade(course)
-    with opened(course) as book:
+    with gradebook.opened(course) as book:
         assert [book.find_submission(TOPIC, s).score for s in ("ada", "ben", "eve")] == [TOTAL, 0.0, BUT_IOU]
         assert "Hint" in book.find_comment("iou", TOPIC, TOPIC, "ben").auto_comment
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
@@ -226,14 +290,14 @@ def test_the_gradebook_has_the_scores_and_keeps_manual_ones(course):
         written.manual_score, written.needs_manual_grade = 3.0, False
         book.db.commit()
     grade(course)  # nothing changed: nothing is asked again
-    with opened(course) as book:
+    with gradebook.opened(course) as book:
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
         assert (written.manual_score, written.needs_manual_grade) == (3.0, False)
         assert book.find_submission(TOPIC, "ada").score == 14.0
     notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC) | {"iou": "iou = None"})
     kit.submit(course, "ada", TOPIC, notebook)
     grade(course)
-    with opened(course) as book:
+    with gradebook.opened(course) as book:
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
         assert (written.manual_score, written.needs_manual_grade) == (3.0, True)
         assert book.find_submission(TOPIC, "ada").score == 12.0
@@ -244,7 +308,7 @@ def test_an_answer_in_words_that_was_not_written_earns_nothing(course):
     notebook["cells"][-1]["source"] = "*Your answer.*"
     kit.submit(course, "ada", TOPIC, notebook)
     grade(course)
-    with opened(course) as book:
+    with gradebook.opened(course) as book:
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
         assert (written.auto_score, written.needs_manual_grade) == (0.0, False)
 
@@ -267,7 +331,7 @@ def test_what_can_not_be_read_any_more_loses_its_scores(course):
     (course / "submitted" / "ada" / TOPIC / f"{TOPIC}.ipynb").write_text("{")
     graded = grade(course)
     assert graded.records[0].reason and graded.graded_now == 1
-    with opened(course) as book:
+    with gradebook.opened(course) as book:
         assert book.find_submission(TOPIC, "ada").score == 0.0
         assert book.find_grade("check_iou", TOPIC, TOPIC, "ada").needs_manual_grade
 
@@ -277,7 +341,7 @@ def test_a_time_of_submission_is_kept(course):
     (folder / "timestamp.txt").write_text("2026-03-01 12:00:00 UTC")
     (course / "submitted" / "ben" / TOPIC / "timestamp.txt").write_text("yesterday")
     grade(course)
-    with opened(course) as book:
+    with gradebook.opened(course) as book:
         assert book.find_submission(TOPIC, "ada").timestamp.isoformat() == "2026-03-01T12:00:00"
         assert book.find_submission(TOPIC, "ben").timestamp is None
 
