@@ -34,18 +34,20 @@ class Journey:
 def journeys(rate: int | float, network_ms: int | float, seconds: float = 0.6) -> list[Journey]:
     """Follow the frames of a camera through a node that takes network_ms for each and always takes the newest.
 
+    The frames are those taken in the first `seconds`; the camera goes on after them, so that the last ones may be
+    superseded, too.
+
     >>> [journey.end for journey in journeys(rate=10.0, network_ms=50.0, seconds=0.3)]
     [58.0, 158.0, 258.0]
     >>> [journey.begin for journey in journeys(rate=10.0, network_ms=150.0, seconds=0.4)]
     [8.0, 158.0, None, 308.0]
     """
     period = 1000.0 / rate
-    arrivals = [k * period + TRANSPORT_MS for k in range(round(seconds * rate))]
     found, free = [], 0.0
-    for k, arrived in enumerate(arrivals):
+    for k in range(round(seconds * rate)):
+        arrived = k * period + TRANSPORT_MS
         begin = max(arrived, free)
-        superseded = k + 1 < len(arrivals) and arrivals[k + 1] <= begin
-        if superseded:
+        if arrived + period <= begin:  # a newer one is there
             found.append(Journey(arrived - TRANSPORT_MS, arrived))
         else:
             free = begin + network_ms
