@@ -9,14 +9,15 @@ from labkit.course.widgets import node as widgets
 def simulate(rate, network_ms, seconds=0.6):
     """The same node in steps of a tenth of a millisecond: one slot, and whoever is free takes what is in it."""
     waiting, until, answered = None, 0.0, []
-    arrivals = {round(10 * (k * 1000 / rate + widgets.TRANSPORT_MS)): k for k in range(round(seconds * rate))}
+    taken = round(seconds * rate)  # the camera goes on after these
+    arrivals = {round(10 * (k * 1000 / rate + widgets.TRANSPORT_MS)): k for k in range(2 * taken)}
     for tick in range(round(10 * (1000 * seconds + 4 * network_ms + 100))):
         waiting = arrivals.get(tick, waiting)
         if waiting is not None and tick >= until - 1e-6:
             until = tick + 10 * network_ms
             answered.append(waiting)
             waiting = None
-    return answered
+    return [k for k in answered if k < taken]
 
 
 @pytest.mark.parametrize("rate, network_ms", [(10, 20), (10, 150), (30, 90), (25, 40), (50, 7), (15, 290), (20, 50)])
