@@ -8,8 +8,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from sklearn.utils.class_weight import compute_class_weight
 
-from labkit import losses
+from labkit import losses, metrics
+from labkit.labels import one_hot
 
 DTYPES = (np.int8, np.uint8, np.int32, np.int64)
 WEIGHTS = np.array([0.5, 1.0, 20.0, 3.0])
@@ -63,8 +65,17 @@ def channels_last(logits: torch.Tensor) -> np.ndarray:
 
 @untimed
 @given(pixels())
-def test_softmax_agrees_with_torch_in_every_shape_and_dtype(case):
+def test_probabilities_sum_to_one_over_the_classes(case):
+    # Mistake 11: the sum over any other axis is not one.
     z, _, _ = case
+    p = losses.softmax(z)
+    assert p.shape == z.shape and p.dtype == np.float64
+    np.testing.assert_allclose(p.sum(axis=-1), np.ones(z.shape[:-1]), rtol=1e-14)
+    np.testing.assert_allclose(np.log(p), losses.log_softmax(z), rtol=1e-12, atol=1e-14)
+
+
+def test_softmax_agrees_with_torch_in_every_dtype():
+    z = np.random.default_rng(0).normal(size=(3, 5, 4)) * 10
     for logits in (z, z.astype(np.float32), z.round().astype(np.int32)):
         peer = torch.from_numpy(logits).double()
         np.testing.assert_allclose(losses.softmax(logits), peer.softmax(-1).numpy(), rtol=1e-13)
@@ -100,6 +111,23 @@ def test_cross_entropy_is_the_sum_by_hand(case):
     assert losses.cross_entropy(z, y) == pytest.approx(loss_by_hand(z, y, ones), rel=1e-9, abs=1e-9)
 
 
+def test_the_loss_sums_over_pixels_so_that_a_pixels_gradient_knows_nothing_of_how_many_there_are():
+    # Mistake 12: a mean would keep the loss and shrink each gradient.
+    rng = np.random.default_rng(0)
+    z, y = rng.normal(size=(3, 5, 4)), rng.integers(0, 4, (3, 5))
+    twice = np.concatenate([z, z]), np.concatenate([y, y])
+    assert losses.cross_entropy(*twice) == pytest.approx(2 * losses.cross_entropy(z, y))
+    np.testing.assert_array_equal(losses.cross_entropy_grad(*twice)[:3], losses.cross_entropy_grad(z, y))
+
+
+def test_probabilities_given_for_logits_keep_the_loss_from_falling():
+    # Mistake 14: softmax twice. Right and certain pixels cost nothing; with a second softmax each still costs 0.74.
+    z = np.array([[1e3, 0.0, 0.0, 0.0]] * 10)
+    y = np.zeros(10, int)
+    assert losses.cross_entropy(z, y) == 0.0
+    assert losses.cross_entropy(losses.softmax(z), y) / 10 == pytest.approx(math.log(1 + 3 / math.e))
+
+
 @untimed
 @given(pixels(ignored=False), st.data())
 def test_ignored_pixels_add_neither_loss_nor_gradient(case, data):
@@ -113,6 +141,12 @@ def test_ignored_pixels_add_neither_loss_nor_gradient(case, data):
     np.testing.assert_allclose(grad[counted], losses.cross_entropy_grad(z[counted], y[counted], w))
 
 
+def test_an_image_of_ignored_pixels_has_loss_zero_and_no_gradient():
+    z, y = np.random.default_rng(0).normal(size=(3, 5, 4)), np.full((3, 5), 255, np.uint8)
+    assert losses.cross_entropy(z, y, WEIGHTS) == 0.0
+    assert not losses.cross_entropy_grad(z, y, WEIGHTS).any()
+
+
 def test_many_float32_pixels_are_added_up_in_float64():
     # A running float32 sum of these 300,000 terms is off in the fourth digit.
     z = np.zeros((480, 640, 2), np.float32)
@@ -123,6 +157,26 @@ def test_many_float32_pixels_are_added_up_in_float64():
 
 
 # The gradient
+
+
+@untimed
+@given(pixels())
+def test_the_gradient_of_each_pixel_sums_to_zero(case):
+    # Mistake 16: without the one-hot it would sum to the pixel's weight.
+    z, y, w = case
+    grad = losses.cross_entropy_grad(z, y, w)
+    assert grad.shape == z.shape
+    np.testing.assert_allclose(grad.sum(axis=-1), np.zeros(y.shape), atol=1e-12)
+
+
+@untimed
+@given(pixels())
+def test_the_gradient_lowers_the_true_class_only_and_is_never_larger_than_the_weight(case):
+    z, y, w = case
+    C = z.shape[-1]
+    grad, Y = losses.cross_entropy_grad(z, y, w), one_hot(y, C)
+    assert (grad[Y == 1] <= 0).all() and (grad[Y == 0] >= 0).all()
+    np.testing.assert_array_less(np.abs(grad).max(axis=-1, initial=0.0), (Y @ w) * (1 + 1e-12) + 1e-300)
 
 
 @pytest.mark.parametrize("weights", [None, WEIGHTS])
@@ -218,6 +272,12 @@ def test_weights_follow_their_scheme_and_a_class_without_pixels_gets_one(n):
         np.testing.assert_allclose(losses.class_weights(n[present], scheme), w[present])
 
 
+def test_inverse_weights_are_those_that_scikit_learn_calls_balanced():
+    y = np.random.default_rng(0).choice(4, size=5000, p=[0.6, 0.3, 0.01, 0.09])
+    peer = compute_class_weight("balanced", classes=np.arange(4), y=y)
+    np.testing.assert_allclose(losses.class_weights(np.bincount(y), "inverse"), peer)
+
+
 @pytest.mark.bad_input
 @pytest.mark.parametrize(
     ("name", "n", "scheme"),
@@ -238,6 +298,27 @@ def test_class_weights_name_the_argument_that_is_wrong(name, n, scheme):
 # Problem 5: what weights do
 
 
+def test_a_weight_scales_the_gradient_of_its_true_class_by_exactly_itself():
+    rng = np.random.default_rng(0)
+    z, y = rng.normal(size=(20, 30, 4)), rng.integers(0, 4, (20, 30))
+    plain, weighted = losses.cross_entropy_grad(z, y), losses.cross_entropy_grad(z, y, WEIGHTS)
+    for c in range(4):
+        np.testing.assert_array_equal(weighted[y == c], WEIGHTS[c] * plain[y == c])
+
+
+def test_gradient_descent_on_the_weighted_loss_ends_at_the_weighted_optimum():
+    # Pixels that look alike share their logits; of a hundred, the classes are true this often.
+    often = np.array([70, 24, 1, 5])
+    y = np.repeat(np.arange(4), often)
+    z = np.zeros(4)
+    for _ in range(200):
+        everywhere = np.broadcast_to(z, (100, 4))
+        z = z - 0.02 * losses.cross_entropy_grad(everywhere, y, WEIGHTS).sum(axis=0)
+    q = losses.weighted_optimum(often / 100, WEIGHTS)
+    np.testing.assert_allclose(losses.softmax(z), q, atol=1e-10)
+    assert np.abs(q - often / 100).max() > 0.1  # which is not where the data are
+
+
 @untimed
 @given(hnp.arrays(np.float64, 4, elements=st.floats(0.01, 1.0)), hnp.arrays(np.float64, 4, elements=st.floats(0.1, 50)))
 def test_the_weighted_optimum_has_no_gradient_and_dividing_by_the_weights_undoes_it(p, w):
@@ -247,6 +328,24 @@ def test_the_weighted_optimum_has_no_gradient_and_dividing_by_the_weights_undoes
     np.testing.assert_allclose(expected_grad, 0.0, atol=1e-11)
     np.testing.assert_allclose(losses.weighted_optimum(q, 1 / w), p, atol=1e-12)
     np.testing.assert_allclose(losses.weighted_optimum(p, np.full(4, 7.0)), p, atol=1e-12)
+
+
+def test_a_heavier_class_gains_recall_and_loses_precision():
+    # Mistake 24, "weights always help". A rare and a common class with Gaussian features, decided at the optimum.
+    x = np.linspace(-6.0, 8.0, 4001)
+    density = np.stack([0.95 * np.exp(-(x**2) / 2), 0.05 * np.exp(-((x - 2.0) ** 2) / 2)], axis=-1)
+    density /= density.sum()
+    posterior = density / density.sum(axis=-1, keepdims=True)
+    scores = []
+    for weight in (1.0, 3.0, 10.0, 30.0):
+        decided = losses.weighted_optimum(posterior, np.array([1.0, weight])).argmax(axis=-1)
+        n = np.stack([density[decided == j].sum(axis=0) for j in range(2)], axis=1)
+        precision, recall = metrics.precision_recall(n)
+        scores.append((precision[1], recall[1], metrics.iou(n)[1]))
+    precision, recall, iou = np.array(scores).T
+    assert (np.diff(recall) > 0).all()
+    assert (np.diff(precision) < 0).all()
+    assert 0 < iou.argmax() < 3  # a weight in between is the best for IoU
 
 
 @pytest.mark.bad_input
@@ -290,6 +389,65 @@ def test_the_training_loss_passes_torchs_own_gradient_check():
     assert torch.autograd.gradcheck(
         lambda z: losses.segmentation_loss(z, labels, WEIGHTS), logits.clone().requires_grad_()
     )
+
+
+def test_torchs_weighted_mean_divides_by_the_sum_of_weights_and_the_kits_by_the_number_of_pixels():
+    # Mistake 22.
+    logits, labels = batch(seed=4)
+    torchs = torch.nn.CrossEntropyLoss(weight=torch.from_numpy(WEIGHTS), ignore_index=255)(logits, labels)
+    y = labels[labels != 255].numpy()
+    kits = losses.segmentation_loss(logits, labels, WEIGHTS)
+    assert kits.item() * y.size == pytest.approx(torchs.item() * WEIGHTS[y].sum())
+    assert abs(kits.item() / torchs.item() - 1) > 0.5
+    # Without weights the two are one.
+    plain = torch.nn.CrossEntropyLoss(ignore_index=255)(logits, labels)
+    assert losses.segmentation_loss(logits, labels).item() == pytest.approx(plain.item())
+
+
+def test_weights_cancel_in_torchs_mean_of_one_class_but_not_in_the_kits():
+    # Mistake 23.
+    logits, _ = batch(seed=5)
+    labels = torch.full((2, 5, 7), 2)
+    torchs = [torch.nn.CrossEntropyLoss(weight=w)(logits, labels) for w in (None, torch.from_numpy(WEIGHTS))]
+    assert torchs[0].item() == pytest.approx(torchs[1].item())
+    plain, weighted = losses.segmentation_loss(logits, labels), losses.segmentation_loss(logits, labels, WEIGHTS)
+    assert weighted.item() == pytest.approx(WEIGHTS[2] * plain.item())
+
+
+def test_with_class_weights_of_the_same_pixels_the_two_normalisations_meet():
+    logits, labels = batch(seed=6)
+    weights = losses.class_weights(np.bincount(labels[labels != 255].numpy(), minlength=4), "inverse")
+    torchs = torch.nn.CrossEntropyLoss(weight=torch.from_numpy(weights), ignore_index=255)(logits, labels)
+    assert losses.segmentation_loss(logits, labels, weights).item() == pytest.approx(torchs.item())
+
+
+def steps_of(optimiser, factor):
+    """Train a linear network for 20 steps with all class weights multiplied by `factor`; return its parameters."""
+    generator = torch.Generator().manual_seed(0)
+    network = torch.nn.Conv2d(3, 4, 1, dtype=torch.float64)
+    for parameter in network.parameters():
+        parameter.data = torch.randn(parameter.shape, generator=generator, dtype=torch.float64)
+    image = torch.randn(2, 3, 5, 7, generator=generator, dtype=torch.float64)
+    labels = torch.randint(0, 4, (2, 5, 7), generator=generator)
+    optimiser = optimiser(network.parameters())
+    for _ in range(20):
+        optimiser.zero_grad()
+        losses.segmentation_loss(network(image), labels, factor * WEIGHTS).backward()
+        optimiser.step()
+    return torch.cat([parameter.detach().ravel() for parameter in network.parameters()])
+
+
+def test_adam_cancels_a_common_factor_of_all_weights_and_plain_descent_does_not():
+    def adam(parameters):
+        return torch.optim.Adam(parameters, lr=0.05, eps=1e-30)
+
+    def descent(parameters):
+        return torch.optim.SGD(parameters, lr=0.001)
+
+    start = steps_of(lambda parameters: torch.optim.SGD(parameters, lr=0.0), 1.0)
+    torch.testing.assert_close(steps_of(adam, 1000.0), steps_of(adam, 1.0), rtol=1e-9, atol=1e-9)
+    assert (steps_of(adam, 1.0) - start).abs().max() > 0.1
+    assert (steps_of(descent, 10.0) - start).norm() > 3 * (steps_of(descent, 1.0) - start).norm()
 
 
 def test_low_precision_logits_are_reduced_in_float32_and_added_up_in_float64():

@@ -11,6 +11,7 @@ from scipy import ndimage, stats
 from torchmetrics.functional import classification as torchmetrics
 
 from labkit import metrics
+from labkit.losses import cross_entropy
 
 C = 4
 DTYPES = (np.int8, np.uint8, np.int32, np.int64)
@@ -61,6 +62,22 @@ def test_confusion_matrix_is_the_count_by_hand_for_every_shape_and_dtype(pair):
 
 
 @untimed
+@given(label_pairs())
+def test_every_pixel_that_is_not_ignored_is_counted_once(pair):
+    y_true, y_pred = pair
+    n = metrics.confusion_matrix(y_true, y_pred, C)
+    assert n.sum() == np.count_nonzero(y_true != 255)
+    for c in range(C):
+        assert n[c].sum() == np.count_nonzero(y_true == c)  # rows are true classes
+        assert n[:, c].sum() == np.count_nonzero((y_pred == c) & (y_true != 255))  # columns are predicted ones
+
+
+def test_rows_are_true_classes_and_columns_predicted_ones():
+    n = metrics.confusion_matrix(np.array([0, 0, 0]), np.array([1, 1, 0]), 2)
+    assert n.tolist() == [[1, 2], [0, 0]]
+
+
+@untimed
 @given(image_pairs)
 def test_memory_layout_does_not_matter(pair):
     y_true, y_pred = pair
@@ -101,6 +118,13 @@ def test_what_is_predicted_at_an_ignored_pixel_changes_no_count():
         np.testing.assert_array_equal(
             metrics.confusion_matrix(y_true, other, C), metrics.confusion_matrix(y_true, y_pred, C)
         )
+
+
+def test_loss_and_metric_leave_out_the_same_pixels():
+    y_true, y_pred = random_labels(1)
+    certain_of_nothing = np.zeros((*y_true.shape, C))
+    pixels_in_loss = cross_entropy(certain_of_nothing, y_true) / np.log(C)
+    assert pixels_in_loss == pytest.approx(metrics.confusion_matrix(y_true, y_pred, C).sum())
 
 
 @pytest.mark.parametrize("ignore", [-100, -1, 0, 3, 7, 1000])
@@ -191,6 +215,58 @@ def test_an_absent_class_scores_neither_0_nor_1_and_leaves_the_mean_alone():
     assert metrics.mean_iou(n) == metrics.mean_iou(n[:2, :2])
 
 
+def test_a_class_that_is_only_predicted_scores_0():
+    n = np.array([[3, 1], [0, 0]])
+    assert metrics.iou(n).tolist() == [0.75, 0.0]
+    assert metrics.mean_iou(n) == 0.375
+
+
+def test_counts_are_added_before_they_are_divided():
+    # Mistake 18: frames of IoU 1/1 and 0/99 average to 0.5; all their pixels together score 0.01.
+    frames = [np.array([[0, 0], [0, 1]]), np.array([[0, 0], [99, 0]])]
+    assert metrics.iou(sum(frames))[1] == 0.01
+    assert np.mean([metrics.iou(n)[1] for n in frames]) == 0.5
+
+
+@untimed
+@given(st.lists(label_pairs(), min_size=1, max_size=4))
+def test_the_sum_of_confusion_matrices_is_that_of_all_pixels_together(frames):
+    together = (np.concatenate([y.ravel() for y in images]) for images in zip(*frames, strict=True))
+    np.testing.assert_array_equal(
+        sum(metrics.confusion_matrix(*frame, C) for frame in frames), metrics.confusion_matrix(*together, C)
+    )
+
+
+matrices = hnp.arrays(np.int64, st.integers(1, 6).map(lambda c: (c, c)), elements=st.integers(0, 50))
+
+
+@untimed
+@given(matrices)
+def test_iou_cannot_tell_false_positives_from_false_negatives_but_precision_can(n):
+    # Mistake 19: swapping truth and prediction transposes n.
+    precision, recall = metrics.precision_recall(n)
+    np.testing.assert_array_equal(metrics.iou(n), metrics.iou(n.T))
+    np.testing.assert_array_equal(precision, metrics.precision_recall(n.T)[1])
+    np.testing.assert_array_equal(recall, metrics.precision_recall(n.T)[0])
+
+
+@untimed
+@given(matrices)
+def test_precision_and_recall_give_back_the_iou(n):
+    precision, recall = metrics.precision_recall(n)
+    scores = metrics.iou(n)
+    hit = np.diagonal(n) > 0
+    np.testing.assert_allclose(1 / scores[hit], 1 / precision[hit] + 1 / recall[hit] - 1, rtol=1e-12)
+    assert ((scores[hit] <= precision[hit]) & (scores[hit] <= recall[hit])).all()
+
+
+def test_mean_iou_gives_a_small_class_the_voice_of_a_large_one():
+    # Mistake 20: the sum of intersections over the sum of unions is nearly the background's score alone.
+    n = np.array([[9900, 0], [100, 0]])
+    assert metrics.mean_iou(n) == pytest.approx((0.99 + 0.0) / 2)
+    assert metrics.pixel_accuracy(n) == 0.99
+
+
 def test_large_counts_of_small_dtypes_do_not_overflow():
     n = np.full((2, 2), 200, np.uint8)
     np.testing.assert_allclose(metrics.iou(n), 1 / 3)
@@ -252,6 +328,30 @@ def test_the_band_is_what_repeated_3x3_erosion_takes_off(width):
         assert scores[c] == np.count_nonzero(bands[0] & bands[1]) / np.count_nonzero(bands[0] | bands[1])
 
 
+@untimed
+@given(image_pairs)
+def test_a_width_that_reaches_every_pixel_gives_the_plain_iou(pair):
+    plain = metrics.iou(metrics.confusion_matrix(*pair, C))
+    np.testing.assert_array_equal(metrics.boundary_iou(*pair, C, width=100), plain)
+
+
+def test_boundary_iou_sees_a_shifted_edge_where_the_plain_iou_hardly_does():
+    y_true = np.zeros((100, 100), np.uint8)
+    y_true[20:80, 20:80] = 1
+    y_pred = np.roll(y_true, 2, axis=0)
+    assert metrics.iou(metrics.confusion_matrix(y_true, y_pred, 2))[1] > 0.9
+    assert metrics.boundary_iou(y_true, y_pred, 2, width=2)[1] < 0.4
+
+
+def test_a_prediction_that_is_right_wherever_it_is_judged_scores_1():
+    y_true = blobs(1)
+    y_pred = y_true.copy()
+    y_true[ndimage.binary_dilation(y_true == 2) & (y_true != 2)] = 255  # an unsure ring around class 2
+    y_pred[y_true == 255] = 2
+    assert np.count_nonzero(y_true == 255) > 50
+    np.testing.assert_array_equal(metrics.boundary_iou(y_true, y_pred, C), np.ones(C))
+
+
 def test_the_default_width_is_two_hundredths_of_the_diagonal():
     y_true, y_pred = blobs(2, (120, 160)), blobs(3, (120, 160))
     np.testing.assert_array_equal(
@@ -259,6 +359,13 @@ def test_the_default_width_is_two_hundredths_of_the_diagonal():
     )
     tiny = np.array([[0, 1], [1, 1]])
     np.testing.assert_array_equal(metrics.boundary_iou(tiny, tiny, 2), [1.0, 1.0])
+
+
+def test_boundary_iou_is_nan_for_an_absent_class_and_0_for_one_only_predicted():
+    scores = metrics.boundary_iou(np.zeros((4, 6), np.uint8), np.eye(4, 6, dtype=np.uint8), 3)
+    assert 0.0 < scores[0] < 1.0
+    assert scores[1] == 0.0
+    assert np.isnan(scores[2])
 
 
 @pytest.mark.bad_input
@@ -289,6 +396,11 @@ def test_wilson_interval_agrees_with_scipy_and_holds_the_rate(result, confidence
     peer = stats.binomtest(*result).proportion_ci(confidence, method="wilson")
     assert (low, high) == pytest.approx((peer.low, peer.high), abs=1e-9)
     assert 0.0 <= low <= result[0] / result[1] <= high <= 1.0
+
+
+def test_wilson_interval_of_a_clean_sweep_still_has_a_width():
+    assert metrics.wilson_interval(20, 20) == pytest.approx((0.8389, 1.0), abs=1e-4)
+    assert metrics.wilson_interval(0, 20) == pytest.approx((0.0, 0.1611), abs=1e-4)
 
 
 @pytest.mark.bad_input
