@@ -111,10 +111,10 @@ def export(
 
 @app.command()
 def compare(
-    out: Annotated[Path, typer.Option(help="The table to write, a CSV file.")] = Path("lessons/09_other_stacks.csv"),
+    out: Annotated[Path, typer.Option(help="The table to write, a CSV file.")] = Path("out/09_other_stacks.csv"),
     scenes: Annotated[int, typer.Option(help="How many scenes.", min=1)] = 40,
 ) -> None:
-    """Compare the stacks on the same scenes, masks, times and lifts: the table that lesson 09 reads (some minutes)."""
+    """Compare the stacks on the same scenes, masks, times and lifts: a table as lesson 09 reads it (some minutes)."""
     from labkit.apps import stack_study
 
     typer.echo(stack_study.table(stack_study.run(out, scenes=scenes)))
@@ -122,7 +122,7 @@ def compare(
 
 @app.command()
 def study(
-    out: Annotated[Path, typer.Option(help="Where to write the table.")] = Path("lessons/07_grasp.csv"),
+    out: Annotated[Path, typer.Option(help="Where to write the table.")] = Path("out/07_grasp.csv"),
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
 ) -> None:
     """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it goes on where it was."""

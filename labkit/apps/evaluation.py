@@ -1,20 +1,17 @@
 """How good is the whole chain? Scores of the masks, and lifts by the simulated arm, over many scenes."""
 
 import json
-import multiprocessing
 import time
 from collections import Counter
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 from tqdm.auto import tqdm
 
-from labkit.frame import RGBDFrame
+from labkit.apps.trials import in_processes
 from labkit.labels import CLASSES
 from labkit.metrics import boundary_counts, confusion_matrix, iou, mean_iou, pixel_accuracy, wilson_interval
 from labkit.pipeline import Pipeline
@@ -38,26 +35,25 @@ class Trial:
 def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = False) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
-    spec: a SceneSpec. model: network or path of its weights; None for true masks. crf: refine the network's labels. No
-    reachable candidate is a failure, and so is lifting anything but a target. Only the score reads the simulator's
-    truth.
+    spec: a SceneSpec. model: as in Pipeline, or the path of weights; None for true masks. crf: refine the model's
+    labels. No reachable candidate is a failure, and so is lifting anything but a target. Only the score reads the
+    simulator's truth. Raises ValueError for a CRF on true masks.
     """
     from labkit.sim.world import World  # PyBullet stays out of this module's import
 
+    if crf and model is None:
+        raise ValueError("crf: expected none with true masks, which there is nothing to refine in")
     if isinstance(model, (str, Path)):
-        model = _loaded(str(model))
+        model = _loaded(str(model), Path(model).stat().st_mtime_ns)
+    pipeline = Pipeline(model, spec.table.z, crf=crf)
     with World(spec) as world:
         start = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
-        perception = perceive(frame, model, spec.table.z, crf)
+        perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)
         before = time.perf_counter()
         result = lift(world, perception)
-        seconds = {
-            "render": rendered - start,
-            **perception.seconds,
-            "lift": time.perf_counter() - before,
-        }
+        seconds = {"render": rendered - start, **perception.seconds, "lift": time.perf_counter() - before}
     families = {thing.name: thing.family for thing in spec.objects}
     return Trial(
         seed=spec.seed,
@@ -70,11 +66,12 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
     )
 
 
-def perceive(frame: RGBDFrame, model, table_z: float, crf: bool = False):
-    """Run the pipeline on a frame with a network, or with the frame's own labels if `model` is None."""
-    if model is None:
-        return Pipeline(table_z=table_z).locate(frame, frame.labels)
-    return Pipeline(model, table_z, crf=crf).run(frame)
+@lru_cache(maxsize=1)
+def _loaded(path: str, changed: int):
+    """Load weights once in each process; `changed`, when the file was written, makes retrained weights others."""
+    from labkit.network import load_model
+
+    return load_model(path)
 
 
 def lift(world, perception):
@@ -84,17 +81,6 @@ def lift(world, perception):
     if not perception.plan.grasps:
         return LiftResult(False, perception.plan.reason)
     return Panda(world).lift(perception.plan.grasps, perception.scene)
-
-
-_models: dict[str, object] = {}  # by path: a worker process loads its weights once
-
-
-def _loaded(path: str):
-    if path not in _models:
-        from labkit.network import load_model
-
-        _models[path] = load_model(path, len(CLASSES))
-    return _models[path]
 
 
 @dataclass(frozen=True)
@@ -148,33 +134,18 @@ def summarise(trials: Iterable[Trial]) -> Report:
 def run_trials(
     specs, model=None, size: tuple[int, int] = (320, 240), crf: bool = False, workers: int = 1, progress: bool = True
 ) -> list[Trial]:
-    """Run a trial a scene, in the order of `specs`, in so many processes.
+    """Run a trial of each scene, in the order of `specs`, in so many processes.
 
     With several workers, give `model` as the path of its weights: each worker loads them once.
     """
-    specs = list(specs)
-    pool = (
-        ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_one_thread)
-        if workers > 1
-        else nullcontext()
-    )
-    trials, lifts = [], 0
-    with pool as executor:
-        run = partial(run_trial, model=model, size=size, crf=crf)
-        results = executor.map(run, specs) if executor else map(run, specs)
-        with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
-            for trial in bar:
-                trials.append(trial)
-                lifts += trial.lifted
-                bar.set_postfix_str(f"lifted {lifts}/{len(trials)}", refresh=False)
+    specs, trials, lifts = list(specs), [], 0
+    results = in_processes(partial(run_trial, model=model, size=size, crf=crf), specs, workers)
+    with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
+        for trial in bar:
+            trials.append(trial)
+            lifts += trial.lifted
+            bar.set_postfix_str(f"lifted {lifts}/{len(trials)}", refresh=False)
     return trials
-
-
-def _one_thread() -> None:
-    """Workers share the cores among themselves, not each with all threads of PyTorch."""
-    import torch
-
-    torch.set_num_threads(1)
 
 
 def as_json(report: Report) -> str:

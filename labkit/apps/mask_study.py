@@ -3,26 +3,18 @@
 `labkit study` runs it: one trial a scene and way of spoiling its mask. Lesson 07 reads the table.
 """
 
-import csv
-import io
-import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
-from dataclasses import astuple, dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool
-from tqdm.auto import tqdm
 
-from labkit.apps import degrade
+from labkit.apps import degrade, trials
 from labkit.apps.evaluation import lift
 from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
 from labkit.metrics import wilson_interval
 from labkit.pipeline import Perception, Pipeline
-from labkit.support.files import write_atomically
 
 FIRST_SEED, SCENES, SIZE = 600_000, 60, (320, 240)
 
@@ -124,50 +116,13 @@ def try_lift(spec, perception: Perception, name: str) -> tuple[bool, str]:
 
 
 def run(out, first_seed: int = FIRST_SEED, scenes: int = SCENES, workers: int = 1, progress: bool = True) -> list[Row]:
-    """Run all trials of so many scenes and write them to `out`, a CSV file with a row a trial.
-
-    What is finished is kept beside it, scene by scene, in a file OUT.unfinished: stopped with Ctrl-C, the same call
-    goes on where it was. Raises ValueError if that file is of other scenes.
-    """
-    out = Path(out)
-    unfinished = out.with_name(out.name + ".unfinished")
-    seeds = range(first_seed, first_seed + scenes)
-    done = {}
-    for row in read(unfinished) if unfinished.exists() else []:
-        done.setdefault(row.seed, []).append(row)
-    if not done.keys() <= set(seeds):
-        raise ValueError(f"out: {unfinished} is of other scenes; remove it, or ask for those")
-    missing = [seed for seed in seeds if seed not in done]
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, context) if workers > 1 else nullcontext()
-    with pool as executor, tqdm(total=scenes, initial=len(done), unit="scene", disable=not progress) as bar:
-        for rows in (executor.map if executor else map)(trials_of_scene, missing):
-            done[rows[0].seed] = rows
-            write(unfinished, [row for seed in sorted(done) for row in done[seed]])
-            bar.update()
-    rows = [row for seed in seeds for row in done[seed]]
-    write(out, rows)
-    unfinished.unlink(missing_ok=True)
-    return rows
-
-
-def write(path, rows: Sequence[Row]) -> None:
-    """Write rows as CSV, whole or not at all."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(field.name for field in fields(Row))
-    writer.writerows(astuple(row) for row in rows)
-    write_atomically(path, text.getvalue().encode())
+    """Run all trials of so many scenes and write them to `out`, as `trials.make_table` does."""
+    return trials.make_table(out, Row, trials_of_scene, range(first_seed, first_seed + scenes), workers, progress)
 
 
 def read(path) -> list[Row]:
-    """Read what `write` wrote. Raises ValueError if the columns are others."""
-    with open(path, newline="") as file:
-        lines = list(csv.reader(file))
-    kinds = {field.name: field.type for field in fields(Row)}
-    if not lines or lines[0] != list(kinds):
-        raise ValueError(f"path: expected a CSV file with columns {', '.join(kinds)} in {path}")
-    return [Row(*(kind(cell) for kind, cell in zip(kinds.values(), line, strict=True))) for line in lines[1:]]
+    """Read a table. Raises ValueError if its columns are others."""
+    return trials.read_rows(path, Row)
 
 
 def lift_rate(rows: Sequence[Row]) -> tuple[float, float, float]:

@@ -3,18 +3,15 @@
 `labkit compare` runs it: one trial a scene and method. Lesson 09 reads the table.
 """
 
-import csv
-import io
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Integer, UInt8
-from tqdm.auto import tqdm
+from jaxtyping import UInt8
 
+from labkit.apps import trials
 from labkit.apps.evaluation import lift
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, SURFACE, TARGET
@@ -23,7 +20,6 @@ from labkit.pipeline import Pipeline, class_probabilities, most_probable
 from labkit.stacks import regions
 from labkit.stacks.engines import open_engine, segment_like_cpp
 from labkit.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
-from labkit.support.files import write_atomically
 
 FIRST_SEED, SCENES, SIZE = 600_000, 40, (320, 240)
 TRAINING_SEEDS = range(630_000, 630_024)  # what the classical methods are fitted to, and the small FCN is trained on
@@ -142,53 +138,37 @@ def trials_of_scene(seed: int, ways: dict[str, Method]) -> list[Row]:
                 tried[labels.tobytes()] = lift(world, perception)
         result = tried[labels.tobytes()]
         n = confusion_matrix(frame.labels, labels, len(CLASSES))
-        counts = (x for c in (TARGET, SURFACE) for x in (int(n[c, c]), int(n[c].sum() + n[:, c].sum() - n[c, c])))
-        reason = "lifted" if result.success else result.reason
-        rows.append(Row(seed, name, *counts, milliseconds, int(result.success), reason))
+        both, either = n.diagonal(), n.sum(axis=0) + n.sum(axis=1) - n.diagonal()
+        rows.append(
+            Row(
+                seed=seed,
+                method=name,
+                target_both=int(both[TARGET]),
+                target_either=int(either[TARGET]),
+                surface_both=int(both[SURFACE]),
+                surface_either=int(either[SURFACE]),
+                milliseconds=milliseconds,
+                lifted=int(result.success),
+                reason="lifted" if result.success else result.reason,
+            )
+        )
     return rows
 
 
 def run(out, first_seed: int = FIRST_SEED, scenes: int = SCENES, progress: bool = True) -> list[Row]:
-    """Run every method on so many scenes and write `out`, a CSV file with a row a trial.
-
-    What is finished is kept in OUT.unfinished: stopped with Ctrl-C, the same call goes on where it was. Raises
-    ValueError if that file is of other scenes.
-    """
+    """Run every method on so many scenes and write their rows to `out`, as `trials.make_table` does."""
     from data_gen import render, sample_scene
     from labkit.network import load_model, weights_path
 
-    unfinished = Path(f"{out}.unfinished")
-    rows = read(unfinished) if unfinished.exists() else []
-    seeds, done = range(first_seed, first_seed + scenes), {row.seed for row in rows}
-    if not done <= set(seeds):
-        raise ValueError(f"out: {unfinished} is of other scenes; remove it, or ask for those")
     training = [render(sample_scene(seed, "train"), SIZE) for seed in TRAINING_SEEDS]
     ways = methods(training, load_model(weights_path("unet")))
-    for seed in tqdm([seed for seed in seeds if seed not in done], unit="scene", disable=not progress):
-        rows += trials_of_scene(seed, ways)
-        write(unfinished, rows)
-    write(out, sorted(rows, key=lambda row: row.seed))
-    unfinished.unlink(missing_ok=True)
-    return read(out)
-
-
-def write(path, rows: Sequence[Row]) -> None:
-    """Write rows as CSV, whole or not at all."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(field.name for field in fields(Row))
-    writer.writerows(astuple(row) for row in rows)
-    write_atomically(path, text.getvalue().encode())
+    seeds = range(first_seed, first_seed + scenes)
+    return trials.make_table(out, Row, lambda seed: trials_of_scene(seed, ways), seeds, progress=progress)
 
 
 def read(path) -> list[Row]:
-    """Read what `write` wrote. Raises ValueError if the columns are others."""
-    with open(path, newline="") as file:
-        lines = list(csv.reader(file))
-    kinds = {field.name: field.type for field in fields(Row)}
-    if not lines or lines[0] != list(kinds):
-        raise ValueError(f"path: expected a CSV file with columns {', '.join(kinds)} in {path}")
-    return [Row(*(kind(cell) for kind, cell in zip(kinds.values(), line, strict=True))) for line in lines[1:]]
+    """Read a table. Raises ValueError if its columns are others."""
+    return trials.read_rows(path, Row)
 
 
 # ------------------------------------------------------------------------------------------------ the table
@@ -218,13 +198,16 @@ def summarise(rows: Sequence[Row]) -> list[Summary]:
     summaries = []
     for name in dict.fromkeys(row.method for row in rows):
         own = [row for row in rows if row.method == name]
-        counts = _columns(own)
+        target_both, target_either, surface_both, surface_either = (
+            sum(getattr(row, name) for row in own)
+            for name in ("target_both", "target_either", "surface_both", "surface_either")
+        )
         lifts = sum(row.lifted for row in own)
         summaries.append(
             Summary(
                 method=name,
-                target_iou=float(counts[:, 0].sum() / counts[:, 1].sum()),
-                surface_iou=float(counts[:, 2].sum() / counts[:, 3].sum()),
+                target_iou=target_both / target_either,
+                surface_iou=surface_both / surface_either,
                 milliseconds=float(np.median([row.milliseconds for row in own])),
                 lifts=lifts,
                 trials=len(own),
@@ -232,10 +215,6 @@ def summarise(rows: Sequence[Row]) -> list[Summary]:
             )
         )
     return summaries
-
-
-def _columns(rows: Sequence[Row]) -> Integer[np.ndarray, "n 4"]:
-    return np.array([(row.target_both, row.target_either, row.surface_both, row.surface_either) for row in rows])
 
 
 def table(rows: Sequence[Row]) -> str:

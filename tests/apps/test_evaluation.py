@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from data_gen import sample_scene
-from labkit.apps.evaluation import Trial, lift, perceive, run_trial, summarise, table
+from labkit.apps.evaluation import Trial, lift, run_trial, summarise, table
 from labkit.grasp import GraspPlan
-from labkit.labels import CLASSES, OBSTACLE, TARGET
+from labkit.labels import CLASSES, OBSTACLE, SURFACE, TARGET
 from labkit.metrics import confusion_matrix, iou
+from labkit.network import SmallSegNet, save_model
+from labkit.pipeline import Pipeline
 from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
 from labkit.sim.world import World
 
@@ -58,15 +60,15 @@ def test_lifting_a_non_target_is_a_failure():
         with World(post_scene(class_id)) as world:
             frame = world.render()
             mask = np.where(frame.instances == 1, TARGET, frame.labels)
-            frame = type(frame)(frame.rgb, frame.depth, frame.K, frame.T_base_cam, labels=mask)
-            outcomes[class_id] = lift(world, perceive(frame, None, 0.0))
+            outcomes[class_id] = lift(world, Pipeline().locate(frame, mask))
     assert outcomes[TARGET].success
     assert not outcomes[OBSTACLE].success and "obstacle" in outcomes[OBSTACLE].reason
 
 
 def test_no_candidate_is_a_failure_with_the_planners_reason():
     with World(post_scene(OBSTACLE)) as world:
-        perception = perceive(world.render(), None, 0.0)
+        frame = world.render()
+        perception = Pipeline().locate(frame, frame.labels)
         result = lift(world, perception)
     assert isinstance(perception.plan, GraspPlan)
     assert not result.success and result.reason == perception.plan.reason != ""
@@ -85,6 +87,23 @@ def test_the_command_writes_the_promised_keys(tmp_path):
     assert set(scores["iou"]) == set(CLASSES) and scores["trials"] == 2
     assert scores["mean_iou"] == scores["boundary_iou"] == scores["pixel_accuracy"] == 1.0
     assert "IoU" in run.stdout and "95 %" in run.stdout
+
+
+def test_weights_that_were_trained_again_are_loaded_again(tmp_path):
+    """The same file, first with weights that see nothing but surface, then nothing but obstacles."""
+    seen = []
+    for class_id in (SURFACE, OBSTACLE):
+        model = SmallSegNet()
+        model.logits.bias.data[class_id] = 1000.0
+        save_model(model, tmp_path / "w.pt")
+        seen.append(run_trial(post_scene(TARGET), tmp_path / "w.pt", (64, 48)).counts.sum(axis=0).argmax())
+    assert seen == [SURFACE, OBSTACLE]
+
+
+@pytest.mark.bad_input
+def test_a_crf_on_true_masks_is_not_silently_left_out():
+    with pytest.raises(ValueError, match="crf: expected none with true masks"):
+        run_trial(post_scene(TARGET), None, (64, 48), crf=True)
 
 
 def test_predicted_masks_are_scored_against_the_truth():

@@ -94,47 +94,15 @@ def test_a_scene_is_always_spoilt_in_the_same_way():
         assert (one == two).all() and (one != other).any()
 
 
-def trials(seed, calls=None):
-    """A trial that costs nothing, for the tests of `run`."""
-    if calls is not None:
-        calls.append(seed)
-    return [Row(seed, "true", 0.0, 1.0, seed % 2, "lifted" if seed % 2 else "slipped, alas")]
-
-
-def test_a_study_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
-    calls, out = [], tmp_path / "new" / "study.csv"
-
-    def stops(seed):
-        if seed == 13:
-            raise KeyboardInterrupt
-        return trials(seed, calls)
-
-    monkeypatch.setattr(mask_study, "trials_of_scene", stops)
-    with pytest.raises(KeyboardInterrupt):
-        mask_study.run(out, 10, 5, progress=False)
-    assert not out.exists() and calls == [10, 11, 12]
-    monkeypatch.setattr(mask_study, "trials_of_scene", lambda seed: trials(seed, calls))
-    rows = mask_study.run(out, 10, 5, progress=False)
-    assert calls == [10, 11, 12, 13, 14] and rows == mask_study.read(out) == [trials(s)[0] for s in range(10, 15)]
-    assert [path.name for path in out.parent.iterdir()] == ["study.csv"]
-
-
 def test_the_command_runs_it_and_says_what_came_out(tmp_path, monkeypatch):
+    def trials(seed):
+        return [Row(seed, "true", 0.0, 1.0, seed % 2, "lifted" if seed % 2 else "slipped")]
+
     monkeypatch.setattr(mask_study, "trials_of_scene", trials)
     out = tmp_path / "study.csv"
     done = CliRunner().invoke(app, ["study", "--out", str(out)])
     assert done.exit_code == 0 and len(mask_study.read(out)) == mask_study.SCENES
     assert f"{out}: {mask_study.SCENES} lifts, 50.0% succeeded (95 % interval 37.7% to 62.3%)" in done.output
-
-
-def test_what_is_left_of_other_scenes_is_not_mixed_in(tmp_path):
-    out = tmp_path / "study.csv"
-    mask_study.write(tmp_path / "study.csv.unfinished", trials(3))
-    with pytest.raises(ValueError, match="of other scenes"):
-        mask_study.run(out, 10, 5, progress=False)
-    (tmp_path / "study.csv.unfinished").write_text("seed,kind\n")
-    with pytest.raises(ValueError, match="expected a CSV file with columns seed, kind, strength"):
-        mask_study.run(out, 10, 5, progress=False)
 
 
 def test_bins_take_each_trial_once_and_their_upper_edge_only_at_the_end():

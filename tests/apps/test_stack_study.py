@@ -8,7 +8,7 @@ import pytest
 
 import data_gen
 from labkit.apps import stack_study
-from labkit.apps.stack_study import FIRST_SEED, SCENES, Row, read, summarise, table, trials_of_scene, write
+from labkit.apps.stack_study import FIRST_SEED, SCENES, Row, read, summarise, table, trials_of_scene
 from labkit.labels import CLASSES, SURFACE, TARGET
 from labkit.metrics import confusion_matrix, iou
 from labkit.stacks.threshold import HSVRange
@@ -59,27 +59,12 @@ def test_summaries_pool_counts_before_they_divide():
     assert [line.split("  ")[0] for line in table(rows).splitlines()[1:]] == ["a", "b"]
 
 
-def test_what_is_written_is_read_and_other_files_are_not(tmp_path):
-    write(tmp_path / "t.csv", [ROW])
-    assert read(tmp_path / "t.csv") == [ROW]
-    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(ValueError, match="path: expected a CSV file with columns seed"):
-        read(tmp_path / "other.csv")
-
-
-def test_a_stopped_run_goes_on_and_other_scenes_are_refused(tmp_path, monkeypatch):
-    asked = []
+def test_a_run_tries_every_method_in_every_scene(tmp_path, monkeypatch):
     monkeypatch.setattr(stack_study, "methods", lambda frames, unet: {"true": lambda frame: frame.labels})
     monkeypatch.setattr(stack_study, "TRAINING_SEEDS", range(0))
-    trial = stack_study.trials_of_scene
-    monkeypatch.setattr(stack_study, "trials_of_scene", lambda seed, ways: (asked.append(seed), trial(seed, ways))[1])
-    write(tmp_path / "t.csv.unfinished", [replace(ROW, seed=600_001)])
     rows = stack_study.run(tmp_path / "t.csv", 600_001, 2, progress=False)
-    assert asked == [600_002] and [row.seed for row in rows] == [600_001, 600_002]
-    assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
-    write(tmp_path / "t.csv.unfinished", [ROW])
-    with pytest.raises(ValueError, match=r"out: .*other scenes"):
-        stack_study.run(tmp_path / "t.csv", 600_001, 2, progress=False)
+    assert [(row.seed, row.method, row.lifted) for row in rows] == [(600_001, "true", 1), (600_002, "true", 1)]
+    assert read(tmp_path / "t.csv") == rows
 
 
 def test_the_committed_table_is_whole_and_says_what_the_lesson_says():

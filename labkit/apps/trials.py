@@ -1,0 +1,75 @@
+"""Trials over many scenes, in several processes if wanted, and their table: a CSV file with a row for each trial."""
+
+import csv
+import io
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import astuple, fields
+from pathlib import Path
+
+from tqdm.auto import tqdm
+
+from labkit.support.files import write_atomically
+
+
+def in_processes(function: Callable, items: Iterable, workers: int = 1) -> Iterator:
+    """Yield function(item) for each item, in their order; with several workers in as many processes."""
+    if workers == 1:
+        yield from map(function, items)
+        return
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_one_thread) as executor:
+        yield from executor.map(function, items)
+
+
+def _one_thread() -> None:
+    """Workers share the cores among themselves, not each with all threads of PyTorch."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def make_table(
+    out, kind: type, trials_of_scene: Callable[[int], list], seeds: Sequence[int], workers: int = 1, progress=True
+) -> list:
+    """Try every scene and write the rows to `out`, scene by scene in the order of `seeds`; returns them.
+
+    kind: the dataclass of a row, with a field `seed`. trials_of_scene: seed -> its rows. What is finished is kept in
+    OUT.unfinished: stopped with Ctrl-C, the same call goes on where it was. Raises ValueError if that file is of other
+    scenes.
+    """
+    unfinished = Path(f"{out}.unfinished")
+    done = {}
+    for row in read_rows(unfinished, kind) if unfinished.exists() else []:
+        done.setdefault(row.seed, []).append(row)
+    if not done.keys() <= set(seeds):
+        raise ValueError(f"out: {unfinished} is of other scenes; remove it, or ask for those")
+    missing = [seed for seed in seeds if seed not in done]
+    with tqdm(total=len(seeds), initial=len(done), unit="scene", disable=not progress) as bar:
+        for rows in in_processes(trials_of_scene, missing, workers):
+            done[rows[0].seed] = rows
+            write_rows(unfinished, [row for seed in sorted(done) for row in done[seed]])
+            bar.update()
+    rows = [row for seed in seeds for row in done[seed]]
+    write_rows(out, rows)
+    unfinished.unlink(missing_ok=True)
+    return rows
+
+
+def write_rows(path, rows: Sequence) -> None:
+    """Write dataclasses of one kind as CSV, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(field.name for field in fields(rows[0]))
+    writer.writerows(astuple(row) for row in rows)
+    write_atomically(path, text.getvalue().encode())
+
+
+def read_rows(path, kind: type) -> list:
+    """Read what `write_rows` wrote of dataclasses of this kind. Raises ValueError if the columns are others."""
+    with open(path, newline="") as file:
+        lines = list(csv.reader(file))
+    types = {field.name: field.type for field in fields(kind)}
+    if not lines or lines[0] != list(types):
+        raise ValueError(f"path: expected a CSV file with columns {', '.join(types)} in {path}")
+    return [kind(*(of(cell) for of, cell in zip(types.values(), line, strict=True))) for line in lines[1:]]
