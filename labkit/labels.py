@@ -1,4 +1,4 @@
-"""Label images: which classes there are, one-hot tensors and back, and how labels are drawn (the text's section 1)."""
+"""Label images: which classes there are, one-hot tensors and back, and how labels are drawn (topic 01)."""
 
 import numpy as np
 from jaxtyping import Integer, Num, UInt8
@@ -15,9 +15,9 @@ IGNORE_COLOUR = np.array([255, 255, 255], dtype=np.uint8)
 
 
 def one_hot(y: Integer[np.ndarray, "*shape"], C: int = len(CLASSES)) -> UInt8[np.ndarray, "*shape C"]:
-    """Turn labels into the text's one-hot tensor Y, one more axis of length C; an ignored pixel is all zeros.
+    """Turn labels into the one-hot tensor Y, with one more axis, of length C; an ignored pixel is all zeros.
 
-    Raises ValueError if a label is neither in 0 .. C - 1 nor 255. Section 1 of the text.
+    Raises ValueError if a label is neither in 0 .. C - 1 nor 255. Topic 01.
 
     >>> one_hot(np.array([[0, 2]]), 3)
     array([[[1, 0, 0], [0, 0, 1]]], dtype=uint8)
@@ -29,7 +29,7 @@ def one_hot(y: Integer[np.ndarray, "*shape"], C: int = len(CLASSES)) -> UInt8[np
 def from_one_hot(Y: Num[np.ndarray, "*shape C"]) -> UInt8[np.ndarray, "*shape"]:
     """Turn a one-hot tensor back into labels; all zeros become 255 (ignore).
 
-    Raises ValueError if an entry is not 0 or 1, or a pixel has several classes. Section 1 of the text.
+    Raises ValueError if an entry is not 0 or 1, or a pixel has several classes. Topic 01.
 
     >>> from_one_hot(np.array([[1, 0], [0, 1], [0, 0]]))
     array([  0,   1, 255], dtype=uint8)
@@ -41,7 +41,7 @@ def from_one_hot(Y: Num[np.ndarray, "*shape C"]) -> UInt8[np.ndarray, "*shape"]:
         raise ValueError("Y: expected only 0 and 1; for probabilities use argmax over the last axis")
     count = Y.sum(axis=-1)
     if count.size and count.max() > 1:
-        raise ValueError(f"Y: expected at most one class a pixel, got a pixel with {int(count.max())}")
+        raise ValueError(f"Y: expected at most one class per pixel, got a pixel with {int(count.max())}")
     return np.where(count == 0, IGNORE, Y.argmax(axis=-1)).astype(np.uint8)
 
 

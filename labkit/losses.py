@@ -1,7 +1,6 @@
-"""The loss of the text and its gradient, in NumPy to be read and in PyTorch to be trained with.
+"""Cross-entropy and its gradient, in NumPy to be read and in PyTorch to be trained with (topics 03 and 05).
 
-Sections 3 and 6 and problems 1 and 5 of the text. The NumPy functions sum over pixels, as the text does, and reduce
-in float64; a pixel labelled 255 adds neither loss nor gradient.
+The NumPy functions sum over pixels, in float64; a pixel labelled 255 adds neither loss nor gradient.
 """
 
 from typing import TYPE_CHECKING
@@ -23,7 +22,7 @@ def softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
     """Turn logits into probabilities over the last axis, the classes.
 
     Adding a constant to all logits of a pixel changes nothing, so the largest is taken off first: exp cannot overflow.
-    Raises ValueError if z has a NaN or infinite entry, or no class. Section 3 of the text.
+    Raises ValueError if z has a NaN or infinite entry, or no class. Topic 03.
 
     >>> softmax(np.array([1e4, 1e4, -1e4]))
     array([0.5, 0.5, 0. ])
@@ -36,7 +35,7 @@ def softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
 def log_softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
     """Give the logarithm of the softmax, z - log(sum(exp(z))), right also where the probability itself rounds to 0.
 
-    Raises ValueError as softmax does. Problem 1 of the text.
+    Raises ValueError as softmax does. Topic 03.
 
     >>> log_softmax(np.array([0.0, -1e4]))
     array([ 0., -10000.])
@@ -49,10 +48,10 @@ def log_softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C
 def cross_entropy(
     z: Num[np.ndarray, "*shape C"], y: Integer[np.ndarray, "*shape"], weights: Num[np.ndarray, " C"] | None = None
 ) -> float:
-    """Sum -w[y_p] log p(y_p) over the pixels p: the text's loss, weighted if `weights` are given.
+    """Sum -w[y] log p(y) over the pixels, y being a pixel's label; w is 1 unless `weights` are given.
 
     z: logits; y: labels; weights: one number above 0 for each class. Raises ValueError if shapes do not fit, z has NaN,
-    a label is neither in 0 .. C - 1 nor 255, or a weight is not above 0. Section 3 of the text.
+    a label is neither in 0 .. C - 1 nor 255, or a weight is not above 0. Topics 03 and 05.
 
     >>> round(cross_entropy(np.zeros((2, 4)), np.array([2, 255])), 4)  # one counted pixel, four equal classes: log 4
     1.3863
@@ -64,15 +63,15 @@ def cross_entropy(
 def cross_entropy_grad(
     z: Num[np.ndarray, "*shape C"], y: Integer[np.ndarray, "*shape"], weights: Num[np.ndarray, " C"] | None = None
 ) -> Float64[np.ndarray, "*shape C"]:
-    """Differentiate cross_entropy by its logits: w[y_p] (p - one-hot of y_p) at each pixel, which sums to 0 there.
+    """Differentiate cross_entropy by its logits: w[y] (p - one-hot of y) at each pixel, which sums to 0 there.
 
-    Arguments and errors as in cross_entropy. Problems 1 and 5 of the text.
+    Arguments and errors as in cross_entropy. Topics 03 and 05.
 
     >>> cross_entropy_grad(np.zeros((1, 2)), np.array([1]), weights=np.array([1.0, 10.0]))
     array([[ 5., -5.]])
     """
     z, Y, w = _check_pixels(z, y, weights)
-    pixel_weights = Y @ w  # w[y_p], and 0 where the pixel is ignored
+    pixel_weights = Y @ w  # w[y], and 0 where the pixel is ignored
     return pixel_weights[..., None] * (softmax(z) - Y)
 
 
@@ -82,7 +81,7 @@ def class_weights(counts: Num[np.ndarray, " C"], scheme: str) -> Float64[np.ndar
     scheme: "none", all 1; "inverse", w_c proportional to 1 / counts_c; "sqrt", to 1 / sqrt(counts_c), which is milder.
     Scaled so that the mean weight over the counted pixels is 1: a learning rate found without weights still fits. A
     class without pixels gets 1, the mean, and has no part in the scaling. Raises ValueError for an unknown scheme, a
-    negative count, or no pixel at all. Section 3 of the text.
+    negative count, or no pixel at all. Topic 05.
 
     >>> class_weights(np.array([900, 100, 0]), "inverse")
     array([0.55555556, 5. , 1. ])
@@ -107,7 +106,7 @@ def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -
     p: probabilities of the classes where pixels look alike, summing to 1 over the last axis; w: class weights above 0.
     This q minimises the expected weighted loss -sum_c w_c p_c log q_c, so a weighted network answers with q; it is the
     price of weights, and dividing its answer by w undoes it. Raises ValueError if p is no distribution or a weight is
-    not above 0. Problem 5 of the text, continued.
+    not above 0. Topic 05.
 
     >>> weighted_optimum(np.array([0.9, 0.1]), np.array([1.0, 9.0]))
     array([0.5, 0.5])
@@ -126,13 +125,13 @@ def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -
 
 
 def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=None) -> "torch.Tensor":
-    """Give the loss to train with: the text's weighted sum, divided by the number of counted pixels.
+    """Give the loss to train with: the weighted sum of `cross_entropy`, divided by the number of counted pixels.
 
     logits: (N, C, H, W), any floating dtype; labels: (N, H, W), any integer dtype, 255 is left out; weights: (C,),
     array or tensor, or None. Returns a scalar, 0 if no pixel is counted. PyTorch's `CrossEntropyLoss(weight=...)`
     divides by the sum of the counted pixels' weights instead: there weights cancel in a batch of one class, here they
     never do. Raises ValueError if shapes do not fit, a label or weight is out of range, or logits have NaN or infinity.
-    Section 6 of the text.
+    Topic 05.
 
     >>> import torch
     >>> segmentation_loss(torch.zeros(1, 2, 1, 1), torch.tensor([[[1]]]), weights=[1.0, 10.0]) / 10.0
@@ -183,10 +182,10 @@ def _check_weights(name: str, w, num_classes: int) -> np.ndarray:
 
 
 def _check_pixels(z, y, weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the logits, the one-hot tensor Y of the text (all zeros where ignored) and one weight a class."""
+    """Return the logits, the one-hot tensor Y (all zeros where ignored) and one weight per class."""
     z, y = _check_logits(z), np.asarray(y)
     if y.shape != z.shape[:-1]:
-        raise ValueError(f"y: expected one label to each pixel of z, shape {z.shape[:-1]}, got {y.shape}")
+        raise ValueError(f"y: expected one label for each pixel of z, shape {z.shape[:-1]}, got {y.shape}")
     num_classes = z.shape[-1]
     w = np.ones(num_classes) if weights is None else _check_weights("weights", weights, num_classes)
     return z, one_hot(y, num_classes), w

@@ -1,4 +1,4 @@
-"""How good is a mask: the confusion matrix and every score that follows from it (the text's section 3, problem 2).
+"""How good is a mask: the confusion matrix and every score that follows from it (topic 04).
 
 Counts add up over frames and scores do not: keep one confusion matrix (and one pair of boundary counts) for a whole
 test set, add each frame's to it, and divide once at the end. A score of 0 / 0 is NaN, neither 0 nor 1.
@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, Integer, Num, UInt8
 
 from labkit.labels import IGNORE
-from labkit.support.validation import check_finite, check_labels, check_shape
+from labkit.support.validation import check_finite, check_labels
 
 
 def confusion_matrix(
@@ -24,14 +24,12 @@ def confusion_matrix(
 
     y_true, y_pred: labels of any one shape and any integer dtype. A pixel with y_true == ignore is left out, whatever
     is predicted there; ignore=None leaves out none. Raises ValueError if the shapes differ, or if a label of a counted
-    pixel is not in 0 .. num_classes - 1. Problem 2 of the text.
+    pixel is not in 0 .. num_classes - 1. Topic 04.
 
     >>> confusion_matrix(np.array([0, 0, 1, 255]), np.array([0, 1, 1, 0]), 2)
     array([[1, 1], [0, 1]])
     """
-    from labkit.support.metrics_kernels import (
-        count_pairs,  # here, so that importing this module does not wait for numba
-    )
+    from labkit.support.metrics_kernels import count_pairs  # here, so that importing this module waits for no numba
 
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.
@@ -54,7 +52,7 @@ def iou(n: Num[np.ndarray, "C C"]) -> Float64[np.ndarray, " C"]:
     """Score each class with TP / (TP + FP + FN): intersection over union of its true and its predicted pixels.
 
     n: confusion matrix. NaN where a class is in neither image, because 0 / 0 is not a score. Raises ValueError if n is
-    not a square matrix of counts. Section 3 and problem 2 of the text.
+    not a square matrix of counts. Topic 04.
 
     >>> iou(np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]]))
     array([0.75 , 0.66666667, nan])
@@ -67,8 +65,8 @@ def iou(n: Num[np.ndarray, "C C"]) -> Float64[np.ndarray, " C"]:
 def mean_iou(n: Num[np.ndarray, "C C"]) -> float:
     """Average the IoU over the classes that are present, in the truth or in the prediction; NaN if none is.
 
-    The text divides by C, which is 0 / 0 for a class that is in neither image. A class that is only predicted counts,
-    with an IoU of 0. n: confusion matrix. Section 3 of the text.
+    Dividing by C instead would score a class that is in neither image with 0 / 0. A class that is only predicted
+    counts, with an IoU of 0. n: confusion matrix. Topic 04.
 
     >>> round(mean_iou(np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]])), 4)
     0.7083
@@ -79,7 +77,7 @@ def mean_iou(n: Num[np.ndarray, "C C"]) -> float:
 
 
 def pixel_accuracy(n: Num[np.ndarray, "C C"]) -> float:
-    """Give the share of the counted pixels whose class is right; NaN if no pixel is counted. Section 3 of the text.
+    """Give the share of the counted pixels whose class is right; NaN if no pixel is counted (topic 04).
 
     >>> pixel_accuracy(np.array([[6, 2], [0, 4]])) == 10 / 12
     True
@@ -92,7 +90,7 @@ def precision_recall(n: Num[np.ndarray, "C C"]) -> tuple[Float64[np.ndarray, " C
     """Score each class with TP / (TP + FP) and TP / (TP + FN).
 
     n: confusion matrix. Precision is NaN for a class that is never predicted, recall for one that is never true. IoU
-    cannot tell a mask that is too large from one that is too small; these two can. Problem 2 of the text.
+    cannot tell a mask that is too large from one that is too small; these two can. Topic 04.
 
     >>> precision_recall(np.array([[6, 2], [0, 4]]))
     (array([1. , 0.66666667]), array([0.75, 1. ]))
@@ -103,16 +101,17 @@ def precision_recall(n: Num[np.ndarray, "C C"]) -> tuple[Float64[np.ndarray, " C
 
 
 def boundary_iou(
-    y_true: Integer[np.ndarray, "H W"],
-    y_pred: Integer[np.ndarray, "H W"],
+    y_true: Integer[np.ndarray, "*batch H W"],
+    y_pred: Integer[np.ndarray, "*batch H W"],
     num_classes: int,
     width: int | None = None,
     ignore: int | None = IGNORE,
 ) -> Float64[np.ndarray, " {num_classes}"]:
     """Score the edge of each class's mask: IoU of the pixels that lie inside it and within `width` of its boundary.
 
-    Boundary IoU of Cheng et al. (2021). For many frames, add up `boundary_counts` and divide once. A width that reaches
-    the middle of every mask gives the plain IoU. NaN where a class is in neither image. Arguments and errors as there.
+    Boundary IoU of Cheng et al. (2021), over one image or a batch of them. A width that reaches the middle of every
+    mask gives the plain IoU. NaN where a class is in neither mask. Arguments and errors as in `boundary_counts`, which
+    are what to add up over batches. Topic 04.
 
     >>> y = np.zeros((5, 5), int); y[1:4, 1:4] = 1
     >>> boundary_iou(y, np.roll(y, 1, axis=1), 2, width=1)[1]  # moved by a pixel, a rim of 8 shares 4: 4 / (8 + 8 - 4)
@@ -122,8 +121,8 @@ def boundary_iou(
 
 
 def boundary_counts(
-    y_true: Integer[np.ndarray, "H W"],
-    y_pred: Integer[np.ndarray, "H W"],
+    y_true: Integer[np.ndarray, "*batch H W"],
+    y_pred: Integer[np.ndarray, "*batch H W"],
     num_classes: int,
     width: int | None = None,
     ignore: int | None = IGNORE,
@@ -132,22 +131,27 @@ def boundary_counts(
 
     The band of a mask: its pixels with a pixel outside it, or the image's border, within `width` rows and columns.
     width: pixels, at least 1; None is the paper's 2 % of the image's diagonal. An ignored pixel belongs to no mask,
-    true or predicted. Raises ValueError if the shapes differ, a label is out of range, or width is below 1.
+    true or predicted. The counts of a batch (..., H, W) are summed. Raises ValueError if the shapes differ, a label is
+    out of range, or width is below 1.
 
     >>> boundary_counts(np.array([[0, 0, 1, 1]]), np.array([[0, 1, 1, 1]]), 2, width=1)
     (array([1, 2]), array([2, 3]))
     """
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
-    check_shape("y_true", y_true, (None, None))
+    if y_true.ndim < 2:
+        raise ValueError(f"y_true: expected images (..., H, W), got shape {y_true.shape}")
     _check_counted(y_true, y_pred, num_classes, ignore)
     if width is None:
-        width = max(1, round(0.02 * np.hypot(*y_true.shape)))
+        width = max(1, round(0.02 * np.hypot(*y_true.shape[-2:])))
     if width < 1:
         raise ValueError(f"width: expected at least 1 pixel, got {width}")
 
     ignored = y_true == ignore
     true, pred = (np.where(ignored, np.uint8(IGNORE), y.astype(np.uint8)) for y in (y_true, y_pred))
-    true_band, pred_band = _boundary_band(true, width), _boundary_band(pred, width)
+    true_band, pred_band = (
+        np.array([_boundary_band(image, width) for image in y.reshape(-1, *y.shape[-2:])], bool).reshape(y.shape)
+        for y in (true, pred)
+    )
 
     def pixels_per_class(labels):  # entry 255, the ignored pixels, is cut off
         return np.bincount(labels, minlength=IGNORE + 1)[:num_classes].astype(np.int64)

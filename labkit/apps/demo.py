@@ -76,7 +76,7 @@ def report(story: Story) -> str:
         "scene": f"seed {story.spec.seed}, {counts['target']} target(s) among {counts['obstacle']} obstacles",
         "render": f"{width} x {height} RGB-D image",
         "warm-up": "a first run, which compiles",
-        "network": f"probabilities of {len(CLASSES)} classes a pixel",
+        "network": f"probabilities of {len(CLASSES)} classes per pixel",
         "labels": f"{np.count_nonzero(p.labels == TARGET)} target pixels",
         "crf": "labels refined along edges of colour and depth",
         "back_projection": f"{np.count_nonzero(np.isfinite(p.points[..., 2]))} points in the base frame",

@@ -1,6 +1,6 @@
 """What is a point of IoU worth? Masks spoilt on purpose, scored by IoU, and by whether the arm still lifts the object.
 
-`labkit study` runs it: one trial a scene and way of spoiling its mask. Lesson 07 reads the table.
+`labkit study` runs it: one trial per scene and way of spoiling its mask. Lesson 07 reads the table.
 """
 
 from collections.abc import Callable, Iterable, Sequence

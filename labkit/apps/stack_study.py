@@ -1,6 +1,6 @@
 """The stacks side by side: every way to a mask on the same frames, by its IoU, its time, and the lifts that follow.
 
-`labkit compare` runs it: one trial a scene and method. Lesson 09 reads the table.
+`labkit compare` runs it: one trial per scene and method. Lesson 09 reads the table.
 """
 
 import time
@@ -218,7 +218,7 @@ def summarise(rows: Sequence[Row]) -> list[Summary]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """The comparison as text: a line a method."""
+    """The comparison as text: a line per method."""
     lines = [f"{'method':<25}{'target IoU':>11}{'table IoU':>11}{'ms':>8}{'lifted':>9}   95 % interval"]
     for s in summarise(rows):
         low, high = s.interval

@@ -1,4 +1,4 @@
-"""What the MATLAB listing does, step by step: labels with scores, a montage, the cloud of a mask (section 9)."""
+"""What the MATLAB listing does, step by step: labels with scores, a montage, the cloud of a mask (topic 09)."""
 
 from collections.abc import Callable
 

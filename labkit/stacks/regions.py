@@ -1,4 +1,4 @@
-"""Segmentation without labels: k-means of colours, connected components, and the choice of one (section 10)."""
+"""Segmentation without labels: k-means of colours, connected components, and the choice of one (topic 09)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Integer, UInt8
+from scipy import ndimage
+from scipy.cluster.vq import kmeans2, vq
 
 from labkit.support.validation import check_finite, check_rgb, check_shape
 
@@ -17,8 +19,7 @@ def kmeans(
 ) -> tuple[Float64[np.ndarray, "k D"], Integer[np.ndarray, " N"]]:
     """Cluster points by Lloyd's algorithm from a k-means++ start; returns the means and each point's cluster.
 
-    It ends when no point changes its cluster, or after `iterations`. A cluster that loses all its points takes the
-    point that is furthest from its mean. Raises ValueError for fewer than k different points.
+    Raises ValueError for fewer than k different points.
 
     >>> means, labels = kmeans(np.array([[0.0], [1.0], [10.0]]), 2)
     >>> sorted(means.ravel().tolist()), bool(labels[0] == labels[1])
@@ -27,27 +28,8 @@ def kmeans(
     X = check_finite("X", check_shape("X", X, (None, None))).astype(np.float64)
     if not 1 <= k <= len(np.unique(X, axis=0)):
         raise ValueError(f"k: expected 1 to {len(np.unique(X, axis=0))}, the number of different points, got {k}")
-    rng = np.random.default_rng(seed)
-    means = X[rng.integers(len(X))][None]
-    while len(means) < k:  # the next start is drawn by its squared distance to the nearest one
-        weight = _squared_distances(X, means).min(axis=1)
-        means = np.vstack([means, X[rng.choice(len(X), p=weight / weight.sum())]])
-    labels = np.full(len(X), -1)
-    for _ in range(iterations):
-        distances = _squared_distances(X, means)
-        nearest = distances.argmin(axis=1)
-        for empty in np.setdiff1d(np.arange(k), nearest):
-            furthest = distances[np.arange(len(X)), nearest].argmax()
-            nearest[furthest], distances[furthest] = empty, 0.0
-        if np.array_equal(nearest, labels):
-            break
-        labels = nearest
-        means = np.stack([X[labels == j].mean(axis=0) for j in range(k)])
-    return means, labels
-
-
-def _squared_distances(X: Float[np.ndarray, "N D"], means: Float[np.ndarray, "k D"]) -> Float[np.ndarray, "N k"]:
-    return ((X[:, None, :] - means[None]) ** 2).sum(axis=2)
+    means, _ = kmeans2(X, k, iter=iterations, minit="++", missing="raise", rng=np.random.default_rng(seed))
+    return means, vq(X, means)[0]
 
 
 def segment_kmeans(rgb: UInt8[np.ndarray, "H W 3"], k: int, seed: int = 0) -> UInt8[np.ndarray, "H W"]:
@@ -55,12 +37,11 @@ def segment_kmeans(rgb: UInt8[np.ndarray, "H W 3"], k: int, seed: int = 0) -> UI
 
     Colours are compared in CIE L*a*b*, where distance is closer to what is seen; the means are found from a few
     thousand pixels. A region need not be connected: `components` takes it apart. Raises ValueError if the image has
-    fewer than k colours among them. Section 10 of the text.
+    fewer than k colours among them. Topic 09.
     """
     lab = cv2.cvtColor(check_rgb("rgb", rgb).astype(np.float32) / 255.0, cv2.COLOR_RGB2Lab).reshape(-1, 3)
-    sample = lab[:: max(1, len(lab) // SAMPLE)]
-    means, _ = kmeans(sample, k, seed)
-    regions = np.concatenate([_squared_distances(part, means).argmin(axis=1) for part in np.array_split(lab, 16)])
+    means, _ = kmeans(lab[:: max(1, len(lab) // SAMPLE)], k, seed)
+    regions = vq(lab, means)[0]
     order = np.argsort(-np.bincount(regions, minlength=k), kind="stable")
     rank = np.empty(k, np.uint8)
     rank[order] = np.arange(k)
@@ -79,16 +60,12 @@ def components(regions: Integer[np.ndarray, "H W"], connectivity: int = 4) -> In
     regions = check_shape("regions", regions, (None, None))
     if connectivity not in (4, 8):
         raise ValueError(f"connectivity: expected 4 or 8, got {connectivity!r}")
-    pieces, count = np.zeros(regions.shape, np.int32), 0
+    pieces, structure = np.zeros(regions.shape, np.int32), ndimage.generate_binary_structure(2, connectivity // 4)
     for value in np.unique(regions):
-        n, found = cv2.connectedComponents((regions == value).astype(np.uint8), connectivity=connectivity)
-        pieces += np.where(found > 0, found + count, 0)
-        count += n - 1
-    first = np.full(count + 1, pieces.size)
-    np.minimum.at(first, pieces.ravel(), np.arange(pieces.size))
-    number = np.empty(count + 1, np.int32)
-    number[np.argsort(first[1:]) + 1] = np.arange(1, count + 1)
-    return number[pieces]
+        found, _ = ndimage.label(regions == value, structure)
+        pieces += np.where(found > 0, found + pieces.max(), 0)
+    _, first, pieces = np.unique(pieces, return_index=True, return_inverse=True)
+    return (1 + first.argsort().argsort()[pieces]).astype(np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +112,8 @@ def measure(pieces: Integer[np.ndarray, "H W"]) -> Measurements:
     uu, vv = mean(u * u) - centroid[:, 0] ** 2 + 1 / 12, mean(v * v) - centroid[:, 1] ** 2 + 1 / 12
     uv = mean(u * v) - centroid[:, 0] * centroid[:, 1]
     middle, radius = (uu + vv) / 2, np.hypot((uu - vv) / 2, uv)
-    box = np.stack([_extreme(np.minimum, flat, u, len(area), W), _extreme(np.minimum, flat, v, len(area), H)], axis=1)
-    far = np.stack([_extreme(np.maximum, flat, u, len(area), -1), _extreme(np.maximum, flat, v, len(area), -1)], axis=1)
-    box = np.hstack([box, far])
+    box = np.array([(u.start, v.start, u.stop - 1, v.stop - 1) for v, u in ndimage.find_objects(pieces)])
+    box = box.reshape(-1, 4)
     sides = box[:, 2:] - box[:, :2] + 1
     return Measurements(
         area=area,
@@ -147,13 +123,6 @@ def measure(pieces: Integer[np.ndarray, "H W"]) -> Measurements:
         elongation=np.sqrt((middle + radius) / np.maximum(middle - radius, 1 / 12)),
         at_border=(box[:, :2] == 0).any(axis=1) | (box[:, 2:] == (W - 1, H - 1)).any(axis=1),
     )
-
-
-def _extreme(reduce, flat, values, count: int, start: int) -> Integer[np.ndarray, " n"]:
-    """The smallest or largest value of each piece."""
-    out = np.full(count + 1, start, np.int64)
-    reduce.at(out, flat, values.astype(np.int64))
-    return out[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +145,7 @@ def learn_typical(masks: Sequence[Bool[np.ndarray, "H W"]]) -> Typical:
 def choose_region(measurements: Measurements, typical: Typical, allowed: Bool[np.ndarray, " n"]) -> int:
     """Select the piece that looks most like the wanted ones: least Mahalanobis distance; its number, 0 if none may be.
 
-    allowed: which pieces come into question, such as `~measurements.at_border`. Section 10's "label of the target".
+    allowed: which pieces come into question, such as `~measurements.at_border`. Topic 09.
     """
     allowed = check_shape("allowed", allowed, measurements.area.shape)
     if not allowed.any():

@@ -1,4 +1,4 @@
-"""The Mathematica listing's network: three convolutions, no pooling; small enough to train in a lesson (section 10)."""
+"""The Mathematica listing's network: three convolutions, no pooling; small enough to train in a lesson (topic 09)."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from labkit.support.validation import check_labels, check_rgb, check_same_size
 class SmallFCN(nn.Module):
     """Convolutions of 16, 32 and `num_classes` channels: 5,220 weights, and a pixel sees 5x5 pixels.
 
-    Its output is a class a pixel, (N, C, H, W), any H and W; the listing's decoder asks for one class an image.
+    Its output has logits for each pixel, (N, C, H, W), any H and W; the listing's decoder asks for one class per image.
 
     >>> SmallFCN()(torch.zeros(1, 3, 5, 7)).shape
     torch.Size([1, 4, 5, 7])

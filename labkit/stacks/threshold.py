@@ -47,7 +47,7 @@ BROWN = HSVRange((5, 50, 50), (20, 255, 255))  # the listing's range for a table
 
 
 def hsv_mask(rgb: UInt8[np.ndarray, "H W 3"], colours: HSVRange) -> Bool[np.ndarray, "H W"]:
-    """Which pixels of an RGB image have a colour in the range. Section 8 of the text.
+    """Which pixels of an RGB image have a colour in the range (topic 09).
 
     >>> hsv_mask(np.array([[[150, 90, 40], [40, 90, 150]]], np.uint8), BROWN)
     array([[ True, False]])
