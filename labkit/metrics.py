@@ -148,10 +148,7 @@ def boundary_counts(
 
     ignored = y_true == ignore
     true, pred = (np.where(ignored, np.uint8(IGNORE), y.astype(np.uint8)) for y in (y_true, y_pred))
-    true_band, pred_band = (
-        np.array([_boundary_band(image, width) for image in y.reshape(-1, *y.shape[-2:])], bool).reshape(y.shape)
-        for y in (true, pred)
-    )
+    true_band, pred_band = _boundary_bands(true, width), _boundary_bands(pred, width)
 
     def pixels_per_class(labels):  # entry 255, the ignored pixels, is cut off
         return np.bincount(labels, minlength=IGNORE + 1)[:num_classes].astype(np.int64)
@@ -160,16 +157,19 @@ def boundary_counts(
     return intersection, pixels_per_class(true[true_band]) + pixels_per_class(pred[pred_band]) - intersection
 
 
-def _boundary_band(y: UInt8[np.ndarray, "H W"], width: int) -> Bool[np.ndarray, "H W"]:
-    """Mark the pixels that have another label, or the image's border, within `width` rows and columns.
+def _boundary_bands(y: UInt8[np.ndarray, "*batch H W"], width: int) -> Bool[np.ndarray, "*batch H W"]:
+    """In each image, mark the pixels that have another label, or the image's border, within `width` rows and columns.
 
     One erosion and one dilation serve all classes at once: a window holds one label only if its minimum is its maximum.
     """
-    width = min(width, max(y.shape))  # a wider window sees no more
+    width = min(width, max(y.shape[-2:]))  # a wider window sees no more
     window = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
-    # OpenCV's windows end where the image does; a frame of another label makes the image's border a boundary.
-    framed = np.pad(y, 1, constant_values=IGNORE)
-    return (cv2.erode(framed, window) != cv2.dilate(framed, window))[1:-1, 1:-1]
+    bands = np.empty(y.shape, bool)
+    for image in np.ndindex(y.shape[:-2]):
+        # OpenCV's windows end where the image does; a frame of another label makes the image's border a boundary.
+        framed = np.pad(y[image], 1, constant_values=IGNORE)
+        bands[image] = (cv2.erode(framed, window) != cv2.dilate(framed, window))[1:-1, 1:-1]
+    return bands
 
 
 def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
