@@ -35,7 +35,7 @@ release: .venv/installed
 	$(BIN)/labkit release $(ARGS)
 
 stacks: .venv/installed
-	$(BIN)/python -m tests.stacks.run $(ARGS)
+	$(BIN)/python -m pytest -q tests/stacks/test_programs.py $(ARGS)
 
 bench: .venv-bench/installed
 	.venv-bench/bin/python -m tests.bench.run $(ARGS)

@@ -130,21 +130,10 @@ def test_train_writes_weights_and_a_second_run_finds_it_done(monkeypatch, capsys
     assert (tmp_path / "unet.pt").read_bytes() != weights
 
 
-def test_ctrl_c_ends_training_with_status_130_and_a_checkpoint(data, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "labkit.apps.cli",
-        "train",
-        data,
-        "--epochs",
-        "100000",
-        "--device",
-        "cpu",
-        "--out",
-        tmp_path,
-    ]
-    with subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True) as process:
+def test_ctrl_c_ends_training_with_status_130_and_says_where_the_checkpoint_is(data, tmp_path):
+    words = ["train", data, "--epochs", 100_000, "--device", "cpu", "--out", tmp_path]
+    command = [sys.executable, "-m", "labkit.apps.cli", *map(str, words)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         said = ""
         while "loss" not in said:  # the progress bar shows a loss as soon as a step is done
             character = process.stderr.read(1)

@@ -9,13 +9,12 @@ from scipy.ndimage import distance_transform_edt
 from labkit.apps import degrade
 
 
-def blob(seed=0, size=(40, 56)):
-    """A mask with a slanted side, a notch and a hole, and more to the right than to the left."""
-    v, u = np.mgrid[0 : size[0], 0 : size[1]]
+def blob():
+    """A mask with a slanted side, a notch and a hole, and more to the right than to the left; read-only."""
+    v, u = np.mgrid[:40, :56]
     mask = (v > 5) & (v < 33) & (u > 12) & (u + 0.4 * v < 52)
-    mask[18:22, 12:20] = False
-    row, column = np.random.default_rng(seed).integers((8, 24), (30, 34))
-    mask[row - 1 : row + 2, column - 1 : column + 2] = False
+    mask[18:22, 12:20] = mask[14:17, 28:31] = False
+    mask.setflags(write=False)
     return mask
 
 
@@ -78,25 +77,19 @@ def test_cut_loses_the_share_that_lies_furthest_in_the_direction(direction):
         assert not far or not near or max(near) <= min(far) + 1e-9
 
 
-def test_the_truth_is_left_as_it_was():
-    mask = blob()
-    copy = mask.copy()
-    degrade.erode(mask, 2), degrade.dilate(mask, 2), degrade.shift(mask, 3, 1)
-    degrade.holes(mask, 0.5, np.random.default_rng(0)), degrade.cut(mask, 0.5, 1.0)
-    np.testing.assert_array_equal(mask, copy)
-
-
 @pytest.mark.bad_input
-def test_what_is_no_mask_or_no_strength_is_said():
-    mask = blob()
-    for function, arguments in ((degrade.erode, (1,)), (degrade.shift, (1, 1)), (degrade.cut, (0.5, 0.0))):
-        with pytest.raises(ValueError, match="mask: expected bool, got dtype uint8"):
-            function(mask.astype(np.uint8), *arguments)
-    with pytest.raises(ValueError, match="mask: expected shape"):
-        degrade.dilate(mask[0], 1)
-    with pytest.raises(ValueError, match="pixels: expected 0 or more, got -1"):
-        degrade.erode(mask, -1)
-    with pytest.raises(ValueError, match=r"share: expected a share in .*, got 20"):
-        degrade.cut(mask, 20, 0.0)
-    with pytest.raises(ValueError, match=r"share: expected a share in .*, got -0.1"):
-        degrade.holes(mask, -0.1, np.random.default_rng(0))
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda mask: degrade.erode(mask.astype(np.uint8), 1), "mask: expected bool, got dtype uint8"),
+        (lambda mask: degrade.shift(mask.astype(np.uint8), 1, 1), "mask: expected bool, got dtype uint8"),
+        (lambda mask: degrade.cut(mask.astype(np.uint8), 0.5, 0.0), "mask: expected bool, got dtype uint8"),
+        (lambda mask: degrade.dilate(mask[0], 1), "mask: expected shape"),
+        (lambda mask: degrade.erode(mask, -1), "pixels: expected 0 or more, got -1"),
+        (lambda mask: degrade.cut(mask, 20, 0.0), r"share: expected a share in .*, got 20"),
+        (lambda mask: degrade.holes(mask, -0.1, np.random.default_rng(0)), r"share: expected a share in .*, got -0.1"),
+    ],
+)
+def test_what_is_no_mask_or_no_strength_is_said(call, says):
+    with pytest.raises(ValueError, match=says):
+        call(blob())

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from scenes import box, scene
 
 from data_gen import sample_scene
 from labkit.apps.evaluation import Trial, lift, run_trial, summarise, table
@@ -14,7 +15,6 @@ from labkit.labels import CLASSES, OBSTACLE, SURFACE, TARGET
 from labkit.metrics import confusion_matrix, iou
 from labkit.network import SmallSegNet, save_model
 from labkit.pipeline import Pipeline
-from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
 from labkit.sim.world import World
 
 
@@ -48,9 +48,7 @@ def test_a_trial_with_true_masks_scores_one_and_the_table_says_so():
 
 
 def post_scene(class_id):
-    thing = ObjectSpec("post", "post", class_id, (0.5, 0.05, 0.026), parts=(Part("box", (0.03, 0.03, 0.05)),))
-    camera = Camera.looking_at((0.5, 0.0, 0.0), 0.7, 0.2, 0.9)
-    return SceneSpec((thing,), camera)
+    return scene(box("post", 0.5, 0.05, (0.03, 0.03, 0.05), class_id))
 
 
 def test_lifting_a_non_target_is_a_failure():

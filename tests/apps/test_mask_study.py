@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import box, scene
 from typer.testing import CliRunner
 
 import data_gen
@@ -12,7 +13,6 @@ from labkit.apps import mask_study
 from labkit.apps.cli import app
 from labkit.apps.mask_study import Row
 from labkit.labels import OBSTACLE, TARGET
-from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
 from labkit.sim.world import World
 
 TABLE = Path(__file__).parents[2] / "lessons" / "07_grasp.csv"
@@ -61,17 +61,8 @@ def test_the_masks_of_a_scene_made_again_have_the_tables_iou(table, seed):
             assert round(mask_study.mask_iou(mask, truth), 4) == row.iou
 
 
-def scene():
-    """A small target and a large one, side by side."""
-    things = [
-        ObjectSpec(name, "post", TARGET, (0.5, y, size / 2 + 0.001), parts=(Part("box", (size, size, size)),))
-        for name, y, size in (("small", -0.1, 0.03), ("large", 0.1, 0.045))
-    ]
-    return SceneSpec(tuple(things), Camera.looking_at((0.5, 0.0, 0.0), 0.7, 0.2, 0.9))
-
-
 def test_only_the_masks_target_is_a_target_and_only_that_one_counts():
-    spec = scene()
+    spec = scene(box("small", 0.5, -0.1, (0.03, 0.03, 0.03)), box("large", 0.5, 0.1, (0.045, 0.045, 0.045)))
     with World(spec) as world:
         frame = world.render((160, 120))
     name, truth = mask_study.target_mask(spec, frame)
