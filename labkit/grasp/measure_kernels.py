@@ -24,6 +24,7 @@ MEASURES = np.dtype(
         ("unseen", float),  # how far the target may go on behind what the camera saw
     ]
 )
+MEASURES = np.dtype((np.record, MEASURES))  # fields are attributes where nothing is compiled, too
 
 
 class Contact(NamedTuple):

@@ -82,6 +82,7 @@ GRIP = np.dtype(
         ("right_far", float),
     ]
 )
+GRIP = np.dtype((np.record, GRIP))  # fields are attributes where nothing is compiled, too
 
 
 @njit(cache=True, nogil=True)

@@ -1,4 +1,4 @@
-"""Scenes a second, the share of it spent inside PyBullet, two workers against one, and memory."""
+"""Scenes per second, the share of it spent inside PyBullet, two workers against one, and memory."""
 
 import multiprocessing
 import subprocess
@@ -13,6 +13,7 @@ import numpy as np
 import data_gen
 from data_gen.dataset import write_frame
 from labkit.sim.client import Client
+from tests.bench.measure import table
 
 SCENES = 40
 FRAMES = 1000  # for the memory
@@ -26,13 +27,13 @@ def main() -> str:
         ratio = one_worker_against_two(folder)
         generating, loading = memory(folder)
     rows = [
-        f"| seconds a scene on one core, median | {np.median(seconds):.3f} | 0.4 |",
-        f"| share of it inside PyBullet | {share:.0%} | stated |",
-        f"| scenes a second, 2 workers over 1 | {ratio:.2f} | 1.7 |",
-        f"| peak memory, generating {FRAMES} frames, MB | {generating:.0f} | 1000 |",
-        f"| peak memory, loading {FRAMES} frames, MB | {loading:.0f} | 1000 |",
+        ("seconds per scene on one core, median", f"{np.median(seconds):.3f}", 0.4),
+        ("share of it inside PyBullet", f"{share:.0%}", "stated"),
+        ("scenes per second, 2 workers over 1", f"{ratio:.2f}", 1.7),
+        (f"peak memory, generating {FRAMES} frames, MB", f"{generating:.0f}", 1000),
+        (f"peak memory, loading {FRAMES} frames, MB", f"{loading:.0f}", 1000),
     ]
-    return "\n".join(["| figure at 320x240 | measured | to reach |", "|---|---|---|", *rows])
+    return table("figure at 320x240 | measured | to reach", rows)
 
 
 def timed_scenes(folder: str) -> tuple[list[float], float]:
@@ -92,7 +93,3 @@ def memory(folder: str) -> tuple[float, float]:
         for code in work
     ]
     return tuple(float(result.stdout.split()[-1]) for result in results)
-
-
-if __name__ == "__main__":
-    print(main())

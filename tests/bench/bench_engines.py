@@ -4,7 +4,7 @@ Plain PyTorch is the text's way: float32, one NCHW tensor of the image divided b
 use all cores. Each round runs every engine once on the same image, so that a slow moment meets all of them.
 """
 
-import time
+from functools import partial
 
 import cv2
 import numpy as np
@@ -13,12 +13,13 @@ import torch
 from data_gen import render, sample_scene
 from labkit.network import load_model, weights_path
 from labkit.stacks.engines import ENGINES, open_engine
+from tests.bench.measure import in_turns, table
 
 FRAMES, ROUNDS = 4, 10
 
 
 def main() -> str:
-    """Median milliseconds an image over rounds on several scenes, after one round that is not counted."""
+    """Median milliseconds per image over rounds on several scenes."""
     model = load_model(weights_path("unet"))
     plain = load_model(weights_path("unet")).to(memory_format=torch.contiguous_format)
 
@@ -29,35 +30,11 @@ def main() -> str:
     runs = {"plain PyTorch (NCHW)": text}
     runs |= {f'engine "{name}"': open_engine(name, model).logits for name in ENGINES}
     frames = [render(sample_scene(620_000 + i, "test"), (640, 480)).rgb for i in range(FRAMES)]
-    milliseconds = {name: [] for name in runs}
-    apart = dict.fromkeys(runs, 0.0)
-    for round_ in range(ROUNDS + 1):
-        for rgb in frames:
-            expected = None
-            for name, run in runs.items():
-                start = time.perf_counter()
-                z = run(rgb)
-                if round_:
-                    milliseconds[name].append(1000.0 * (time.perf_counter() - start))
-                expected = z if expected is None else expected
-                apart[name] = max(apart[name], float(np.abs(z - expected).max()))
-    first = np.median(milliseconds["plain PyTorch (NCHW)"])
-    rows = [
-        f"| {name} | {np.median(ms):.1f} | {first / np.median(ms):.2f} | {apart[name]:.0e} |"
-        for name, ms in milliseconds.items()
-    ]
-    fastest = first / min(np.median(ms) for ms in milliseconds.values())
-    return "\n".join(
-        [
-            "| run by | median ms | times as fast | logits within |",
-            "|---|---|---|---|",
-            *rows,
-            "",
-            f"OpenCV {cv2.__version__}, {torch.get_num_threads()} threads. "
-            f"The fastest is {fastest:.1f} times as fast as plain PyTorch; to reach: 2.",
-        ]
-    )
-
-
-if __name__ == "__main__":
-    print(main())
+    apart = {name: max(float(np.abs(run(rgb) - text(rgb)).max()) for rgb in frames) for name, run in runs.items()}
+    times = [in_turns({name: partial(run, rgb) for name, run in runs.items()}, ROUNDS) for rgb in frames]
+    median = {name: np.median([ms[name] for ms in times]) for name in runs}
+    first = median["plain PyTorch (NCHW)"]
+    rows = ((name, f"{ms:.1f}", f"{first / ms:.2f}", f"{apart[name]:.0e}") for name, ms in median.items())
+    said = f"OpenCV {cv2.__version__}, {torch.get_num_threads()} threads. The fastest is "
+    said += f"{first / min(median.values()):.1f} times as fast as plain PyTorch; to reach: 2."
+    return f"{table('run by | median ms | times as fast | logits within', rows)}\n\n{said}"

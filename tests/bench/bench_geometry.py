@@ -6,8 +6,6 @@ cv2.depthTo3d stays in the camera frame, checks nothing and turns a hole into a 
 starts from the points of three targets in a 320x240 frame: outliers removed, then one cloud an object.
 """
 
-import timeit
-
 import cv2
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -24,6 +22,7 @@ from labkit.geometry import (
     remove_outliers,
 )
 from labkit.sim.spec import Camera
+from tests.bench.measure import in_turns, table
 
 try:
     import open3d
@@ -31,7 +30,6 @@ except ImportError:
     open3d = None
 
 TURNS, REPEATS = 30, 5
-MISSING = "not installed"
 RADIUS, MIN_NEIGHBOURS, GAP = 0.01, 4, 0.015
 
 
@@ -98,28 +96,16 @@ def clouds_with_open3d(P):
     return [P[group == g] for g in np.argsort(-np.bincount(group))]
 
 
-def medians(ways: dict) -> dict[str, float | None]:
-    """Time the ways in turns, so that a busy moment of the machine hits all alike; median milliseconds by name.
-
-    Each turn runs a way a few times and takes the fastest, so that it does not pay for what its predecessor did to the
-    caches and to the heap.
-    """
-    times = {name: [] for name, way in ways.items() if way is not None}
-    for _ in range(TURNS):
-        for name, turns in times.items():
-            turns.append(1e3 * min(timeit.repeat(ways[name], number=1, repeat=REPEATS)))
-    return {name: float(np.median(times[name])) if name in times else None for name in ways}
-
-
-def table(title: str, ways: dict, bars: dict[str, str]) -> str:
-    """Write one table in Markdown; the first way is labkit's, which the others are compared with."""
-    times = medians(ways)
-    own = next(iter(times.values()))
-    rows = [f"| {title} | median ms | times the first row | asked for |", "|---|---|---|---|"]
-    for name, ms in times.items():
-        measured = f"{MISSING} | " if ms is None else f"{ms:.2f} | {ms / own:.2f}"
-        rows.append(f"| {name} | {measured} | {bars.get(name, '')} |")
-    return "\n".join(rows)
+def against_the_first(title: str, ways: dict, bars: dict[str, str]) -> str:
+    """Time the ways that are installed; the first is labkit's, which the others are compared with."""
+    times = in_turns({name: way for name, way in ways.items() if way}, TURNS, best_of=REPEATS)
+    ms = {name: float(np.median(turns)) for name, turns in times.items()}
+    own = ms[next(iter(ways))]
+    rows = []
+    for name in ways:
+        measured = (f"{ms[name]:.2f}", f"{ms[name] / own:.2f}") if name in ms else ("not installed", "")
+        rows.append((name, *measured, bars.get(name, "")))
+    return table(f"{title} | median ms | times the first row | asked for", rows)
 
 
 def frame_table() -> str:
@@ -127,7 +113,7 @@ def frame_table() -> str:
     depth, mask, K, T_base_cam = scene(640, 480)
     everything = np.ones_like(mask)
     holes = np.where(np.random.default_rng(1).random(depth.shape) < 0.1, np.float32(0.0), depth)
-    poses = iter(np.linspace(0.0, 3.0, TURNS * REPEATS))
+    poses = iter(np.linspace(0.0, 3.0, (TURNS + 1) * REPEATS))
 
     def new_camera():
         moved = np.array(Camera.looking_at((0.5, 0.0, 0.0), 0.9, next(poses), 0.9).T_base_cam)
@@ -154,7 +140,7 @@ def frame_table() -> str:
         "Open3D create_from_depth_image": "at least 2",
         "cv2.depthTo3d, camera frame": f"at least {1 / 1.5:.2f}",
     }
-    return table("640x480, full frame", ways, bars)
+    return against_the_first("640x480, full frame", ways, bars)
 
 
 def cloud_table() -> str:
@@ -175,13 +161,9 @@ def cloud_table() -> str:
     expected = [len(cloud) for cloud in ways["labkit, remove_outliers and cluster"]()]
     assert len(expected) == 3
     assert [len(cloud) for cloud in with_scipy(P)] == expected
-    return table(f"320x240, three targets, {len(P)} points in all", ways, {})
+    return against_the_first(f"320x240, three targets, {len(P)} points in all", ways, {})
 
 
 def main() -> str:
     """Measure both tables and return them in Markdown."""
     return f"{frame_table()}\n\n{cloud_table()}"
-
-
-if __name__ == "__main__":
-    print(main())

@@ -13,14 +13,18 @@ import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent.parent
+import numpy as np
+
+from labkit.course.grading import grade, reading, sandbox
+from labkit.course.grading.gradebook import opened
+from labkit.course.grading.run import grade_course
+from labkit.course.questions.question import TOPICS
+from tests.bench.measure import in_turns, resident_mb, table
+
+ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import grading_course as kit  # noqa: E402
-
-from labkit.course.grading import grade, reading, sandbox  # noqa: E402
-from labkit.course.grading.run import grade_course  # noqa: E402
-from labkit.course.questions.question import TOPICS  # noqa: E402
 
 TOPIC = "04_iou"
 ROUNDS = 5
@@ -51,50 +55,38 @@ def new_course(course: Path) -> Path:
     return course
 
 
-def nbgrader(course: Path, *arguments: str) -> float:
-    """Run nbgrader; returns seconds."""
-    start = time.perf_counter()
+def nbgrader(course: Path, *arguments: str) -> None:
+    """Run nbgrader."""
     command = [sys.executable, "-m", "nbgrader", *arguments]
     subprocess.run(command, cwd=course, env=ENVIRONMENT, check=True, capture_output=True)
-    return time.perf_counter() - start
 
 
 def beside_nbgrader(course: Path) -> str:
     """Both graders on the same two submissions, again and again, in turns; start-up of the command included in both."""
-    from labkit.course.grading.gradebook import opened
-
     new_course(course)
     ours, theirs = course / "ours", course / "theirs"
     for copy in (ours, theirs):
         new_course(copy)
     nbgrader(theirs, "generate_assignment", TOPIC, "--force")
     command = [sys.executable, "-m", "labkit.apps.cli", "grade", TOPIC, "--workers", "1", "--force", "--seed", "s"]
-    times = {"nbgrader autograde": [], "labkit grade": [], "labkit grade, without starting the command": []}
-    for _ in range(ROUNDS):
-        times["nbgrader autograde"].append(nbgrader(theirs, "autograde", TOPIC, "--force") / len(HONEST))
-        start = time.perf_counter()
-        subprocess.run(command, cwd=ours, capture_output=True)
-        times["labkit grade"].append((time.perf_counter() - start) / len(HONEST))
-        start = time.perf_counter()
-        grade_course(TOPIC, ours, seed="s", force=True, progress=False)
-        times["labkit grade, without starting the command"].append((time.perf_counter() - start) / len(HONEST))
+    ways = {
+        "nbgrader autograde": lambda: nbgrader(theirs, "autograde", TOPIC, "--force"),
+        "labkit grade": lambda: subprocess.run(command, cwd=ours, capture_output=True),
+        "labkit grade, without starting the command": lambda: grade_course(
+            TOPIC, ours, seed="s", force=True, progress=False
+        ),
+    }
+    seconds = {name: np.median(ms) / 1000 / len(HONEST) for name, ms in in_turns(ways, ROUNDS).items()}
     scores = []
     for copy in (ours, theirs):
         with opened(copy) as book:
-            names = [
-                cell.name for cell in book.find_notebook(TOPIC, TOPIC).grade_cells if cell.name.startswith("check_")
-            ]
-            scores.append([book.find_grade(name, TOPIC, TOPIC, s).auto_score for s in HONEST for name in sorted(names)])
+            names = sorted(c.name for c in book.find_notebook(TOPIC, TOPIC).grade_cells if c.name.startswith("check_"))
+            scores.append([book.find_grade(name, TOPIC, TOPIC, s).auto_score for s in HONEST for name in names])
     agree = sum(a == b for a, b in zip(*scores, strict=True))
-    base = statistics.median(times["nbgrader autograde"])
-    rows = [
-        f"| {name} | {statistics.median(t):.2f} | {60 / statistics.median(t):.0f} | {base / statistics.median(t):.1f} |"
-        for name, t in times.items()
-    ]
-    head = "| grader, one submission at a time | median s a submission | submissions a minute | times nbgrader's |"
-    return "\n".join(
-        [head, "|---|---|---|---|", *rows, "", f"Same verdicts on honest work: {agree} of {len(scores[0])}."]
-    )
+    base = seconds["nbgrader autograde"]
+    rows = ((name, f"{s:.2f}", f"{60 / s:.0f}", f"{base / s:.1f}") for name, s in seconds.items())
+    header = "grader, one submission at a time | median s per submission | submissions per minute | times nbgrader's"
+    return f"{table(header, rows)}\n\nSame verdicts on honest work: {agree} of {len(scores[0])}."
 
 
 def classes(folder: Path) -> str:
@@ -114,9 +106,8 @@ def classes(folder: Path) -> str:
             results = grade.grade_submission(lab, submission, f"secret {i // len(students)}")
             seconds.append(time.perf_counter() - start)
             wrong += sum((r.points == r.max_points) != right[r.question] for r in results)
-        rows.append(f"| {topic} | {statistics.median(seconds):.2f} | {sum(seconds):.0f} | {torch} | {wrong} |")
-    head = "| lab, 100 students | median s | all, s | of them with torch | grades not as constructed |"
-    return "\n".join([head, "|---|---|---|---|---|", *rows])
+        rows.append((topic, f"{statistics.median(seconds):.2f}", f"{sum(seconds):.0f}", torch, wrong))
+    return table("lab, 100 students | median s | all, s | of them with torch | grades not as constructed", rows)
 
 
 def many(course: Path) -> str:
@@ -133,15 +124,5 @@ def many(course: Path) -> str:
         seconds.append(time.perf_counter() - start)
         if i in (100, MANY // 2, MANY):
             sizes[i] = resident_mb()
-    cells = " | ".join(f"{size:.1f}" for size in sizes.values())
-    head = "| lab 04 | median s a submission | " + " | ".join(f"MB after {i}" for i in sizes) + " |"
-    return f"{head}\n|---|---|{'---|' * len(sizes)}\n| one worker | {statistics.median(seconds):.3f} | {cells} |"
-
-
-def resident_mb() -> float:
-    """Memory that this process holds."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-if __name__ == "__main__":
-    print(main())
+    row = ("one worker", f"{statistics.median(seconds):.3f}", *(f"{size:.1f}" for size in sizes.values()))
+    return table(f"lab 04 | median s per submission | {' | '.join(f'MB after {i}' for i in sizes)}", [row])

@@ -7,7 +7,7 @@ against all that was seen; the principal axis looks at nothing but the target.
 import os
 import subprocess
 import sys
-import time
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from labkit.grasp import plan_grasps, principal_axis_grasp
 from labkit.labels import TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
+from tests.bench.measure import in_turns, table
 
 SCENES = 6
 ROUNDS = 40
@@ -37,15 +38,10 @@ def problems(targets: int, scenes: int = SCENES) -> list[tuple]:
     return found
 
 
-def milliseconds(function, problems: list[tuple], rounds: int) -> float:
-    """Median over rounds and problems, after one call of each to compile."""
-    times = []
-    for turn in range(rounds + 1):
-        for problem in problems:
-            start = time.perf_counter()
-            function(*problem)
-            times += [1e3 * (time.perf_counter() - start)] * (turn > 0)
-    return float(np.median(times))
+def milliseconds(function, problems: list[tuple]) -> float:
+    """Median over rounds and problems."""
+    ways = {number: partial(function, *problem) for number, problem in enumerate(problems)}
+    return float(np.median(list(in_turns(ways, ROUNDS).values())))
 
 
 def principal_axes(clouds, scene, table_z, camera_position):
@@ -54,8 +50,8 @@ def principal_axes(clouds, scene, table_z, camera_position):
 
 def interpreted() -> float:
     """Milliseconds of the same planner in a process in which numba compiles nothing, one target and one scene."""
-    code = f"from {__name__ if __name__ != '__main__' else 'tests.bench.bench_grasp'} import *\n"
-    code += "problem = problems(1, 1); start = time.perf_counter(); plan_grasps(*problem[0])\n"
+    code = f"from {__name__} import *\n"
+    code += "import time; problem = problems(1, 1); start = time.perf_counter(); plan_grasps(*problem[0])\n"
     code += "print('ms', 1e3 * (time.perf_counter() - start))"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
@@ -64,19 +60,14 @@ def interpreted() -> float:
 
 def main() -> str:
     """Measure one and three targets, and return the table in Markdown."""
-    rows = ["| targets | method | grasps found | median ms | times the kit |", "|---|---|---|---|---|"]
+    rows = []
     for targets in (1, 3):
         given = problems(targets)
-        kit = milliseconds(plan_grasps, given, ROUNDS)
-        found = np.mean([len(plan_grasps(*problem).grasps) for problem in given])
-        text = milliseconds(principal_axes, given, ROUNDS)
-        rows.append(f"| {targets} | `plan_grasps` | {found:.0f} | {kit:.2f} | |")
-        rows.append(f"| {targets} | the text's principal axis, unchecked | {targets} | {text:.2f} | {text / kit:.2f} |")
+        kit, text = milliseconds(plan_grasps, given), milliseconds(principal_axes, given)
+        found = f"{np.mean([len(plan_grasps(*problem).grasps) for problem in given]):.0f}"
+        rows.append((targets, "`plan_grasps`", found, f"{kit:.2f}", ""))
+        rows.append((targets, "the text's principal axis, unchecked", targets, f"{text:.2f}", f"{text / kit:.2f}"))
         if targets == 1:
             slow = interpreted()
-            rows.append(f"| 1 | `plan_grasps`, its loops not compiled | {found:.0f} | {slow:.0f} | {slow / kit:.0f} |")
-    return "\n".join(rows)
-
-
-if __name__ == "__main__":
-    print(main())
+            rows.append((1, "`plan_grasps`, its loops not compiled", found, f"{slow:.0f}", f"{slow / kit:.0f}"))
+    return table("targets | method | grasps found | median ms | times the kit", rows)

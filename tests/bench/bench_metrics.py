@@ -11,6 +11,7 @@ import torch
 from torchmetrics.functional.classification import multiclass_confusion_matrix
 
 from labkit import metrics
+from tests.bench.measure import in_turns, table
 
 C = 4
 ROUNDS = 30
@@ -39,14 +40,8 @@ def numpy_one_liner(y_true, y_pred):
 
 
 def medians(ways: dict) -> dict[str, float]:
-    """Time them in turns, so that a busy moment hits all alike; median milliseconds of processor time by name."""
-    times = {name: [] for name in ways}
-    for _ in range(ROUNDS + 1):
-        for name, count in ways.items():
-            start = time.thread_time()
-            count()
-            times[name].append(1e3 * (time.thread_time() - start))
-    return {name: float(np.median(ms[1:])) for name, ms in times.items()}
+    """Median milliseconds of processor time by name."""
+    return {name: float(np.median(ms)) for name, ms in in_turns(ways, ROUNDS, time.thread_time).items()}
 
 
 def contenders(y_true, y_pred) -> dict:
@@ -69,7 +64,7 @@ def contenders(y_true, y_pred) -> dict:
 def main() -> str:
     """Measure on a scene and on noise, in the dtypes that labels come in, and return the table in Markdown."""
     torch.set_num_threads(1)
-    rows = ["| labels | method | median ms of one thread | times labkit |", "|---|---|---|---|"]
+    rows = []
     for kind, images in {"scene": scene(), "noise": noise(np.random.default_rng(0))}.items():
         for dtype in (np.uint8, np.int64):
             ways = contenders(*(y.astype(dtype) for y in images))
@@ -77,15 +72,9 @@ def main() -> str:
             for name, count in ways.items():
                 assert (count() == expected).all(), f"{name} counts otherwise"
             times = medians(ways)
-            rows += [
-                f"| {kind}, {np.dtype(dtype).name} | {name} | {ms:.2f} | {ms / times['labkit']:.1f} |"
-                for name, ms in times.items()
-            ]
+            what = f"{kind}, {np.dtype(dtype).name}"
+            rows += [(what, name, f"{ms:.2f}", f"{ms / times['labkit']:.1f}") for name, ms in times.items()]
     images = scene()
     ms = medians({"boundary": lambda: metrics.boundary_counts(*images, C)})["boundary"]
-    rows.append(f"| scene, uint8 | labkit's boundary counts | {ms:.2f} | |")
-    return "\n".join(rows)
-
-
-if __name__ == "__main__":
-    print(main())
+    rows.append(("scene, uint8", "labkit's boundary counts", f"{ms:.2f}", ""))
+    return table("labels | method | median ms of one thread | times labkit", rows)

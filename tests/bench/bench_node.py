@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from labkit.node.bus import Bus
 from labkit.node.messages import DEFAULT_TOPICS, Diagnostics, Image
 from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline
+from tests.bench.measure import in_turns, resident_mb, table
 
 SIZE = (640, 480)
 REPEATS, SECONDS, RATE, FRAMES = 40, 60, 30.0, 10_000
@@ -49,22 +50,16 @@ def in_process(frame) -> str:
         pipeline = Pipeline(load_model(weights_path("unet")), **options)
         bus = Bus()
         node, camera = SegmentationNode(pipeline, bus), Camera(bus)
-        alone, inside = [], []
-        for number in range(REPEATS + 3):
-            start = time.perf_counter()
-            pipeline.run(frame)
-            middle = time.perf_counter()
-            camera.publish(frame, number)
-            published = time.perf_counter()
-            node.spin_once()
-            end = time.perf_counter()
-            if number >= 3:
-                alone.append(1000.0 * (middle - start))
-                inside.append(1000.0 * (end - published))
-        a, b = np.median(alone), np.median(inside)
-        rows.append(f"| {name} | {a:.1f} | {b:.1f} | {100.0 * (b / a - 1.0):+.1f} % |")
-    head = "| 640x480, in process | Pipeline.run, ms | node, ms | overhead (to reach: 10 %) |\n|---|---|---|---|\n"
-    return head + "\n".join(rows)
+        numbers = iter(range(REPEATS + 1))
+
+        def publish(camera=camera, numbers=numbers):
+            camera.publish(frame, next(numbers))
+
+        turns = {"alone": partial(pipeline.run, frame), "published": publish, "node": node.spin_once}
+        times = in_turns(turns, REPEATS)
+        a, b = np.median(times["alone"]), np.median(times["node"])
+        rows.append((name, f"{a:.1f}", f"{b:.1f}", f"{100.0 * (b / a - 1.0):+.1f} %"))
+    return table("640x480, in process | Pipeline.run, ms | node, ms | overhead (to reach: 10 %)", rows)
 
 
 def over_ros(frame) -> str:
@@ -119,13 +114,12 @@ def talk(transport, frame) -> str:
     time.sleep(1.0)
     last = told[max(told)]
     answered, dropped = (int(last[name]) - before[name] for name in ("answered", "dropped"))
-    head = "| ROS on loopback, 640x480, UNet once on onnxruntime | |\n|---|---|\n"
     rows = [
-        f"| in the pipeline, median ms | {np.median(perceived):.1f} |",
-        f"| added by node and network, median ms (to reach: 12) | {np.median(added):.1f} |",
-        f"| {RATE:.0f} Hz for {SECONDS} s: frames sent, answered, superseded | {sent}, {answered}, {dropped} |",
+        ("in the pipeline, median ms", f"{np.median(perceived):.1f}"),
+        ("added by node and network, median ms (to reach: 12)", f"{np.median(added):.1f}"),
+        (f"{RATE:.0f} Hz for {SECONDS} s: frames sent, answered, superseded", f"{sent}, {answered}, {dropped}"),
     ]
-    return head + "\n".join(rows)
+    return table("ROS on loopback, 640x480, UNet once on onnxruntime | ", rows)
 
 
 def memory() -> str:
@@ -138,15 +132,8 @@ def memory() -> str:
         camera.publish(frames[number % len(frames)], 33_000_000 * number)
         node.spin_once()
         if number % 10 == 0:
-            pages = int(Path("/proc/self/statm").read_text().split()[1])
-            resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 1e6)
+            resident.append(resident_mb())
     tenth = len(resident) // 10
     second, last = np.mean(resident[tenth : 2 * tenth]), np.mean(resident[-tenth:])
-    head = (
-        f"| {FRAMES:,} frames of 80x60 in process | second tenth, MB | last tenth, MB | change |\n|---|---|---|---|\n"
-    )
-    return f"{head}| resident memory | {second:.1f} | {last:.1f} | {100.0 * (last / second - 1.0):+.2f} % |"
-
-
-if __name__ == "__main__":
-    print(main())
+    row = ("resident memory", f"{second:.1f}", f"{last:.1f}", f"{100.0 * (last / second - 1.0):+.2f} %")
+    return table(f"{FRAMES:,} frames of 80x60 in process | second tenth, MB | last tenth, MB | change", [row])

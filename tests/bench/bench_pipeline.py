@@ -5,6 +5,7 @@ import numpy as np
 from data_gen import render, sample_scene
 from labkit.labels import TARGET
 from labkit.pipeline import Pipeline
+from tests.bench.measure import table
 
 SCENES, REPEATS = 12, 15
 
@@ -25,17 +26,6 @@ def main() -> str:
             for stage, s in {**seconds, "all but the network": sum(seconds.values())}.items():
                 stages.setdefault(stage, []).append(1000.0 * s)
             candidates.append(len(perception.plan.grasps))
-    rows = [f"| {name} | {np.median(ms):.2f} | {np.quantile(ms, 0.9):.2f} |" for name, ms in stages.items()]
-    return "\n".join(
-        [
-            "| stage | median ms | 90 % of runs within |",
-            "|---|---|---|",
-            *rows,
-            "",
-            f"{len(three)} scenes, true masks, a median of {np.median(candidates):.0f} ranked grasps. To reach: 5 ms.",
-        ]
-    )
-
-
-if __name__ == "__main__":
-    print(main())
+    rows = ((name, f"{np.median(ms):.2f}", f"{np.quantile(ms, 0.9):.2f}") for name, ms in stages.items())
+    said = f"{len(three)} scenes, true masks, a median of {np.median(candidates):.0f} ranked grasps. To reach: 5 ms."
+    return f"{table('stage | median ms | 90 % of runs within', rows)}\n\n{said}"

@@ -6,18 +6,16 @@ it in hardware. Both start from the same weights and see the same batches; "loss
 difference of their losses over all steps. To reach: 4 times where bfloat16 is native, 2.3 times in float32.
 """
 
-import statistics
-import time
-
 import numpy as np
 import torch
 from torch import nn
 
 from labkit.network import SmallSegNet, UNet, predict_probabilities
 from labkit.training import ImagesInMemory, TrainConfig, Trainer, bf16_is_native
+from tests.bench.measure import in_turns, table
 
 SIZE = (240, 320)
-ROUNDS = 9  # the first is a warm-up
+ROUNDS = 8
 CONFIG = TrainConfig(
     model="smallsegnet", steps=100_000, lr=1e-3, weight_decay=0.0, warmup=0.0, weights="none", augment=False
 )
@@ -55,15 +53,8 @@ class PlainLoop:
         return loss.item()
 
 
-def timed(function, *arguments) -> tuple[float, float]:
-    """Return the seconds of a call and its result."""
-    start = time.perf_counter()
-    result = function(*arguments)
-    return time.perf_counter() - start, result
-
-
-def measure_steps() -> list[str]:
-    """Rows of the training step: the loops take turns, one step each, so that noise hits all of them alike."""
+def measure_steps() -> list[tuple]:
+    """Rows of the training step: one step of each loop in turn, on the same batch."""
     data = ImagesInMemory(scenes(16), progress=False)
     device = torch.device("cpu")
     trainers = {"labkit, float32": Trainer(data, CONFIG, device)}
@@ -71,36 +62,27 @@ def measure_steps() -> list[str]:
     if bf16_is_native(device):
         trainers["labkit, bfloat16"] = Trainer(data, CONFIG, device)
     plain = PlainLoop(trainers["labkit, float32"].model.state_dict())
-    seconds = {name: [] for name in ("the text's loop", *trainers)}
-    losses = {name: [] for name in seconds}
+    batches = [trainers["labkit, float32"].batch_of_step(step) for step in range(ROUNDS + 1)]
+    ready = iter([(x.contiguous(), y.long()) for x, y in batches])
+    steps = {"the text's loop": lambda: plain.step(*next(ready))}
+    steps |= {name: trainer.step for name, trainer in trainers.items()}
+    losses = {name: [] for name in steps}
 
-    def note(name, measured):
-        seconds[name].append(measured[0])
-        losses[name].append(measured[1])
+    def noted(name):
+        return lambda: losses[name].append(steps[name]())
 
-    for step in range(ROUNDS):
-        x, y = trainers["labkit, float32"].batch_of_step(step)
-        note("the text's loop", timed(plain.step, x.contiguous(), y.long()))
-        for name, trainer in trainers.items():
-            note(name, timed(trainer.step))
-    return rows("training step", seconds, lambda name: f"{loss_difference(losses, name):.1e}")
-
-
-def loss_difference(losses: dict, name: str) -> float:
-    """Largest relative difference between a loop's losses and those of the text's."""
+    times = in_turns({name: noted(name) for name in steps}, ROUNDS)
     expected = np.array(losses["the text's loop"])
-    return float(np.abs(np.array(losses[name]) / expected - 1.0).max())
+    return rows("training step", times, {name: f"{np.abs(losses[name] / expected - 1).max():.1e}" for name in steps})
 
 
-def rows(what: str, seconds: dict, last_column) -> list[str]:
-    """Lines of the table: medians without the warm-up, and how many times as fast as the first, round by round."""
-    first = next(iter(seconds.values()))[1:]
-    lines = []
-    for name, times in seconds.items():
-        ratio = statistics.median(a / b for a, b in zip(first, times[1:], strict=True))
-        median = 1e3 * statistics.median(times[1:])
-        lines.append(f"| {what} | {name} | {median:.1f} | {ratio:.1f} | {last_column(name)} |")
-    return lines
+def rows(what: str, times: dict[str, np.ndarray], last_column: dict[str, str]) -> list[tuple]:
+    """Medians, and how many times as fast as the first, round by round."""
+    first = next(iter(times.values()))
+    return [
+        (what, name, f"{np.median(ms):.1f}", f"{np.median(first / ms):.1f}", last_column.get(name, ""))
+        for name, ms in times.items()
+    ]
 
 
 def text_inference(model: nn.Module, rgb: np.ndarray) -> np.ndarray:
@@ -110,7 +92,7 @@ def text_inference(model: nn.Module, rgb: np.ndarray) -> np.ndarray:
         return model(x).softmax(dim=1)[0].permute(1, 2, 0).numpy()
 
 
-def measure_inference() -> list[str]:
+def measure_inference() -> list[tuple]:
     """Rows of one image's probabilities, in float32 everywhere."""
     image = scenes(1)[0][0]
     torch.manual_seed(0)
@@ -123,18 +105,9 @@ def measure_inference() -> list[str]:
         "labkit, UNet": lambda: predict_probabilities(unet, image),
     }
     np.testing.assert_allclose(runs["labkit, SmallSegNet"](), runs["the text's listing"](), atol=1e-5)
-    seconds = {name: [] for name in runs}
-    for _ in range(5 * ROUNDS):
-        for name, run in runs.items():
-            seconds[name].append(timed(run)[0])
-    return rows("one image", seconds, lambda name: "")
+    return rows("one image", in_turns(runs, 5 * ROUNDS), {})
 
 
 def main() -> str:
     """Measure, and return the table."""
-    lines = ["| what | loop | ms | times as fast | loss off by |", "|---|---|---:|---:|---:|"]
-    return "\n".join(lines + measure_steps() + measure_inference())
-
-
-if __name__ == "__main__":
-    print(main())
+    return table("what | loop | ms | times as fast | loss off by", measure_steps() + measure_inference())

@@ -2,7 +2,8 @@
 
 A benchmark is a module bench_<name>.py whose docstring says what is compared, and whose main() returns a
 Markdown table. Each runs in a process of its own, one after the other, so that none disturbs another's threads or
-memory. When only some are named, the page keeps the sections of the others.
+memory, and waits until the machine is quiet; the page says where that never came. When only some are named, the page
+keeps the sections of the others.
 """
 
 import argparse
@@ -26,6 +27,7 @@ INTRODUCTION = """# Benchmarks
 another machine they differ, while their ratios hold.
 """
 SECTION = "<!-- bench: {} -->"
+QUIET_LOAD, PATIENCE_S = 0.5, 900.0
 # Flags of /proc/cpuinfo that decide how fast networks and kernels run, in words.
 CPU_FLAGS = {"avx2": "AVX2", "avx512f": "AVX-512", "avx512_bf16": "AVX-512 bf16", "amx_bf16": "AMX bf16"}
 VERSIONS = ("numpy", "scipy", "numba", "torch", "opencv-python-headless", "pybullet")
@@ -63,13 +65,22 @@ def main(arguments: list[str] | None = None, folder: Path = HERE) -> int:
 
 def measure(name: str, folder: Path) -> str:
     """Run one benchmark in a process of its own and return its section of the page."""
-    load, start = os.getloadavg()[0], time.perf_counter()
+    load, start = wait_until_quiet(), time.perf_counter()
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         description, table = pool.submit(run, name, folder).result()
     seconds = time.perf_counter() - start
     title, _, rest = description.partition("\n")
-    footer = f"<sub>Measured in {seconds:.0f} s on {machine()}; load before it {load:.1f}.</sub>"
+    busy = "" if load < QUIET_LOAD else f" after {PATIENCE_S / 60:.0f} minutes of waiting: the machine was never quiet"
+    footer = f"<sub>Measured in {seconds:.0f} s on {machine()}; load before it {load:.1f}{busy}.</sub>"
     return "\n\n".join(part for part in (f"## {title.rstrip('.')}", rest.strip(), table.strip(), footer) if part)
+
+
+def wait_until_quiet() -> float:
+    """Wait until nothing else runs on this machine, for a limited time; returns its load."""
+    end = time.monotonic() + PATIENCE_S
+    while (load := os.getloadavg()[0]) >= QUIET_LOAD and time.monotonic() < end:
+        time.sleep(2.0)
+    return load
 
 
 def run(name: str, folder: Path) -> tuple[str, str]:
