@@ -293,14 +293,14 @@ def test_the_gradebook_has_the_scores_and_keeps_manual_ones(course):
     with gradebook.opened(course) as book:
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
         assert (written.manual_score, written.needs_manual_grade) == (3.0, False)
-        assert book.find_submission(TOPIC, "ada").score == 14.0
+        assert book.find_submission(TOPIC, "ada").score == TOTAL + 3.0
     notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC) | {"iou": "iou = None"})
     kit.submit(course, "ada", TOPIC, notebook)
     grade(course)
     with gradebook.opened(course) as book:
         written = book.find_grade("explain", TOPIC, TOPIC, "ada")
         assert (written.manual_score, written.needs_manual_grade) == (3.0, True)
-        assert book.find_submission(TOPIC, "ada").score == 12.0
+        assert book.find_submission(TOPIC, "ada").score == BUT_IOU + 3.0
 
 
 def test_an_answer_in_words_that_was_not_written_earns_nothing(course):
