@@ -1,6 +1,7 @@
 """The student's instant check: a tick, or the first thing that is wrong, and the function to go on with.
 
 It lives in `labkit.course.checking`, and notebooks say `from labkit import check`: a module of that name would hide it.
+In Jupyter a check runs the program that the grader will run: the cell of the answer and what it needs of other cells.
 """
 
 import html
@@ -8,15 +9,14 @@ import os
 import sys
 from collections.abc import Callable
 
-import numpy as np
-
+from labkit.course.questions.comparison import Problem
 from labkit.course.questions.judge import Verdict
-from labkit.course.questions.question import Question, find
-from labkit.course.questions.run import MAX_PRINTED, Printed, judge
+from labkit.course.questions.program import Cell, Program, program
+from labkit.course.questions.question import PACKAGES, Question, find, of_topic
+from labkit.course.questions.run import MAX_PRINTED, Printed, define, judge
 
 PUBLIC_SEED = 0
 LIMIT_S = 10.0  # for all cases together; a right answer takes a small part of it
-MAX_SHOWN = 100  # characters of an argument or output that are worth showing
 COLOURS = {"✔": "#2e7d32", "✘": "#c62828", "○": "#b26a00"}
 
 
@@ -63,55 +63,70 @@ def check(name: str, answer: object) -> Callable:
         shown = Shown("✘", f"{question.function} is not a function", f"It is of type {type(answer).__name__}.")
         return conclude(shown, question.reference, passed=False)
     printed = Printed()
-    verdict = judge(question, answer, PUBLIC_SEED, LIMIT_S, printed)
+    verdict = judged(question, answer, printed)
     shown = describe(question, verdict, printed)
     return conclude(shown, answer if verdict.passed else question.reference, verdict.passed)
+
+
+def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:
+    """The verdict on an answer: in Jupyter on its program, anywhere else on the function itself."""
+    cut = program_here(question)
+    if cut is not None and cut.refused:
+        return Verdict(Problem("refused", cut.refused), None, "")
+    if cut is not None:
+        answer = define(cut, question.function, LIMIT_S, printed)
+    if isinstance(answer, Problem):
+        return Verdict(answer, None, "before it is called")
+    if not callable(answer):
+        return Verdict(Problem("kind", f"its cell makes it a {type(answer).__name__}, not a function"), None, "")
+    return judge(question, answer, PUBLIC_SEED, LIMIT_S, printed)
+
+
+def program_here(question: Question) -> Program | None:
+    """The program of an answer among the cells that were run in this notebook; None outside of one.
+
+    Other blanks that it calls are the student's, or the kit's where a check has put that in their place.
+    """
+    shell = jupyter()
+    if shell is None:
+        return None
+    cells = [Cell(source) for source in shell.history_manager.input_hist_raw]
+    blanks = of_topic(question.topic)
+    given = {name: other.source for name, other in blanks.items() if shell.user_ns.get(name) is other.reference}
+    return program(cells, question.function, blanks, PACKAGES, question.forbidden, given, latest=True)
+
+
+def jupyter() -> object | None:
+    """The running IPython shell, None in plain Python."""
+    ipython = sys.modules.get("IPython")
+    return None if ipython is None else ipython.get_ipython()
 
 
 def conclude(shown: Shown, function: Callable, passed: bool) -> Callable:
     """Show a result; return the function, or raise if failing is to stop the notebook."""
     if not passed and os.environ.get("LABKIT_STRICT") == "1":
         raise CheckFailed(repr(shown))
-    ipython = sys.modules.get("IPython")
-    if ipython is not None and ipython.get_ipython() is not None:
-        ipython.display.display(shown)
+    if jupyter() is not None:
+        sys.modules["IPython"].display.display(shown)
     else:
         print(shown)
     return function
 
 
 def describe(question: Question, verdict: Verdict, printed: Printed) -> Shown:
-    """Put a verdict in words. Nothing in them comes from the reference but the shape and dtype that are asked for."""
+    """Put a verdict on public cases in words."""
     name, problem = question.function, verdict.problem
     said = [f"It prints: {line}" for line in printed.text.splitlines()[:3]]
     said += ["..."] if printed.length > MAX_PRINTED or printed.text.count("\n") > 3 else []
-    notes = [f"Note: {note}." for note in verdict.notes]
     if problem is None:
         by_hand = len(question.by_hand)
         tried = ([f"{by_hand} by hand"] if by_hand else []) + [f"{question.random_cases} random"]
-        return Shown("✔", f"{name} is right", f"Cases tried: {', '.join(tried)}.", *notes, *said)
+        return Shown("✔", f"{name} is right", f"Cases tried: {', '.join(tried)}.", *said)
     if problem.kind == "unanswered":
         return Shown("○", f"{name}: not answered yet", "The kit's function takes its place below.")
+    if problem.kind == "refused":
+        return Shown("✘", f"{name} cannot be graded: {problem.says}", "The grader would refuse it in these words.")
     lines = [f"line {number}:  {text}" for number, text in problem.lines]
-    lines += [f"In {verdict.where}{called(question, verdict)}."]
+    lines += [f"In {verdict.where}:", *(f"    {line}" for line in verdict.shown)] if verdict.shown else []
     lines += [f"Hint: {verdict.hint}"] if verdict.hint else []
-    return Shown("✘", f"{name}: {problem.says}", *lines, *notes, *said)
-
-
-def called(question: Question, verdict: Verdict) -> str:
-    """The call of a case by hand, if it is short enough to read."""
-    if verdict.case is None or verdict.case >= len(question.by_hand):
-        return ""
-    text = ", ".join(compact(argument) for argument in question.by_hand[verdict.case])
-    return f": {question.function}({text})" if len(text) <= MAX_SHOWN else ""
-
-
-def compact(value: object) -> str:
-    """A number or small array in one line.
-
-    >>> compact(np.array([[1.0, 0.5], [0.0, 2.0]]))
-    '[[1, 0.5], [0, 2]]'
-    """
-    if isinstance(value, np.ndarray) and value.ndim:
-        return "[" + ", ".join(compact(part) for part in value) + "]" if value.size <= 32 else "..."
-    return f"{value:.4g}" if isinstance(value, float | np.floating) else str(value)
+    return Shown("✘", f"{name}: {problem.says}", *lines, *(f"Note: {note}." for note in verdict.notes), *said)

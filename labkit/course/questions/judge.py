@@ -1,303 +1,92 @@
-"""Is an answer right? Cases with what is expected, the comparison, and the verdict; nothing here calls an answer.
+"""The verdict on an answer: from the outputs of all cases, however they were computed, to words for its student.
 
-    expected_cases(question, seed)          arguments and expected outputs: keep them where no answer can see them
-    verdict(question, cases, outputs)       outputs by any way: a value that `plain` takes, or a Problem in its place
-    compare(question, args, expected, got)  one case: None if it is right, else the Problem
+    cases = expected_cases(question, seed)     keep them where no answer can see them
+    verdict(question, cases, outputs)          outputs by any way: a value that `plain` takes, or a Problem in its place
 
-`labkit.course.questions.run.judge` does all three in one process, for the student's check; the grader runs the answer
-elsewhere, puts `Problem("exception" | "time" | ..., text)` where no value came back, and calls `verdict`. All
-functions here are pure: the same arguments, the same result, and no argument is altered.
+`labkit.course.questions.run.judge` does all of it in one process, for the student's check; the grader runs the answer
+elsewhere, and puts `Problem("exception" | "time" | ..., text)` where no value came back.
 """
 
-import contextlib
-import copy
-import inspect
-import sys
-import types
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
-import numpy as np
+from labkit.course.questions.comparison import Case, Problem, compare, expected_cases, parts, plain, trusted
+from labkit.course.questions.diagnosis import Sentence, diagnose
+from labkit.course.questions.question import Question
+from labkit.course.questions.showing import shown_case
 
-from labkit.course.questions.question import Misconception, Question
+__all__ = ["Case", "Problem", "Verdict", "compare", "expected_cases", "parts", "plain", "trusted", "verdict"]
 
-LONGEST_TUPLE = 16
-FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, np.ufunc)
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What is wrong with one output.
-
-    kind: "unanswered", "exception", "time", "kind", "dtype", "length", "shape", "finite", "property", "values", or one
-    of a caller's own. says: one line, without any expected value. lines: (number, text) of the student's line that
-    raised it, if it is known.
-    """
-
-    kind: str
-    says: str
-    lines: tuple[tuple[int, str], ...] = ()
-
-
-@dataclass(frozen=True)
-class Case:
-    """Arguments of one call, what the reference makes of them (as `plain` gives it), and whether it is by hand."""
-
-    args: tuple
-    expected: object
-    by_hand: bool
+# What is told first: that it does not run, then its type, its shape, its values, and what it does to its arguments.
+STAGES = ("unanswered", "exception", "time", "kind", "length", "dtype", "shape", "finite", "values", "altered")
 
 
 @dataclass(frozen=True)
 class Verdict:
     """The result of all cases of a question.
 
-    problem: the first one, None if the answer passes; case: the number of its case, from 0, and `where` says it in
-    words. misconception: the one that the answer behaves like. notes: what is no reason to fail, but should be said.
+    problem: None if the answer passes; case: the number of the case that has it, from 0, and `where` says it in words.
+    question, notes: what is no reason to fail, but should be said. cases, outputs: what it was made of.
     """
 
     problem: Problem | None
     case: int | None
     where: str
-    misconception: Misconception | None
-    notes: tuple[str, ...]
+    question: Question | None = None
+    notes: tuple[str, ...] = ()
+    cases: Sequence[Case] = ()
+    outputs: Sequence[object] = ()
 
     @property
     def passed(self) -> bool:
         """Whether every case is right."""
         return self.problem is None
 
+    @cached_property
+    def sentence(self) -> Sentence | None:
+        """The most specific thing that is true of a wrong answer; looked for when it is asked for."""
+        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "time", "altered"):
+            return None
+        return diagnose(self.question, self.cases, self.outputs)
+
     @property
     def hint(self) -> str | None:
-        """The hint that the recognised misconception earns."""
-        return self.misconception.hint if self.misconception else None
+        """The same in words."""
+        return self.sentence.says if self.sentence else None
 
-
-def expected_cases(question: Question, seed: int) -> list[Case]:
-    """Give the cases by hand, then the random ones that belong to the seed (any that numpy's default_rng takes)."""
-    rng = np.random.default_rng(seed)
-    drawn = [question.inputs(rng) for _ in range(question.random_cases)]
-    by_hand = len(question.by_hand)
-    return [
-        Case(args, trusted(question.reference, args), i < by_hand) for i, args in enumerate((*question.by_hand, *drawn))
-    ]
-
-
-def trusted(function: Callable, args: tuple) -> object:
-    """Call the kit's own function on copies of the arguments, quietly; `plain` of its output."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        return plain(function(*copy.deepcopy(args)))
+    @cached_property
+    def shown(self) -> tuple[str, ...]:
+        """Lines that show the call of the case, and what came and what was expected where they first differ."""
+        if self.problem is None or self.question is None or self.case is None:
+            return ()
+        return shown_case(self.question, self.cases[self.case], self.outputs[self.case])
 
 
 def verdict(
     question: Question, cases: Sequence[Case], outputs: Sequence[object], altered: frozenset[int] = frozenset()
 ) -> Verdict:
-    """Compare the outputs of all cases, in the cases' order, and look for a misconception that explains them.
+    """Compare the outputs of all cases, and find what should be told first.
 
-    altered: positions of the arguments that the answer altered, which is said in a note.
+    altered: positions of the arguments that the answer altered: then it is not right, since its caller needs them.
     """
     problems = [
-        got if isinstance(got, Problem) else compare(question, case.args, case.expected, got)
+        got if isinstance(got, Problem) else compare(question, case.expected, got)
         for case, got in zip(cases, outputs, strict=True)
     ]
-    first = next((i for i, problem in enumerate(problems) if problem), None)
-    names = list(inspect.signature(question.reference).parameters)
-    notes = tuple(f"it alters its argument {names[i]}: work on a copy, the caller needs it" for i in sorted(altered))
-    if first is None:
-        return Verdict(None, None, "", None, notes)
+    changed = tuple(f"it changes its argument {question.parameters[i]}: work on a copy" for i in sorted(altered))
+    told = [(stage(problem), i) for i, problem in enumerate(problems) if problem]
+    if not told:
+        problem = Problem("altered", f"{changed[0]}; what calls it still needs the old values") if changed else None
+        return Verdict(problem, None, "all cases" if changed else "", question, (), cases, outputs)
+    _, first = min(told)
     by_hand = sum(case.by_hand for case in cases)
     here, number, of = ("case by hand", first + 1, by_hand)
     if first >= by_hand:
         here, number, of = ("random case", first + 1 - by_hand, len(cases) - by_hand)
-    where = f"{here} {number} of {of}"
-    return Verdict(problems[first], first, where, recognise(question, cases, outputs), notes)
+    return Verdict(problems[first], first, f"{here} {number} of {of}", question, changed, cases, outputs)
 
 
-def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Misconception | None:
-    """Find the misconception whose outputs are these on every case: where it raises, they are exceptions too."""
-    if all(isinstance(got, Problem) for got in outputs):
-        return None
-    for misconception in question.misconceptions:
-        if all(
-            alike(question, output_of(misconception, case.args), got) for case, got in zip(cases, outputs, strict=True)
-        ):
-            return misconception
-    return None
-
-
-def output_of(misconception: Misconception, args: tuple) -> object:
-    """What a misconception gives, or a Problem where it raises."""
-    try:
-        return trusted(misconception.answer, args)
-    except Exception as error:
-        return Problem("exception", type(error).__name__)
-
-
-def alike(question: Question, a: object, b: object) -> bool:
-    """Whether two outputs, wrong ones perhaps, are the same within the question's tolerance."""
-    a, b = plain(a), plain(b)
-    if isinstance(a, Problem) or isinstance(b, Problem):
-        return isinstance(a, Problem) and isinstance(b, Problem) and a.kind == b.kind
-    with contextlib.suppress(Exception):  # it may rely on a right output's shape; else they are compared as they came
-        a, b = question.canonical(a), question.canonical(b)
-    return not any(wrong.any() for wrong in differences(question, a, b))
-
-
-# ------------------------------------------------------------------------------------- what an output is
-
-
-def plain(got: object) -> object:
-    """Give an output as NumPy: a scalar or an array, or a tuple of these, all copied; or the Problem that it is not.
-
-    Tensors of torch are converted; subclasses of arrays lose what they add. Lists stand for tuples. Nothing of an
-    object of any other class is called, not even its repr.
-
-    >>> plain((1, np.ones(2, np.float32)))
-    (np.int64(1), array([1., 1.], dtype=float32))
-    >>> plain(None).says
-    'it returns None: is a `return` missing?'
-    """
-    if not issubclass(type(got), tuple | list):
-        return plain_array(got)
-    if len(got) > LONGEST_TUPLE:
-        return Problem("kind", f"expected an array or a number, got a {kind_name(got)} of {len(got)}")
-    parts = tuple(plain_array(part) for part in got)
-    return next((part for part in parts if isinstance(part, Problem)), parts)
-
-
-def plain_array(got: object) -> object:
-    """Give one array or number as `plain` does."""
-    cls = type(got)
-    if got is None:
-        return Problem("kind", "it returns None: is a `return` missing?")
-    torch = sys.modules.get("torch")
-    if torch is not None and issubclass(cls, torch.Tensor):
-        try:
-            got = got.detach().cpu().resolve_neg().numpy()
-        except (TypeError, RuntimeError):  # bfloat16, sparse ...
-            return Problem("dtype", f"a tensor of {got.dtype}, {got.layout} is not an array of numbers")
-    elif not issubclass(cls, bool | int | float | complex | np.generic | np.ndarray):
-        return Problem("kind", f"expected an array or a number, got {kind_name(got)}")
-    array = np.array(got, subok=False)
-    if array.dtype.kind not in "biuf":
-        return Problem("dtype", f"expected real numbers, got dtype {array.dtype}")
-    return array[()]
-
-
-def kind_name(got: object) -> str:
-    """Say what something is by its class."""
-    return "a function" if issubclass(type(got), FUNCTIONS) else type(got).__name__[:40]
-
-
-# ------------------------------------------------------------------------------------------ the comparison
-
-
-def compare(question: Question, args: tuple, expected: object, got: object) -> Problem | None:
-    """Say what is wrong with an output, None if nothing is.
-
-    expected: from a Case. got: any object. In this order: kind, length of a tuple, dtype, shape, values that are not
-    finite where they should be, a property that does not hold, values. Floating-point outputs may come in any real
-    dtype but bool; integers must be integers, of any width, and truth values must be bool. NaN is right where the
-    reference gives NaN.
-    """
-    got = plain(got)
-    if isinstance(got, Problem):
-        return got
-    return wrong_form(expected, got) or wrong_values(question, args, expected, got)
-
-
-def wrong_form(expected: object, got: object) -> Problem | None:
-    """Find the first of wrong kind, length, dtype, shape, and values that are not finite."""
-    if isinstance(expected, tuple) != isinstance(got, tuple):
-        wanted = f"a tuple of {len(expected)}" if isinstance(expected, tuple) else "one array or number"
-        came = f"a tuple or list of {len(got)}" if isinstance(got, tuple) else "one array or number"
-        return Problem("kind", f"expected {wanted}, got {came}")
-    pairs = list(zip(parts(expected), parts(got), strict=False))
-    if len(parts(expected)) != len(parts(got)):
-        return Problem("length", f"expected a tuple of {len(expected)}, got one of {len(got)}")
-    names = [f"output {i + 1} of {len(pairs)}: " if len(pairs) > 1 else "" for i in range(len(pairs))]
-    for test in (wrong_dtype, wrong_shape, not_finite):
-        for name, (e, g) in zip(names, pairs, strict=True):
-            if problem := test(e, g):
-                return Problem(problem.kind, name + problem.says)
-    return None
-
-
-def parts(output: object) -> tuple:
-    """The outputs as a tuple, also if there is only one."""
-    return output if isinstance(output, tuple) else (output,)
-
-
-def wrong_dtype(expected, got) -> Problem | None:
-    """Integers for integers, truth values for truth values, and any real numbers for real numbers."""
-    allowed, wanted = {
-        "b": ("b", "bool"),
-        "i": ("iu", "an integer dtype"),
-        "u": ("iu", "an integer dtype"),
-        "f": ("fiu", "real numbers"),
-    }[expected.dtype.kind]
-    return None if got.dtype.kind in allowed else Problem("dtype", f"expected {wanted}, got dtype {got.dtype}")
-
-
-def wrong_shape(expected, got) -> Problem | None:
-    """The same shape; a number has the shape ()."""
-    if expected.shape == got.shape:
-        return None
-    wanted = f"shape {expected.shape}" if expected.shape else "a number"
-    return Problem("shape", f"expected {wanted}, got {f'shape {got.shape}' if expected.shape == () else got.shape}")
-
-
-def not_finite(expected, got) -> Problem | None:
-    """No NaN and no infinity where the reference is finite."""
-    bad = np.isfinite(expected) & ~np.isfinite(got)
-    if not bad.any():
-        return None
-    what = "NaN" if np.isnan(got[bad] if got.shape else got).all() else "NaN or infinite"
-    return Problem(
-        "finite", f"{np.count_nonzero(bad)} of {got.size} values are {what}" if got.shape else f"it is {what}"
-    )
-
-
-def wrong_values(question: Question, args: tuple, expected: object, got: object) -> Problem | None:
-    """Compare values; of a wrong output the first property that it violates says more than a count of values."""
-    try:
-        canonical = question.canonical(got)
-    except Exception:  # it may rely on what only right outputs have
-        canonical = got
-    wrong = differences(question, question.canonical(expected), canonical)
-    count, size = sum(int(np.count_nonzero(w)) for w in wrong), sum(w.size for w in wrong)
-    if not count:
-        return None
-    for prop in question.properties:
-        if not fulfilled(prop.holds, args, got):
-            return Problem("property", f"it should hold, but does not: {prop.says}")
-    return Problem("values", f"{count} of {size} values are not right" if size > 1 else "the value is not right")
-
-
-def fulfilled(holds: Callable[[tuple, object], bool], args: tuple, got: object) -> bool:
-    """Whether a property holds; one that cannot even be computed does not."""
-    try:
-        with np.errstate(all="ignore"):
-            return bool(holds(copy.deepcopy(args), copy.deepcopy(got)))
-    except Exception:
-        return False
-
-
-def differences(question: Question, expected: object, got: object) -> list[np.ndarray]:
-    """For each part, where two outputs differ; a part of another shape differs in one place."""
-    if len(parts(expected)) != len(parts(got)):
-        return [np.ones(1, bool)]
-    pairs = zip(parts(expected), parts(got), strict=True)
-    return [different(question, np.atleast_1d(e), np.atleast_1d(g)) for e, g in pairs]
-
-
-def different(question: Question, expected: np.ndarray, got: np.ndarray) -> np.ndarray:
-    """Where two arrays differ: numbers by the question's tolerance, integers and truth values exactly."""
-    if expected.shape != got.shape:
-        return np.ones(1, bool)
-    if expected.dtype.kind != "f" and got.dtype.kind != "f":
-        return expected != got
-    with np.errstate(all="ignore"):
-        return ~np.isclose(got, expected.astype(np.float64), question.rtol, question.atol, equal_nan=True)
+def stage(problem: Problem) -> int:
+    """How early a problem is told; what only a grader meets comes with the exceptions."""
+    return STAGES.index(problem.kind if problem.kind in STAGES else "exception")

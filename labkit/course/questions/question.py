@@ -1,6 +1,7 @@
 """What a question is, and where the questions of the nine topics are found."""
 
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,6 +19,9 @@ TOPICS = (
     "08_node",
     "09_other_stacks",
 )
+
+
+PACKAGES = ("numpy", "scipy", "torch")  # what an answer may import beside the standard library, unless it is forbidden
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,16 @@ class Question:
     def function(self) -> str:
         """The name of the function that answers it, and the grade id of its cell."""
         return self.name.partition(".")[2]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The names of its arguments."""
+        return tuple(inspect.signature(self.reference).parameters)
+
+    @property
+    def source(self) -> str:
+        """The source of the reference, which is complete in itself but for `np`."""
+        return inspect.getsource(inspect.unwrap(self.reference))
 
 
 def wrong(question: Question, hint: str) -> Callable[[Callable], Callable]:

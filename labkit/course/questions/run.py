@@ -18,7 +18,8 @@ from types import TracebackType
 
 import numpy as np
 
-from labkit.course.questions.judge import Problem, Verdict, expected_cases, plain, verdict
+from labkit.course.questions.comparison import Problem, expected_cases, plain
+from labkit.course.questions.judge import Verdict, verdict
 from labkit.course.questions.program import Program
 from labkit.course.questions.question import Question
 
@@ -48,16 +49,14 @@ def judge(
 ) -> Verdict:
     """Run an answer on the cases that belong to a seed and tell the first problem, if there is one.
 
-        limit_s: seconds for all cases together (where the system has interval timers, in the main thread); what was not
-        reached then counts as not returned. printed: takes what the answer prints; else it is dropped.
+    limit_s: seconds for all cases together (where the system has interval timers, in the main thread); what was not
+    reached then counts as not returned. printed: takes what the answer prints; else it is dropped.
 
-        >>> from labkit.course.questions.program import Program
-    from labkit.course.questions.question import Question
-        >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(3),))
-        >>> judge(double, lambda x: x + x, seed=0).passed
-        True
-        >>> judge(double, lambda x: (2 * x)[:, None], seed=0).problem.says
-        'expected shape (3,), got (3, 1)'
+    >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(3),))
+    >>> judge(double, lambda x: x + x, seed=0).passed
+    True
+    >>> judge(double, lambda x: (2 * x)[:, None], seed=0).problem.says
+    'expected shape (3,), got (3, 1)'
     """
     cases = expected_cases(question, seed)
     outputs, altered = run(answer, [case.args for case in cases], limit_s, printed)

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 import torch
 
-from labkit.course.questions.judge import Problem, compare, expected_cases, plain, recognise, verdict
+from labkit.course.questions.comparison import Problem, compare, expected_cases, plain
+from labkit.course.questions.diagnosis import Sentence, recognise
+from labkit.course.questions.judge import verdict
 from labkit.course.questions.question import Property, Question, wrong
 from labkit.course.questions.run import Printed, call, judge, run
 
@@ -90,23 +92,23 @@ def test_right_answers_pass_in_any_real_array(answer):
 def test_dtypes(expected, right, wrong):
     """Real numbers come in any real dtype; integers are integers; truth values are truth values."""
     for got in right:
-        assert compare(PLAIN, (), expected, got) is None
+        assert compare(PLAIN, expected, got) is None
     for got in wrong:
-        assert compare(PLAIN, (), expected, got).kind in ("dtype", "kind")
+        assert compare(PLAIN, expected, got).kind in ("dtype", "kind")
 
 
 def test_nan_is_right_where_the_reference_has_it_and_nowhere_else():
     expected = np.array([0.5, np.nan, np.inf])
-    assert compare(PLAIN, (), expected, expected.copy()) is None
-    assert compare(PLAIN, (), expected, np.array([0.5, 0.0, np.inf])).kind == "values"
-    assert compare(PLAIN, (), expected, np.array([0.5, np.nan, -np.inf])).kind == "values"
-    assert compare(PLAIN, (), expected, np.array([np.nan, np.nan, np.inf])).says == "1 of 3 values are NaN"
-    assert compare(PLAIN, (), np.float64(1), np.inf).says == "it is NaN or infinite"
+    assert compare(PLAIN, expected, expected.copy()) is None
+    assert compare(PLAIN, expected, np.array([0.5, 0.0, np.inf])).kind == "values"
+    assert compare(PLAIN, expected, np.array([0.5, np.nan, -np.inf])).kind == "values"
+    assert compare(PLAIN, expected, np.array([np.nan, np.nan, np.inf])).says == "1 of 3 values are NaN"
+    assert compare(PLAIN, np.float64(1), np.inf).says == "it is NaN or infinite"
 
 
 def test_integers_are_compared_exactly():
     """As floating-point numbers these two would be equal."""
-    assert compare(PLAIN, (), np.array([2**60]), np.array([2**60 + 1])).kind == "values"
+    assert compare(PLAIN, np.array([2**60]), np.array([2**60 + 1])).kind == "values"
 
 
 def test_canonical_makes_equally_right_outputs_one():
@@ -177,7 +179,7 @@ def itself(n):
         (lambda n: 0.5, "shape", "expected shape (2,), got ()"),
         (lambda n: np.zeros(len(n)).view(AlwaysEqual), "values", "2 of 2 values are not right"),
         (lambda n: iou(n) * 1.01, "values", "2 of 2 values are not right"),
-        (lambda n: iou(n) * 9, "property", "no class has an IoU over one"),
+        (lambda n: iou(n) * 9, "values", "2 of 2 values are not right"),
         (lambda n: np.where(np.arange(len(n)) == 1, np.nan, iou(n)), "finite", "1 of 2 values are NaN"),
         (lambda n: n[7], "exception", "IndexError: index 7 is out of bounds"),
         (lambda n, m: n, "exception", "missing 1 required positional argument: 'm'"),
@@ -224,16 +226,17 @@ def test_a_problem_never_holds_an_expected_value():
 
 def test_a_wrong_answer_that_behaves_like_a_misconception_earns_its_hint():
     found = judge(QUESTION, lambda n: (np.diagonal(n) / n.sum(axis=1)).astype(np.float32), seed=3)
-    assert (found.misconception.name, found.hint) == ("recall", "who pays for false alarms?")
-    assert judge(QUESTION, lambda n: np.trace(n) / n.sum(), seed=3).misconception.name == "whole"
+    assert found.sentence == Sentence("misconception", "who pays for false alarms?")
+    assert judge(QUESTION, lambda n: np.trace(n) / n.sum(), seed=3).hint == "one number per class"
 
 
 def test_one_that_behaves_so_on_some_cases_only_earns_none():
     def mixed(n):
         return np.diagonal(n) / n.sum(axis=1) + (len(n) == 2)
 
-    assert judge(QUESTION, mixed, seed=3).misconception is None
-    assert judge(QUESTION, lambda n: n[7], seed=3).misconception is None
+    for answer in (mixed, lambda n: n[7]):
+        cases = expected_cases(QUESTION, 3)
+        assert recognise(QUESTION, cases, run(answer, [case.args for case in cases])[0]) is None
 
 
 def test_a_misconception_may_raise_where_the_answer_does():
@@ -252,9 +255,7 @@ def test_verdicts_are_made_of_outputs_that_came_from_anywhere():
     found = verdict(QUESTION, cases, lost)
     assert (found.problem, found.where) == (lost[4], "random case 3 of 4")
     assert recognise(QUESTION, cases, values) is None
-    assert verdict(QUESTION, cases, values, frozenset({0})).notes == (
-        "it alters its argument n: work on a copy, the caller needs it",
-    )
+    assert verdict(QUESTION, cases, values, frozenset({0})).problem.kind == "altered"
 
 
 def test_cases_belong_to_the_seed():
@@ -274,7 +275,7 @@ def test_arguments_are_copies_and_altering_them_is_said():
         return right
 
     found = judge(QUESTION, alters, seed=3)
-    assert found.passed and "alters its argument n" in found.notes[0]
+    assert not found.passed and found.problem.says.startswith("it changes its argument n: work on a copy")
     for untouched in (3, 0.5, np.float32(2), np.nan, "text", None, (np.ones(2), [1, 2]), np.array([np.nan, 1])):
         assert run(lambda x: 1, [(untouched,)]) == ([1], frozenset())
     assert run(lambda x: x[1].append(3), [((np.ones(2), [1, 2]),)])[1] == {0}

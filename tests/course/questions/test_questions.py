@@ -16,11 +16,13 @@ import jaxtyping
 import numpy as np
 import pytest
 from alternatives import alternatives
-from mutants import Mutant, compiled, mutants
+from mutants import mutants
 
+from labkit.course.questions.diagnosis import Sentence
 from labkit.course.questions.judge import Case, Problem, compare, expected_cases, trusted
 from labkit.course.questions.question import TOPICS, Question, find, of_topic
 from labkit.course.questions.run import judge, run
+from labkit.course.questions.slips import Slip, compiled
 
 SEEDS = (0, 1, 20_260_101)  # the first is the one of `check`
 SEARCHED = 150  # random inputs on which a surviving mutant must differ nowhere
@@ -91,11 +93,11 @@ def objections(question: Question, title: str, answer) -> list[str]:
     return [f"{title}, seed {seed}: {v.problem} in {v.where}" for seed, v in verdicts.items() if not v.passed]
 
 
-def passes(question: Question, mutant: Mutant, cases: list[Case]) -> bool:
+def passes(question: Question, mutant: Slip, cases: list[Case]) -> bool:
     """Whether a mutant is right on all cases, and returns in time."""
     for case in cases:
         (got,), _ = run(mutant.function, [case.args], LIMIT_S)
-        if isinstance(got, Problem) or compare(question, case.args, case.expected, got) is not None:
+        if isinstance(got, Problem) or compare(question, case.expected, got) is not None:
             return False
     return True
 
@@ -174,9 +176,8 @@ def test_misconceptions_earn_their_own_hints(name):
     lenient = replace(question, rtol=100 * question.rtol, atol=100 * question.atol)
     for misconception in question.misconceptions:
         for seed in SEEDS:
-            verdict = judge(question, misconception.answer, seed)
-            found = verdict.misconception
-            assert found is misconception, (misconception.name, seed, verdict.problem, found and found.name)
+            found = judge(question, misconception.answer, seed)
+            assert found.sentence == Sentence("misconception", misconception.hint), (misconception.name, seed, found)
         assert not judge(lenient, misconception.answer, SEEDS[0]).passed, misconception.name
 
 
@@ -200,19 +201,25 @@ def test_weak_cases_let_mutants_through_and_are_found_out():
 
 def test_mutants_are_the_slips_that_they_should_be():
     """And a copy without a change behaves as the original does."""
-    found = [mutant.name for mutant in mutants(shares)]
-    assert found == [
-        "line 3: n / n.sum(axis=1, keepdims=True) -> n * n.sum(axis=1, keepdims=True)",
-        "line 3: n / n.sum(axis=1, keepdims=True) -> n",
-        "line 3: n / n.sum(axis=1, keepdims=True) -> n.sum(axis=1, keepdims=True)",
-        "line 3: n.sum(axis=1, keepdims=True) -> n.mean(axis=1, keepdims=True)",
-        "line 3: n.sum(axis=1, keepdims=True) -> n.prod(axis=1, keepdims=True)",
-        "line 3: n.sum(axis=1, keepdims=True) -> n.sum(keepdims=True)",
-        "line 3: n.sum(axis=1, keepdims=True) -> n.sum(axis=1)",
+    recognised, held_out = ([mutant.name for mutant in mutants(shares, which)] for which in (False, True))
+    whole, total = "line 3: n / n.sum(axis=1, keepdims=True)", "line 3: n.sum(axis=1, keepdims=True)"
+    assert recognised == [
+        f"{whole} -> n * n.sum(axis=1, keepdims=True)",
+        f"{whole} -> n",
+        f"{whole} -> n.sum(axis=1, keepdims=True)",
+        f"{whole} -> n.sum(axis=1, keepdims=True) / n",
+        f"{total} -> n",
         "line 3: 1 -> 2",
         "line 3: 1 -> 0",
         "line 3: True -> False",
     ]
+    assert held_out == [
+        f"{total} -> n.mean(axis=1, keepdims=True)",
+        f"{total} -> n.prod(axis=1, keepdims=True)",
+        f"{total} -> n.sum(keepdims=True)",
+        f"{total} -> n.sum(axis=1)",
+    ]
+    assert {mutant.name for mutant in mutants(shares)} == {*recognised, *held_out}
     source = inspect.getsource(shares)
     assert compiled(source, shares)(np.array([[1.0, 3.0]])).tolist() == [[0.25, 0.75]]
 
