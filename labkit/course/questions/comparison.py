@@ -122,10 +122,10 @@ def compare(question: Question, expected: object, got: object) -> Problem | None
     got = plain(got)
     if isinstance(got, Problem):
         return got
-    return wrong_form(expected, got) or wrong_values(question, expected, got)
+    return wrong_form(question, expected, got) or wrong_values(question, expected, got)
 
 
-def wrong_form(expected: object, got: object) -> Problem | None:
+def wrong_form(question: Question, expected: object, got: object) -> Problem | None:
     """Find the first of wrong kind, length, dtype, shape, and values that are not finite."""
     if isinstance(expected, tuple) != isinstance(got, tuple):
         wanted = f"a tuple of {len(expected)}" if isinstance(expected, tuple) else "one array or number"
@@ -139,6 +139,8 @@ def wrong_form(expected: object, got: object) -> Problem | None:
         for name, (e, g) in zip(names, pairs, strict=True):
             if problem := test(e, g):
                 return Problem(problem.kind, name + problem.says)
+    if question.same_dtype and (expected.dtype != got.dtype):
+        return Problem("dtype", f"expected dtype {expected.dtype}, got {got.dtype}")
     return None
 
 

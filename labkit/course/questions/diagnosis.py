@@ -14,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labkit.course.questions.by_number import NUMBERS
 from labkit.course.questions.comparison import Case, Problem, alike, parts, trusted
 from labkit.course.questions.errors import explain
 from labkit.course.questions.inputs import changes
 from labkit.course.questions.places import places
 from labkit.course.questions.question import Misconception, Property, Question
-from labkit.course.questions.relations import ARRANGED, NUMBERS, View
+from labkit.course.questions.relations import ARRANGED, COMBINED, View
 from labkit.course.questions.slips import Slip, slips
 
 LONGEST_S = 1.0  # no further sentence is looked for after that
@@ -52,11 +53,13 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     yield from tuple_in_another_order(question, cases, outputs)
     for says in changed_inputs(question, cases, outputs, end):
         yield Sentence("input", says)
+    for name, view in views:
+        yield from local(name, view)
     yield from broken_properties(question, cases, outputs)
     for says in slipped(question, cases, outputs, end):
         yield Sentence("slip", says)
     for name, view in views:
-        yield from local(name, view)
+        yield from (Sentence("place", f"{name}It is wrong only {where}.") for where, _ in places(view))
 
 
 # ------------------------------------------------------------------------------------------ misconceptions
@@ -122,21 +125,18 @@ def views_of(question: Question, cases: Sequence[Case], outputs: Sequence[object
 
 def related(view: View) -> Iterator[str]:
     """The relations that hold everywhere."""
-    for relation in (*ARRANGED, *NUMBERS):
+    for relation in (*ARRANGED, *NUMBERS, *COMBINED):
         if said := relation(view):
             yield said
 
 
 def local(name: str, view: View) -> Iterator[Sentence]:
-    """The relations that hold at some places outside of which all is right, then the places."""
-    found = list(places(view))
-    for where, masks in found:
+    """The relations that hold at some places outside of which all is right."""
+    for where, masks in places(view):
         narrow = view.at(masks)
         for relation in NUMBERS:
             if said := relation(narrow):
                 yield Sentence("relation", f"{name}It is wrong only {where}. {said}")
-    for where, _ in found:
-        yield Sentence("place", f"{name}It is wrong only {where}.")
 
 
 def tuple_in_another_order(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:

@@ -128,6 +128,12 @@ def changes(question: Question, args: tuple) -> Iterator[tuple[str, Change]]:
         elif isinstance(value, int | float | np.generic):
             for says, change in NUMBERS.items():
                 yield f"Your output is right as if {name} {says}.", at(i, change)
+    alike = [i for i, v in enumerate(args) if isinstance(v, np.ndarray) and v.ndim and v.shape == first_shape(args)]
+    if len(alike) > 1:
+        who = " and ".join(names[i] for i in alike)
+        for says, change in ARRAYS.items():
+            if says.startswith(("were without its", "were upside", "were mirrored", "were transposed", "were its")):
+                yield f"Your output is right as if {who} {says.replace(' its ', ' their ')}.", at_all(alike, change)
     for i in range(len(args)):
         for j in range(i):
             yield f"Your output is right as if the arguments {names[j]} and {names[i]} were exchanged.", swap(i, j)
@@ -141,6 +147,21 @@ def at(i: int, change: Callable) -> Change:
     def changed(args: tuple) -> tuple | None:
         new = change(args[i])
         return None if new is None else (*args[:i], new, *args[i + 1 :])
+
+    return changed
+
+
+def first_shape(args: tuple) -> tuple[int, ...]:
+    """The shape of the first array."""
+    return next((v.shape for v in args if isinstance(v, np.ndarray) and v.ndim), ())
+
+
+def at_all(places: list[int], change: Callable) -> Change:
+    """The same change of several arguments."""
+
+    def changed(args: tuple) -> tuple | None:
+        new = [change(args[i]) if i in places else args[i] for i in range(len(args))]
+        return None if any(new[i] is None for i in places) else tuple(new)
 
     return changed
 

@@ -3,14 +3,17 @@
 Each relation is one small function of a `View`, which holds the expected and the returned array of every case. It gives
 one sentence for the student, "" if it does not hold; it holds only if it does so in every case that can show it.
 ARRANGED are relations of whole arrays; NUMBERS are relations number by number, which can also be asked of some places
-alone (`places`).
+alone (`places`); COMBINED are those with the arguments, which are asked last.
 """
 
 import itertools
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+Array = np.ndarray | np.generic
 
 
 @dataclass(frozen=True)
@@ -27,16 +30,17 @@ class View:
     rtol: float
     atol: float
 
-    def different(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def different(self, a: Array, b: Array) -> np.ndarray:
         """Where two arrays of one shape differ; truth values are no numbers."""
         if (a.dtype.kind == "b") != (b.dtype.kind == "b"):
             return np.ones(a.shape, bool)
         if a.dtype.kind != "f" and b.dtype.kind != "f":
             return np.asarray(a != b)
         with np.errstate(all="ignore"):
-            return ~np.isclose(np.asarray(b, float), np.asarray(a, float), self.rtol, self.atol, equal_nan=True)
+            equal = np.isclose(np.asarray(b, float), np.asarray(a, float), self.rtol, self.atol, equal_nan=True)
+        return np.asarray(~equal)
 
-    def same(self, a: np.ndarray, b: np.ndarray) -> bool:
+    def same(self, a: Array, b: Array) -> bool:
         """Whether two arrays are equal within the tolerance."""
         return a.shape == b.shape and not self.different(a, b).any()
 
@@ -76,6 +80,7 @@ class View:
 Relation = Callable[[View], str]
 ARRANGED: list[Relation] = []
 NUMBERS: list[Relation] = []
+COMBINED: list[Relation] = []
 
 
 def relation(entries: list[Relation]) -> Callable[[Relation], Relation]:
@@ -91,7 +96,8 @@ def relation(entries: list[Relation]) -> Callable[[Relation], Relation]:
 def attempt(change: Callable, *arguments) -> np.ndarray | None:
     """The array that a change gives; None if it cannot be made."""
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             changed = change(*arguments)
         return None if changed is None else np.asarray(changed)
     except Exception:  # a change that cannot be made here explains nothing
@@ -234,7 +240,7 @@ def summed_up(view: View) -> str:
     return ""
 
 
-@relation(ARRANGED)
+@relation(COMBINED)
 def scaled_line_by_line(view: View) -> str:
     """A factor for each row, column or pixel: normalised along the wrong axis, or not at all."""
     if not view.shaped or len(axes(view)) < 2:
@@ -260,236 +266,6 @@ def factors_along(view: View, e: np.ndarray, g: np.ndarray, axis: int) -> bool:
             np.square(e, dtype=float), axis, keepdims=True
         )
     return bool(np.isfinite(factor).all() and (factor != 0).all() and view.same(e * factor, g))
-
-
-# ---------------------------------------------------------------------------------------- number by number
-
-FUNCTIONS = {
-    "The sign is the other one.": np.negative,
-    "The sign is lost: yours are the absolute values.": np.abs,
-    "Each of yours is 1 minus the right value.": lambda e: 1.0 - e,
-    "Each of yours is 1 over the right value: numerator and denominator are exchanged.": lambda e: 1.0 / e,
-    "Each of yours is the square of the right value: is a root missing?": np.square,
-    "Each of yours is the root of the right value: is it not to be squared?": np.sqrt,
-    "Yours are the logarithms of the right values.": np.log,
-    "Yours are minus the logarithms of the right values.": lambda e: -np.log(e),
-    "Yours are the exponentials of the right values: a logarithm is missing.": np.exp,
-    "The right values are minus the logarithms of yours.": lambda e: np.exp(-e),
-    "Yours are sines of the right values.": np.sin,
-    "Yours are rounded down to whole numbers.": np.floor,
-    "Yours are rounded to whole numbers.": np.round,
-    "Yours are rounded up to whole numbers.": np.ceil,
-    "Yours are cut off below 0.": lambda e: np.maximum(e, 0),
-    "Yours are cut off above 1.": lambda e: np.minimum(e, 1),
-    "Yours are cut off to 0 ... 1.": lambda e: np.clip(e, 0, 1),
-    "Yours are cut off to 0 ... 255.": lambda e: np.clip(e, 0, 255),
-    "Your numbers wrap round at 256: the sum or product was formed in uint8.": lambda e: np.mod(e, 256),
-    "Your numbers wrap round at 65536: they were formed in 16 bits.": lambda e: np.mod(e, 65536),
-    "Yours is true exactly where the right one is false.": lambda e: ~e if e.dtype.kind == "b" else None,
-}
-
-
-@relation(NUMBERS)
-def function_of_the_right_value(view: View) -> str:
-    """A function of the right value, one of FUNCTIONS."""
-    return next((says for says, function in FUNCTIONS.items() if view.gives(function)), "")
-
-
-CONSTANTS = {
-    2.0: "2",
-    3.0: "3",
-    4.0: "4",
-    8.0: "8",
-    10.0: "10",
-    100.0: "100",
-    180.0 / np.pi: "180 / pi: degrees and radians",
-    np.pi: "pi",
-    2.0 * np.pi: "2 pi",
-    255.0: "255: bytes and numbers from 0 to 1",
-    256.0: "256",
-    1000.0: "1000: millimetres and metres",
-    1e6: "a million",
-    1e9: "1e9: nanoseconds and seconds",
-    1.0 / np.log(2.0): "log 2: another base of the logarithm",
-    np.log(10.0): "log 10: another base of the logarithm",
-    np.sqrt(2.0): "the root of 2",
-    np.sqrt(3.0): "the root of 3",
-}
-
-
-@relation(NUMBERS)
-def factor(view: View) -> str:
-    """One factor in each case: a constant, a quantity of the arguments, or one that cannot be named."""
-    factors = [factor_of(view, e, g) for e, g in zip(view.expected, view.got, strict=True)]
-    told = [k for k in factors if k is not None and np.isfinite(k)]
-    if not told or any(k is not None and not np.isfinite(k) for k in factors) or max(map(abs, told)) == 0.0:
-        return ""
-    if all(np.isclose(k, 1.0, rtol=view.rtol, atol=0) for k in told) or not enough(view, told):
-        return ""
-    if np.allclose(told, told[0], rtol=max(1e-4, view.rtol)):
-        k = told[0]
-        sign = " and the sign is the other one" if k < 0 else ""
-        for value, name in CONSTANTS.items():
-            for size, words in ((value, "large"), (1.0 / value, "small")):
-                if np.isclose(abs(k), size, rtol=1e-3):
-                    return f"Yours are too {words} by a factor of {name}{sign}."
-        return f"Yours are the right values times {k:.4g}, in every case."
-    for name, values in quantities(view):
-        pairs = [(k, q) for k, q in zip(factors, values, strict=True) if k is not None]
-        for power, words in ((1, "large"), (-1, "small"), (2, "large"), (-2, "small"), (0.5, "large"), (-0.5, "small")):
-            with np.errstate(all="ignore"):
-                if all(q is not None and q > 0 and np.isclose(abs(k), q**power, rtol=1e-3) for k, q in pairs):
-                    of = {1: name, 2: f"the square of {name}", 0.5: f"the root of {name}"}[abs(power)]
-                    return f"Yours are too {words} by a factor that is {of}: divide or multiply by it."
-    return (
-        "In each case yours are the right values times one number, another in each case: something is scaled wrongly."
-    )
-
-
-def enough(view: View, told: list) -> bool:
-    """Whether there is enough to see that it is one number: two values in a case, or two cases."""
-    return len(told) > 1 or view.numbers()[0].size > 2
-
-
-def factor_of(view: View, e: np.ndarray, g: np.ndarray) -> float | None:
-    """The number k with g = k e; NaN if there is none, None if every k would do."""
-    if e.shape != g.shape or e.dtype.kind == "b" or g.dtype.kind == "b":
-        return np.nan
-    e, g = e.astype(float), g.astype(float)
-    use = np.isfinite(e) & (e != 0.0)
-    if not use.any():
-        return None if view.same(e, g) else np.nan
-    k = float(np.median(g[use] / e[use]))
-    return k if view.same(k * e, g) else np.nan
-
-
-@relation(NUMBERS)
-def offset(view: View) -> str:
-    """The same number added everywhere in a case: a constant, a quantity of the arguments, or one without a name."""
-    offsets = [offset_of(view, e, g) for e, g in zip(view.expected, view.got, strict=True)]
-    told = [c for c in offsets if c is not None]
-    if (
-        not told
-        or not np.isfinite(told).all()
-        or not enough(view, told)
-        or np.allclose(told, 0.0, atol=max(view.atol, 1e-9))
-    ):
-        return ""
-    if np.allclose(told, told[0], rtol=max(1e-4, view.rtol), atol=max(view.atol, 1e-9)):
-        return f"Yours are too {'large' if told[0] > 0 else 'small'} by {abs(told[0]):.4g}, in every case."
-    for name, values in quantities(view):
-        pairs = [(c, q) for c, q in zip(offsets, values, strict=True) if c is not None]
-        for sign, words in ((1.0, "large"), (-1.0, "small")):
-            for part, of in ((1.0, ""), (2.0, "twice "), (0.5, "half of ")):
-                if all(q is not None and np.isclose(c, sign * part * q, rtol=1e-3, atol=view.atol) for c, q in pairs):
-                    return f"Yours are too {words} by {of}{name}."
-    return "In each case yours are off by one and the same number, another in each case: a term is missing or too much."
-
-
-def offset_of(view: View, e: np.ndarray, g: np.ndarray) -> float | None:
-    """The number c with g = e + c; NaN if there is none, None if there are no numbers."""
-    if e.shape != g.shape or e.dtype.kind == "b" or g.dtype.kind == "b":
-        return np.nan
-    e, g = e.astype(float), g.astype(float)
-    use = np.isfinite(e)
-    if not use.any():
-        return None if view.same(e, g) else np.nan
-    c = float(np.median(g[use] - e[use]))
-    return c if view.same(e + c, g) else np.nan
-
-
-@relation(NUMBERS)
-def straight_line(view: View) -> str:
-    """A factor and an offset, the same in every case."""
-    if not view.shaped:
-        return ""
-    e, g, _ = view.numbers()
-    use = np.isfinite(e) & np.isfinite(g)
-    if np.unique(e[use]).size < 4 or any(a.dtype.kind == "b" for a in (*view.expected, *view.got)):
-        return ""
-    k, c = np.polyfit(e[use], g[use], 1)
-    if abs(k) < 1e-9 or not view.gives(lambda e: k * e + c):
-        return ""
-    return f"Each of yours is {k:.4g} times the right value {'plus' if c > 0 else 'minus'} {abs(c):.4g}."
-
-
-@relation(NUMBERS)
-def always_the_same(view: View) -> str:
-    """One number, whatever the arguments are."""
-    if not view.shaped:
-        return ""
-    e, g, _ = view.numbers()
-    if g.size < 2 or not view.same(g, np.full(g.shape, g[0])) or view.same(e, np.full(e.shape, e[0])):
-        return ""
-    first = next(a.flat[0] for a in view.got if a.size)
-    return f"Yours is always {first if first.dtype.kind == 'b' else f'{first:.4g}'}, whatever the arguments are."
-
-
-@relation(NUMBERS)
-def an_argument(view: View) -> str:
-    """A number of the arguments, or a quantity of theirs, in the place of the right one."""
-    for name, values in quantities(view):
-        if view.shaped and view.is_(
-            [None if q is None else np.full(e.shape, float(q)) for e, q in zip(view.expected, values, strict=True)]
-        ):
-            return f"What stands there is {name}."
-    return ""
-
-
-@relation(NUMBERS)
-def values_taken_for_others(view: View) -> str:
-    """Whole numbers: wherever one is expected, there always is another."""
-    if not view.shaped or any(a.dtype.kind not in "iub" for a in (*view.expected, *view.got)):
-        return ""
-    e, g, _ = view.numbers()
-    if not e.size:
-        return ""
-    values = np.unique(e)
-    if values.size > 8:
-        return ""
-    taken = {}
-    for value in values:
-        seen = np.unique(g[e == value])
-        if seen.size != 1:
-            return ""
-        if seen[0] != value:
-            taken[value] = seen[0]
-    if not taken or (len(taken) == values.size and values.size < 2):
-        return ""
-    return " ".join(f"Wherever {e:g} is right, you have {g:g}." for e, g in list(taken.items())[:3])
-
-
-def quantities(view: View) -> Iterator[tuple[str, list[float | None]]]:
-    """Numbers that the arguments hold: their values, lengths and sizes, the same one for every case."""
-    for i, name in enumerate(view.names):
-        values = [args[i] for args in view.args]
-        if all(np.ndim(v) == 0 for v in values):
-            yield name, [float(v) for v in values]
-            continue
-        if not all(isinstance(v, np.ndarray) for v in values):
-            continue
-        for axis in range(min(v.ndim for v in values)):
-            length = (
-                {0: "rows", 1: "columns"}.get(axis, f"entries along axis {axis}") if values[0].ndim > 1 else "entries"
-            )
-            yield f"the number of {length} of {name}", [float(v.shape[axis]) for v in values]
-        if values[0].ndim > 1:
-            yield f"the number of all entries of {name}", [float(v.size) for v in values]
-            if all(v.ndim > 2 for v in values):
-                yield f"the number of pixels of {name}", [float(v.size // v.shape[-1]) for v in values]
-        if all(v.dtype.kind in "iuf" for v in values):
-            yield f"the sum of {name}", [float(v.sum()) for v in values]
-            if all(v.size for v in values):
-                yield f"the largest of {name}", [float(v.max()) for v in values]
-                yield f"the smallest of {name}", [float(v.min()) for v in values]
-                yield f"the mean of {name}", [float(v.mean()) for v in values]
-        if all(v.dtype == np.uint8 for v in values):
-            yield (
-                f"the number of entries of {name} that are not 255",
-                [float(np.count_nonzero(v != 255)) for v in values],
-            )
-        if all(v.dtype.kind == "b" for v in values):
-            yield f"the number of true entries of {name}", [float(np.count_nonzero(v)) for v in values]
 
 
 # --------------------------------------------------------------------------------- made of the arguments alone
@@ -543,7 +319,7 @@ OPERATIONS = {
 }
 
 
-@relation(ARRANGED)
+@relation(COMBINED)
 def the_right_one_and_an_argument(view: View) -> str:
     """The right value times, divided by, plus or minus an argument."""
     for name, values in ingredients(view):
@@ -560,7 +336,7 @@ def the_right_one_and_an_argument(view: View) -> str:
     return ""
 
 
-@relation(ARRANGED)
+@relation(COMBINED)
 def made_of_the_arguments(view: View) -> str:
     """Something simple of one argument, or of two that are combined."""
     first = next(i for i, (e, g) in enumerate(zip(view.expected, view.got, strict=True)) if not view.same(e, g))

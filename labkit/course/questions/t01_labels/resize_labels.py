@@ -32,6 +32,7 @@ QUESTION = Question(
     inputs=_labels_and_size,
     by_hand=(
         (np.array([[1, 3]], np.uint8), 1, 4),
+        ((np.arange(24, dtype=np.uint8) * 7 % 24).reshape(4, 6), 2, 3),  # a new centre falls between two old pixels
         (np.array([[0, 1, 2, 3, 1], [3, 255, 1, 0, 2], [0, 0, 2, 1, 3]], np.uint8), 2, 3),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
     ),

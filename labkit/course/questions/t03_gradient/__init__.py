@@ -24,7 +24,7 @@ def random_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 TOY = np.array([2.0, 1.0, -1.0])
 
 
-SURE = np.array([[0.0, 1000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0
+SURE = np.array([[0.0, 3000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0
 
 
 TRUE_CLASSES = np.array([0, 255], np.uint8)

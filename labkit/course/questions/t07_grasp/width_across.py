@@ -21,6 +21,7 @@ QUESTION = Question(
         (RECTANGLE, np.pi / 2),
         (RECTANGLE[:2], np.pi / 6),  # a stick along y, 2 long, 30 degrees from x: 2 sin(30) = 1
         (RECTANGLE[:1], 1.0),
+        (RECTANGLE - RECTANGLE.mean(axis=0), 0.5),  # to both sides of the origin
     ),
     points=2,
     properties=(

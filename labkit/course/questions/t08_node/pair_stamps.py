@@ -41,6 +41,7 @@ QUESTION = Question(
         (np.array([10]), np.array([2, 6, 13, 30]), 8),
         (np.array([10, 50]), np.array([6, 14, 60]), 10),
         (np.array([10, 20]), np.array([], int), 5),
+        (np.array([_NOW]), np.array([_NOW - 2**32 - 2]), 3),  # four seconds, which 32 bits do not see
         (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
     ),
     random_cases=6,

@@ -27,6 +27,7 @@ QUESTION = Question(
         (np.array([[0, 2], [1, 3]], np.uint8), (6, 4)),
         (np.array([[0, 3, 0], [2, 0, 1]], np.uint8), (4, 5)),
         (np.array([[1, 2, 3, 0]], np.uint8), (2, 3)),
+        (np.array([[0], [3]], np.uint8), (1, 98)),  # 49 * (2 / 98) is less than 1 in floating point
     ),
     random_cases=6,
     rtol=0.0,

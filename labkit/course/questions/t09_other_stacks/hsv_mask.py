@@ -49,6 +49,11 @@ QUESTION = Question(
             np.array([30, 100, 100], np.uint8),
             np.array([30, 100, 100], np.uint8),
         ),
+        (
+            _pixels((10, 250, 90), (10, 50, 90), (10, 150, 90)),  # only the hue goes round
+            np.array([5, 200, 50], np.uint8),
+            np.array([20, 100, 255], np.uint8),
+        ),
     ),
     random_cases=8,
     rtol=0.0,

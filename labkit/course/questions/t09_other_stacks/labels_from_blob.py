@@ -23,6 +23,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[[[1, 0, 0], [9, 9, 0]], [[0, 5, 0], [2, 3, 8]]]], np.float32),),
         (np.zeros((1, 3, 2, 4), np.float32),),
+        (np.array([[[[200.0, -300.0]], [[210.0, -310.0]], [[205.0, -305.0]]]], np.float32),),  # beyond exp
         (np.array([[[[-3.0, -1.0]], [[-2.0, -5.0]], [[-9.0, -1.0]]]], np.float32),),
     ),
     random_cases=6,

@@ -27,6 +27,7 @@ QUESTION = Question(
     rtol=1e-6,
     atol=1e-7,
     points=2,
+    same_dtype=True,
     properties=(
         Property("values lie in 0..1", lambda arguments, blob: bool(np.min(blob) >= 0.0 and np.max(blob) <= 1.0)),
     ),

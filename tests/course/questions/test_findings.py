@@ -1,0 +1,177 @@
+"""Wrong answers that readers of the lessons gave: each is refused, and told what is wrong with it.
+
+ACCEPTED were right by mistake once; NAMED got a count of wrong values and nothing else. `says` is part of the hint.
+"""
+
+import jaxtyping
+import numpy as np
+import pytest
+
+from labkit.course.questions import diagnosis
+from labkit.course.questions.question import find
+from labkit.course.questions.run import judge
+
+
+@pytest.fixture(autouse=True)
+def as_outside_the_suite(shape_checks_off_for_bad_input, monkeypatch):
+    """Without the shape checks, and with time enough on a busy machine."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    monkeypatch.setattr(diagnosis, "LONGEST_S", 30.0)
+
+
+def mask_of_16_bits(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    seen = segmentation >= 0
+    labels[seen] = class_of_body[segmentation[seen] & 0xFFFF]
+    return labels
+
+
+def centres_rounded(y, height, width):
+    H, W = y.shape
+    rows = np.round((np.arange(height) + 0.5) * H / height - 0.5).astype(int).clip(0, H - 1)
+    columns = np.round((np.arange(width) + 0.5) * W / width - 0.5).astype(int).clip(0, W - 1)
+    return y[rows[:, None], columns]
+
+
+def shifted_by_the_mean(z):
+    e = np.exp(z - z.mean(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+def sum_shifted_by_the_mean(z):
+    m = z.mean(axis=-1)
+    return m + np.log(np.exp(z - m[..., None]).sum(axis=-1))
+
+
+def counted_in_bytes(y_true, y_pred, num_classes, ignore):
+    n = np.zeros((num_classes, num_classes), np.uint8)
+    counted = y_true != ignore
+    np.add.at(n, (y_true[counted], y_pred[counted]), 1)
+    return n
+
+
+def between_absolute_values(P, yaw):
+    across = np.abs(P[:, 0] * np.cos(yaw) + P[:, 1] * np.sin(yaw))
+    return across.max() - across.min()
+
+
+def every_channel_wraps(hsv, lower, upper):
+    inside = np.ones(hsv.shape[:2], bool)
+    for c in range(3):
+        above, below = hsv[..., c] >= lower[c], hsv[..., c] <= upper[c]
+        inside &= (above & below) if lower[c] <= upper[c] else (above | below)
+    return inside
+
+
+def by_bare_exp(scores):
+    p = np.exp(scores)
+    return (p / p.sum(axis=1, keepdims=True))[0].argmax(axis=0)
+
+
+def by_a_float_factor(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = (np.arange(H) * (h / H)).astype(int), (np.arange(W) * (w / W)).astype(int)
+    return labels[rows[:, None], columns]
+
+
+def with_a_finite_penalty(features, mean, covariance, allowed):
+    off = features - mean
+    squared = (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+    return (squared + 1e3 * ~allowed).argmin() + 1 if allowed.any() else 0
+
+
+def blob_of_doubles(bgr):
+    return bgr[:, :, ::-1].transpose(2, 0, 1)[None] / 255.0
+
+
+def stamps_of_32_bits(a, b, slop):
+    a, b = a.astype(np.int32), b.astype(np.int32)
+    found = np.full(len(a), -1)
+    for i, stamp in enumerate(a):
+        apart = np.abs(b - stamp)
+        if len(b) and apart.min() <= slop:
+            found[i] = apart.argmin()
+    return found
+
+
+ACCEPTED = {
+    "01_labels.labels_from_segmentation": mask_of_16_bits,
+    "01_labels.resize_labels": centres_rounded,
+    "03_gradient.softmax": shifted_by_the_mean,
+    "03_gradient.log_sum_exp": sum_shifted_by_the_mean,
+    "04_iou.confusion_matrix": counted_in_bytes,
+    "07_grasp.width_across": between_absolute_values,
+    "09_other_stacks.labels_from_blob": by_bare_exp,
+    "09_other_stacks.enlarge": by_a_float_factor,
+    "09_other_stacks.choose_region": with_a_finite_penalty,
+    "09_other_stacks.make_blob": blob_of_doubles,
+    "08_node.pair_stamps": stamps_of_32_bits,
+    "09_other_stacks.hsv_mask": every_channel_wraps,
+}
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_what_was_accepted_by_mistake_is_refused(name):
+    for seed in (0, 1, 2):
+        assert not judge(find(name), ACCEPTED[name], seed).passed
+
+
+def centre_at_half(fov_y, width, height):
+    f = height / (2.0 * np.tan(fov_y / 2.0))
+    return np.array([[f, 0.0, width / 2.0], [0.0, f, height / 2.0], [0.0, 0.0, 1.0]])
+
+
+def grad_of_the_other_sign(z, y):
+    return -find("03_gradient.cross_entropy_grad").reference(z, y)
+
+
+def costs_of_base_2(p, floor):
+    return -np.log2(np.maximum(p, floor))
+
+
+def bitten_off(y_true, y_pred, num_classes, ignore):
+    return find("04_iou.confusion_matrix").reference(y_true[:-1], y_pred[:-1], num_classes, ignore)
+
+
+def centroid_v_u(pieces):
+    area, centroid, box = find("09_other_stacks.measure_pieces").reference(pieces)
+    return area, centroid[:, ::-1], box
+
+
+def half_a_height(z, y, h):
+    return find("03_gradient.numerical_grad").reference(z, y, h) * h * h
+
+
+def in_millimetres(P, yaw):
+    return 1000.0 * find("07_grasp.width_across").reference(P, yaw)
+
+
+def ignores_h(z, y, h):
+    return find("03_gradient.numerical_grad").reference(z, y, 0.01)
+
+
+def of_a_sample(P):
+    return P.mean(axis=0), np.cov(P.T)
+
+
+def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
+    n = np.zeros((num_classes, num_classes), int)
+    np.add.at(n, (y_true, y_pred), 1)
+    return n
+
+
+NAMED = [
+    ("06_back_projection.intrinsics", centre_at_half, "entry at [1, 2]. Yours are too large by 1"),
+    ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "gradient"),
+    ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),
+    ("04_iou.confusion_matrix", bitten_off, "y_true and y_pred were without their last row"),
+    ("09_other_stacks.measure_pieces", centroid_v_u, "Output 2 of 3"),
+    ("07_grasp.width_across", in_millimetres, "1000"),
+    ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
+]
+
+
+@pytest.mark.parametrize("name, answer, says", NAMED)
+def test_what_was_only_counted_is_named(name, answer, says):
+    assert says in judge(find(name), answer, seed=0).hint
