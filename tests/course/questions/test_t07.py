@@ -5,7 +5,6 @@ import numpy as np
 from labkit import geometry, grasp
 from labkit.course.questions.question import of_topic
 from labkit.course.questions.t07_grasp import cloud
-from labkit.grasp.measure_kernels import turn
 from labkit.grasp.planner import HAND_MARGIN, TIP_CLEARANCE
 
 QUESTIONS = of_topic("07_grasp")
@@ -42,10 +41,10 @@ def test_yaw_height_and_pose_together_are_the_kits_grasp_by_the_principal_axis()
                 np.testing.assert_allclose(a, b, atol=1e-9)
 
 
-def test_the_width_equals_that_of_the_planners_kernel():
+def test_the_width_is_the_extent_in_x_of_the_cloud_turned_back_by_the_yaw():
     for number, P in enumerate(clouds()):
-        yaw, turned = 0.15 * number, np.empty_like(P)
-        turn(P, 0.5, 0.1, yaw, 0.0, turned)
+        yaw = 0.15 * number
+        turned = Rotation.from_euler("z", -yaw).apply(P)
         assert np.isclose(reference("width_across")(P, yaw), np.ptp(turned[:, 0]))
 
 
