@@ -1,6 +1,7 @@
 """The references of lab 07 equal the kit's functions, and what its questions accept is really a right answer."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from labkit import geometry, grasp
 from labkit.course.questions.question import of_topic
