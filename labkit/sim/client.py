@@ -42,6 +42,8 @@ class Client:
         function = getattr(pybullet, name)
         if not inspect.isbuiltin(function):
             return function
+        if self.number < 0:
+            raise ValueError(f"{name}: expected an open simulation, got one that close() has ended")
         bound = functools.partial(function, physicsClientId=self.number)
         setattr(self, name, bound)
         return bound
@@ -50,4 +52,5 @@ class Client:
         """End the simulation; harmless when already closed."""
         if self.number >= 0 and pybullet.isConnected(self.number):
             pybullet.disconnect(self.number)
+        self.__dict__.clear()  # methods bound to this simulation would act on the next one of the same number
         self.number = -1

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from scipy.spatial import ConvexHull, cKDTree
 
 from labkit.sim.kinematics import HAND_TO_FINGERS, link_frames
-from labkit.sim.shapes import data_path, read_obj
+from labkit.sim.shapes import data_path, read_mesh
 from labkit.support.validation import check_finite, check_shape
 
 ARM = (*(f"link{i}" for i in range(8)), "hand")
@@ -66,7 +66,7 @@ def hulls() -> dict[str, Hull]:
 
 
 def _corners(mesh: str) -> Float[np.ndarray, "V 3"]:
-    return read_obj(data_path() / f"franka_panda/meshes/collision/{mesh}.obj")[0]
+    return np.asarray(read_mesh(data_path() / f"franka_panda/meshes/collision/{mesh}.obj").vertices)
 
 
 def _hull(points: Float[np.ndarray, "V 3"]) -> Hull:

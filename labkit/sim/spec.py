@@ -1,18 +1,22 @@
-"""A scene as plain data: what stands where, how it looks, and the camera that sees it.
+"""A scene as plain data: what stands where, how it looks, and the camera that sees it (topic 07).
 
 Nothing here knows PyBullet. A SceneSpec can be written by hand, drawn by `data_gen.sample_scene`, kept as JSON, and
-loaded into a `World`, which drops the objects from their `position` and lets them come to rest.
+loaded into a `World`, which drops the objects from their `position` and lets them come to rest. What does not make
+sense is refused at once, by a ValueError that names it. Metres, radians, base frame.
 """
 
 import dataclasses
 import json
 import typing
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import UnionType
 
 import numpy as np
+from jaxtyping import Float
 
 from labkit.labels import CLASSES, OBSTACLE, TARGET
+from labkit.support.validation import check_finite, check_shape, check_T
 
 Vector = tuple[float, ...]
 
@@ -32,8 +36,9 @@ class Texture:
 class Part:
     """One convex piece of an object, in the object's frame.
 
-    kind "box": size = three edge lengths; "cylinder": radius, height (its axis is z); "sphere": radius; metres.
-    position in metres, orientation as a quaternion x, y, z, w.
+    kind "box": size = three edge lengths; "cylinder": radius, height (its axis is z); "sphere": radius; "hull": the
+    coordinates x, y, z of at least four points in a row, whose convex hull is the part. orientation: quaternion
+    x, y, z, w.
     """
 
     kind: str
@@ -47,7 +52,7 @@ class ObjectSpec:
     """One thing on the table: either a URDF of pybullet_data or a few convex parts.
 
     name is unique in its scene; family says what it is; class_id is labels.TARGET or labels.OBSTACLE. scale multiplies
-    the URDF's size. mass in kg. position and orientation (quaternion x, y, z, w) place the object's frame in the base
+    the size. mass in kg. position and orientation (unit quaternion x, y, z, w) place the object's frame in the base
     frame before it settles.
     """
 
@@ -70,8 +75,13 @@ class ObjectSpec:
             )
         if self.class_id not in (TARGET, OBSTACLE):
             raise ValueError(f"class_id: expected {TARGET} (target) or {OBSTACLE} (obstacle), got {self.class_id!r}")
-        if not self.mass > 0.0:
-            raise ValueError(f"mass: expected kilograms above 0, got {self.mass}")
+        check_finite("position", check_shape("position", self.position, (3,)))
+        length = np.linalg.norm(check_finite("orientation", check_shape("orientation", self.orientation, (4,))))
+        if abs(length - 1.0) > 0.01:
+            raise ValueError(f"orientation: expected a unit quaternion x, y, z, w, got one of length {length:.3g}")
+        for name in ("mass", "scale"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ValueError(f"{name}: expected a number above 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -86,12 +96,22 @@ class Table:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera: its pose in the base frame (4x4, row by row), its vertical field of view in radians."""
+    """A pinhole camera: its pose in the base frame, (4, 4), kept row by row, and its vertical field of view."""
 
-    T_base_cam: tuple[Vector, ...]
+    T_base_cam: Sequence[Sequence[float]] | Float[np.ndarray, "4 4"]
     fov_y: float = 0.8
     near: float = 0.1
     far: float = 6.0
+
+    def __post_init__(self):
+        T = check_T("T_base_cam", self.T_base_cam)
+        object.__setattr__(self, "T_base_cam", tuple(map(tuple, T.tolist())))
+        if not 0.0 < self.fov_y < np.pi:
+            raise ValueError(
+                f"fov_y: expected radians between 0 and pi, got {self.fov_y}; np.radians makes them of degrees"
+            )
+        if not 0.0 < self.near < self.far < np.inf:
+            raise ValueError(f"near, far: expected 0 < near < far in metres, got {self.near} and {self.far}")
 
     @classmethod
     def looking_at(
@@ -110,7 +130,7 @@ class Camera:
         T[:3, 1] = -np.sin(roll) * x + np.cos(roll) * y
         T[:3, 2] = z
         T[:3, 3] = np.asarray(target) + distance * outward
-        return cls(T_base_cam=tuple(map(tuple, T.tolist())), **rest)
+        return cls(T, **rest)
 
 
 @dataclass(frozen=True)
@@ -143,6 +163,13 @@ class SceneSpec:
         names = [thing.name for thing in self.objects]
         if len(set(names)) < len(names):
             raise ValueError(f"objects: expected unique names, got {names}")
+        for thing in self.objects:
+            off = np.abs(np.subtract(thing.position[:2], self.table.centre)) > np.array(self.table.size[:2]) / 2
+            if off.any():
+                raise ValueError(
+                    f"objects: expected {thing.name!r} over the table, {self.table.size[:2]} m around "
+                    f"{self.table.centre}, got position {thing.position}"
+                )
 
     def class_counts(self) -> dict[str, int]:
         """How many objects there are of each class name."""

@@ -1,4 +1,7 @@
-"""A scene in PyBullet: load a SceneSpec, let it settle, step it, render it, and ask where things really are."""
+"""A scene in PyBullet: load a SceneSpec, let it settle, step it, render it, and ask where things really are (topic 07).
+
+The base frame is the world frame; metres, seconds.
+"""
 
 from collections.abc import Callable
 
@@ -11,7 +14,7 @@ from labkit.frame import RGBDFrame
 from labkit.labels import BACKGROUND, SURFACE
 from labkit.sim.client import Client, pybullet
 from labkit.sim.kinematics import HOME, PANDA_URDF
-from labkit.sim.shapes import data_path, file_for, object_mesh, part_mesh, parts_file
+from labkit.sim.shapes import as_file, data_path, object_mesh, part_mesh, parts_as_obj, urdf_path
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
 from labkit.sim.textures import paint
 from labkit.support.validation import check_T
@@ -19,6 +22,7 @@ from labkit.support.validation import check_T
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7
 ROOM = 6.0  # edge of the square room, metres
+MAX_DROP = 0.3  # metres from which an object may fall before it settles
 
 
 class World:
@@ -26,7 +30,8 @@ class World:
 
     Objects drop from where the spec puts them and come to rest before the constructor returns. `client` is PyBullet's
     own interface, `bodies` the body number by object name, `robot` the arm's (None without one). `observers` are called
-    after every step. The base frame is the world frame; metres, seconds. Sections 4 and 5 of the text.
+    after every step. Raises ValueError for an object that starts inside the table or with nothing close below it, for a
+    URDF that is not there, and for any use after close().
 
     >>> spec = SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.3, 0.8), robot=False)
     >>> with World(spec) as world:
@@ -44,6 +49,7 @@ class World:
                 fixedTimeStep=TIME_STEP, numSolverIterations=100, deterministicOverlappingPairs=1
             )
             self._build_room()
+            self._check_starts()
             self.robot = self._load_robot() if spec.robot else None
             self.bodies = {thing.name: self._load_object(thing) for thing in spec.objects}
             self._settle(settle_seconds)
@@ -82,8 +88,7 @@ class World:
         """The middle of an object's bounding box in its own frame, as a point of the base frame now."""
         thing = next((thing for thing in self.spec.objects if thing.name == name), None)
         T_base_object = self.pose(name)
-        vertices = object_mesh(thing).vertices
-        return T_base_object[:3, :3] @ ((vertices.min(axis=0) + vertices.max(axis=0)) / 2.0) + T_base_object[:3, 3]
+        return T_base_object[:3, :3] @ object_mesh(thing).bounds.mean(axis=0) + T_base_object[:3, 3]
 
     def poses(self) -> dict[str, np.ndarray]:
         """The true poses of all objects now, by name."""
@@ -126,6 +131,7 @@ class World:
             T_base_cam=np.array(camera.T_base_cam),
             labels=labels,
             instances=instances,
+            table_z=self.spec.table.z,
         )
 
     def silhouette(self, name: str, size: tuple[int, int] = (320, 240)) -> Bool[np.ndarray, "H W"]:
@@ -174,8 +180,8 @@ class World:
             centre,
         )
         picture = cv2.imencode(".png", cv2.cvtColor(paint(texture), cv2.COLOR_RGB2BGR))[1].tobytes()
-        number = self.client.loadTexture(file_for(picture, ".png"))
-        self.client.changeVisualShape(body, -1, textureUniqueId=number)
+        with as_file(picture, ".png") as path:
+            self.client.changeVisualShape(body, -1, textureUniqueId=self.client.loadTexture(path))
         self.client.changeDynamics(body, -1, lateralFriction=1.0, rollingFriction=0.001, spinningFriction=0.001)
         return body
 
@@ -188,9 +194,28 @@ class World:
             self.client.setJointMotorControl2(robot, joint, pybullet.POSITION_CONTROL, angle, force=force)
         return robot
 
+    def _check_starts(self) -> None:
+        """Raise unless every object starts on or a little above the table or another object."""
+        bounds = {thing.name: _bounds(thing) for thing in self.spec.objects}
+        for thing in self.spec.objects:
+            low, high = bounds.pop(thing.name)
+            below = [self.spec.table.z] + [
+                top[2]
+                for bottom, top in bounds.values()
+                if (bottom[:2] < high[:2]).all() and (low[:2] < top[:2]).all() and top[2] <= low[2]
+            ]
+            bounds[thing.name] = low, high
+            drop = low[2] - max(below)
+            if not -0.001 <= drop <= MAX_DROP:
+                where = f"{-drop:.3g} m deep in the table" if drop < 0.0 else f"{drop:.3g} m above what is below it"
+                raise ValueError(
+                    f"objects: expected {thing.name!r} to start on the table or at most {MAX_DROP} m above something, "
+                    f"got position {thing.position}: its lowest point is {where}"
+                )
+
     def _load_object(self, thing: ObjectSpec) -> int:
         if thing.urdf is not None:
-            body = self.client.loadURDF(str(data_path() / thing.urdf), globalScaling=thing.scale)
+            body = self.client.loadURDF(str(urdf_path(thing.urdf)), globalScaling=thing.scale)
             self._place(body, thing)
         else:
             body = self._load_parts(thing)
@@ -213,19 +238,19 @@ class World:
         self.client.resetBasePositionAndOrientation(body, T_base_mass[:3, 3], quaternion)
 
     def _load_parts(self, thing: ObjectSpec) -> int:
-        path = parts_file(thing.parts, thing.scale)
         solids = [_volume_and_centroid(part_mesh(part)) for part in thing.parts]
         total = sum(volume for volume, _ in solids)
         mass_centre = thing.scale * sum(volume * centroid for volume, centroid in solids) / total
         # createMultiBody takes the pose of the object's frame, and the centre of mass in that frame.
-        return self.client.createMultiBody(
-            thing.mass,
-            self.client.createCollisionShape(pybullet.GEOM_MESH, fileName=path),
-            self.client.createVisualShape(pybullet.GEOM_MESH, fileName=path),
-            thing.position,
-            thing.orientation,
-            baseInertialFramePosition=mass_centre,
-        )
+        with as_file(parts_as_obj(thing.parts, thing.scale), ".obj") as path:
+            return self.client.createMultiBody(
+                thing.mass,
+                self.client.createCollisionShape(pybullet.GEOM_MESH, fileName=path),
+                self.client.createVisualShape(pybullet.GEOM_MESH, fileName=path),
+                thing.position,
+                thing.orientation,
+                baseInertialFramePosition=mass_centre,
+            )
 
     def _settle(self, seconds: float) -> None:
         """Step until everything rests, at most `seconds`; nobody observes this."""
@@ -275,8 +300,17 @@ def _pose_matrix(position, quaternion) -> Float[np.ndarray, "4 4"]:
     return T
 
 
+def _bounds(thing: ObjectSpec) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """The lowest and the highest x, y, z of an object where it starts."""
+    vertices = Rotation.from_quat(thing.orientation).apply(object_mesh(thing).vertices)
+    return vertices.min(axis=0) + thing.position, vertices.max(axis=0) + thing.position
+
+
 def _volume_and_centroid(mesh) -> tuple[float, Float[np.ndarray, "3"]]:
-    """Volume and centroid of a closed mesh: the sum over tetrahedra from the origin to each triangle."""
-    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    """Volume and centroid of a closed mesh: the sum over tetrahedra from the origin to each triangle.
+
+    trimesh's own differ in the last bit, which is enough for a scene to settle to other bytes.
+    """
+    a, b, c = np.asarray(mesh.vertices)[mesh.faces].transpose(1, 0, 2)
     volumes = np.einsum("fi,fi->f", a, np.cross(b, c)) / 6.0
     return volumes.sum(), (volumes[:, None] * (a + b + c) / 4.0).sum(axis=0) / volumes.sum()

@@ -53,7 +53,9 @@ def test_a_rendered_plane_is_a_plane(size, seed):
     "shown",
     [
         thing(),
-        thing(parts=(Part("cylinder", (0.02, 0.06)), Part("sphere", (0.025,), (0.0, 0.0, 0.03)))),
+        thing(
+            parts=(Part("cylinder", (0.02, 0.06)), Part("sphere", (0.025,), (0.0, 0.0, 0.03))), position=(0.5, 0.0, 0.032)
+        ),
         thing(parts=(), urdf="objects/mug.urdf", scale=0.7, position=(0.5, 0.0, 0.001)),
         thing(parts=(), urdf="duck_vhacd.urdf", scale=0.8, orientation=(0.707, 0.0, 0.0, 0.707)),
         thing(parts=(), urdf="random_urdfs/007/007.urdf", scale=0.9, position=(0.5, 0.0, 0.05)),
