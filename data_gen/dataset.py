@@ -1,7 +1,8 @@
 """Datasets on disk in the BOP benchmark's layout, written so that a killed run goes on where it was.
 
     OUT/rgb/000000.png  depth/000000.png (16 bit)  labels/000000.png  instances/000000.png
-    OUT/scene_camera.json   cam_K, cam_R_w2c, cam_t_w2c (millimetres), depth_scale (millimetres for one unit of depth)
+    OUT/scene_camera.json   cam_K, cam_R_w2c, cam_t_w2c (millimetres), depth_scale (millimetres for one unit of depth),
+                            table_z (the kit's own: height of the table in the world frame, millimetres)
     OUT/scene_gt.json       for each object cam_R_m2c, cam_t_m2c (millimetres), obj_id, and its name, family and class
     OUT/dataset.json        generator version, config, seeds, size, classes, families, and the SHA-256 of every image
 
@@ -159,6 +160,7 @@ def _bop_camera(frame: RGBDFrame) -> dict:
         "depth_scale": DEPTH_UNIT_MM,
         "cam_R_w2c": T_cam_base[:3, :3].ravel().tolist(),
         "cam_t_w2c": (1000.0 * T_cam_base[:3, 3]).tolist(),
+        "table_z": 1000.0 * frame.table_z,
     }
 
 
@@ -253,6 +255,7 @@ class Dataset(Sequence):
             K=np.reshape(camera["cam_K"], (3, 3)),
             T_base_cam=np.linalg.inv(T_cam_base),
             depth_scale=camera["depth_scale"] / 1000.0,
+            table_z=camera["table_z"] / 1000.0 if "table_z" in camera else None,  # older datasets do not say
         )
 
     def objects(self, index: int) -> list[dict]:

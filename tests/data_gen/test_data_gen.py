@@ -4,6 +4,7 @@ import errno
 import hashlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from data_gen.statistics import statistics
 from data_gen.torch_dataset import TorchFrames
 from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
+from labkit.pipeline import Pipeline
 from labkit.sim.shapes import object_mesh
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
@@ -145,6 +147,21 @@ def test_scene_camera_is_in_bops_convention(undisturbed):
     centre = np.array(spec.camera.T_base_cam)[:3, 3]
     R, t = np.reshape(camera["cam_R_w2c"], (3, 3)), np.array(camera["cam_t_w2c"])
     assert np.allclose(R @ (1000.0 * centre) + t, 0.0, atol=1e-6), "the camera's centre is its frame's origin"
+
+
+def test_frames_carry_the_height_of_their_table_so_that_a_pipeline_needs_no_other(undisturbed, tmp_path):
+    found = 0
+    for frame, seed in zip(data_gen.load(undisturbed), range(6), strict=True):
+        table = data_gen.sample_scene(seed, "test").table
+        assert frame.table_z == pytest.approx(table.z, abs=1e-12) and abs(table.z) > 1e-3
+        found += bool(Pipeline().locate(frame, frame.labels).plan.grasps)
+    assert found >= 4
+    shutil.copytree(undisturbed, tmp_path / "older")
+    cameras = json.loads((undisturbed / "scene_camera.json").read_text())
+    older = {index: {key: camera[key] for key in camera if key != "table_z"} for index, camera in cameras.items()}
+    (tmp_path / "older" / "scene_camera.json").write_text(json.dumps(older))
+    frame = data_gen.load(tmp_path / "older")[1]
+    assert frame.table_z is None and np.allclose(frame.T_base_cam, data_gen.load(undisturbed)[1].T_base_cam)
 
 
 def test_an_index_beyond_the_end_is_an_index_error(undisturbed):

@@ -1,6 +1,7 @@
 """The world against geometry that it does not know: planes, meshes, and other worlds."""
 
 import dataclasses
+import os
 import subprocess
 import sys
 
@@ -54,7 +55,8 @@ def test_a_rendered_plane_is_a_plane(size, seed):
     [
         thing(),
         thing(
-            parts=(Part("cylinder", (0.02, 0.06)), Part("sphere", (0.025,), (0.0, 0.0, 0.03))), position=(0.5, 0.0, 0.032)
+            parts=(Part("cylinder", (0.02, 0.06)), Part("sphere", (0.025,), (0.0, 0.0, 0.03))),
+            position=(0.5, 0.0, 0.032),
         ),
         thing(parts=(), urdf="objects/mug.urdf", scale=0.7, position=(0.5, 0.0, 0.001)),
         thing(parts=(), urdf="duck_vhacd.urdf", scale=0.8, orientation=(0.707, 0.0, 0.0, 0.707)),
@@ -176,6 +178,19 @@ def test_importing_labkit_needs_no_pybullet():
     ("call", "says"),
     [
         (lambda: thing(mass=0.0), "mass"),
+        (lambda: thing(scale=np.nan), "scale"),
+        (lambda: thing(position=(0.5, np.nan, 0.022)), "position"),
+        (lambda: thing(position=(0.5, 0.022)), "position"),
+        (lambda: thing(orientation=(0.0, 0.0, 1.57)), "orientation"),
+        (lambda: thing(orientation=(0.0, 0.0, 0.0, 0.0)), "orientation"),
+        (lambda: scene(thing(position=(500.0, 0.0, 22.0))), "'block' over the table"),
+        (lambda: scene(thing(position=(0.5, 0.9, 0.022))), "'block' over the table"),
+        (lambda: World(scene(thing(position=(0.5, 0.0, 0.0)))), "'block' .* deep in the table"),
+        (lambda: World(scene(thing(position=(0.5, 0.0, 0.5)))), "'block' .* above what is below it"),
+        (lambda: World(scene(thing(parts=(), urdf="duck.urdf"))), "urdf: expected a file .*'duck.urdf'"),
+        (lambda: Camera.looking_at((0.5, 0, 0), 0.9, 0.4, 0.8, fov_y=60), "fov_y: .*radians"),
+        (lambda: Camera.looking_at((500.0, 0, 0), 900.0, 0.4, 0.8), "T_base_cam: .*millimetres"),
+        (lambda: Camera.looking_at((0.5, 0, 0), 0.9, 0.4, 0.8, near=7.0), "near"),
         (lambda: thing(class_id=1), "class_id"),
         (lambda: thing(parts=()), "urdf"),
         (lambda: thing(urdf="duck_vhacd.urdf"), "parts"),
@@ -200,6 +215,32 @@ def test_wrong_requests_to_a_world_are_named():
         with pytest.raises(ValueError, match=r"^name:"):
             world.pose("nobody")
     world.close()
+    with World(scene(thing())) as next_world:  # PyBullet gives it the number of the closed one
+        for call in (world.render, world.step, lambda: world.pose("block")):
+            with pytest.raises(ValueError, match="expected an open simulation"):
+                call()
+        assert next_world.pose("block").shape == (4, 4)
+
+
+def test_things_may_stand_on_things():
+    low = thing("low", position=(0.5, 0.0, 0.0201))
+    with World(scene(low, thing("high", position=(0.51, 0.0, 0.062)))) as world:
+        assert world.pose("high")[2, 3] == pytest.approx(0.06, abs=0.004)
+
+
+def test_what_pybullet_reads_from_files_is_private_and_gone_when_read(tmp_path):
+    code = (
+        "import os, stat, sys, tempfile; from data_gen import sample_scene; from labkit.sim.world import World\n"
+        "World(sample_scene(2, 'hard')).close()\n"
+        "(folder,) = os.listdir(tempfile.gettempdir())\n"
+        "path = os.path.join(tempfile.gettempdir(), folder)\n"
+        "print(oct(stat.S_IMODE(os.stat(path).st_mode)), os.listdir(path))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "TMPDIR": str(tmp_path)}, capture_output=True, text=True
+    )
+    assert done.stdout == "0o700 []\n", done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_importing_the_simulator_says_nothing():
