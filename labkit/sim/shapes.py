@@ -20,6 +20,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from labkit.sim.spec import ObjectSpec, Part
+from labkit.support.files import write_atomically
 
 ROUND = 32  # facets around a cylinder
 LENGTHS = {"box": 3, "cylinder": 2, "sphere": 1}
@@ -155,7 +156,7 @@ def as_file(content: bytes, suffix: str) -> Iterator[str]:
     """
     path = Path(_private_folder().name) / (hashlib.sha256(content).hexdigest()[:24] + suffix)
     with _one_at_a_time:
-        path.write_bytes(content)
+        write_atomically(path, content)
         try:
             yield str(path)
         finally:
