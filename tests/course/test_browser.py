@@ -4,7 +4,6 @@ It needs the Debian package `chromium`, and skips without it. `pytest tests/cour
 leaves its screenshots in DIR.
 """
 
-import json
 import os
 import shutil
 import socket
@@ -28,29 +27,26 @@ pytestmark = [
     pytest.mark.timeout(600),
 ]
 
-SETTINGS = {
-    "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
-    "@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"},
-}
-# No dialog that recommends a build, which an extension of another package may ask for.
-SERVER = {"ServerApp": {"tornado_settings": {"page_config_data": {"buildCheck": False, "buildAvailable": False}}}}
+CHANGED = "#jp-main-dock-panel .lm-TabBar-tab.jp-mod-dirty"
 
 
 @pytest.fixture(scope="module")
 def jupyterlab(tmp_path_factory):
-    """JupyterLab on a copy of the course, with settings of its own; gives the URL of the server."""
+    """JupyterLab as `make lab` starts it, on a copy of the course and at nobody's home; gives the URL of the server."""
     folder = tmp_path_factory.mktemp("course")
     for name in ("lessons", "labs"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns(".*"))
     home = tmp_path_factory.mktemp("jupyter")
-    (home / "config/labconfig").mkdir(parents=True)
-    (home / "config/labconfig/default_setting_overrides.json").write_text(json.dumps(SETTINGS))
-    (home / "config/jupyter_server_config.json").write_text(json.dumps(SERVER))
+    (home / "settings/@jupyterlab/notebook-extension").mkdir(parents=True)  # all cells are there, also unseen ones
+    (home / "settings/@jupyterlab/notebook-extension/tracker.jupyterlab-settings").write_text(
+        '{"windowingMode": "none"}'
+    )
     places = {"CONFIG": "config", "DATA": "data", "RUNTIME": "runtime"}
     environment = {key: value for key, value in os.environ.items() if key != "LABKIT_STRICT"}
     environment |= {f"JUPYTER_{name}_DIR": str(home / place) for name, place in places.items()}
     environment |= {"IPYTHONDIR": str(home / "ipython"), "JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces")}
     environment["JUPYTERLAB_SETTINGS_DIR"] = str(home / "settings")
+    environment |= dict.fromkeys(("JUPYTER_PATH", "JUPYTER_CONFIG_PATH"), str(ROOT / "labkit/course/jupyter"))
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -136,6 +132,17 @@ def wait_until_idle(page) -> None:
         "() => ![...document.querySelectorAll('.jp-InputPrompt')].some(prompt => prompt.textContent.includes('*'))"
         " && document.querySelector('.jp-Notebook-ExecutionIndicator').dataset.status === 'idle'"
     )
+
+
+@pytest.mark.parametrize("path, cell", [("lessons/04_iou.ipynb", "import"), ("labs/04_iou/04_iou.ipynb", "def iou(")])
+def test_a_notebook_opens_unchanged_and_asks_nothing(jupyterlab, page, path, cell):
+    open_notebook(page, jupyterlab, path)
+    page.wait_for_timeout(3000)
+    assert page.locator(CHANGED).count() == 0
+    assert page.locator(".jp-Dialog, .Toastify__toast").count() == 0
+    cell_with(page, cell).locator(".cm-content").click()
+    page.keyboard.insert_text("# mine")
+    page.locator(CHANGED).wait_for()
 
 
 def test_a_blank_filled_in_lab_04_gets_its_tick(jupyterlab, page, tmp_path):
