@@ -235,10 +235,14 @@ class TorchEngine(Engine):
         super().__init__(takes or getattr(model, "takes", NetworkInput()), getattr(model, "num_classes", None))
         self.model = model
 
+    def weight(self) -> torch.Tensor:
+        """One of the network's weights: where it runs, and in which precision. A zero on the CPU if it has none."""
+        held = chain(self.model.parameters(), self.model.buffers())
+        return next((tensor for tensor in held if tensor.is_floating_point()), torch.zeros(()))
+
     def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
         """Run the network where its weights are, in their precision; gives logits in float32."""
-        held = chain(self.model.parameters(), self.model.buffers())
-        weight = next((tensor for tensor in held if tensor.is_floating_point()), torch.zeros(()))
+        weight = self.weight()
         with torch.inference_mode(), evaluating(self.model):
             x = [torch.from_numpy(array).to(weight.device, weight.dtype) for array in arrays]
             z = self.model(*(each.contiguous(memory_format=torch.channels_last) for each in x))

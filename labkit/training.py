@@ -22,7 +22,7 @@ from torch.nn import functional as F
 from tqdm.auto import tqdm
 
 from labkit.frame import RGBDFrame
-from labkit.labels import CLASSES, IGNORE, TARGET
+from labkit.labels import CLASSES, IGNORE
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
@@ -111,10 +111,9 @@ class ImagesInMemory:
             if i == 0:
                 self.rgb = torch.empty((len(dataset), *rgb.shape), dtype=torch.uint8)
                 self.y = torch.empty((len(dataset), *y.shape), dtype=torch.uint8)
-            if rgb.shape != self.rgb.shape[1:] or y.shape != self.y.shape[1:]:
+            if y.shape != self.y.shape[1:]:
                 raise ValueError(
-                    f"{name}: expected images of one size, {tuple(self.y.shape[1:])}, "
-                    f"got rgb {rgb.shape} and labels {y.shape} at {i}"
+                    f"{name}: expected images of one size, {tuple(self.y.shape[1:])}, got {y.shape} at {i}"
                 )
             self.rgb[i] = torch.from_numpy(rgb)
             self.y[i] = torch.from_numpy(check_labels(f"{name}[{i}]", y, num_classes).astype(np.uint8))
@@ -132,7 +131,10 @@ def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
     rgb, y = (item.rgb, item.labels) if isinstance(item, RGBDFrame) else item
     if y is None:
         raise ValueError(f"{name}: expected a frame with labels, got one without")
-    return np.ascontiguousarray(check_rgb(name, np.asarray(rgb))), np.asarray(y)
+    rgb, y = np.ascontiguousarray(check_rgb(name, np.asarray(rgb))), np.asarray(y)
+    if y.shape != rgb.shape[:2]:
+        raise ValueError(f"{name}: expected labels of the size of the image, {rgb.shape[:2]}, got {y.shape}")
+    return rgb, y
 
 
 def choose_device(device: str = "auto") -> torch.device:
@@ -221,7 +223,7 @@ class Trainer:
         mean, std = (torch.tensor(value).float().reshape(-1, 1, 1) for value in (self.takes.mean, self.takes.std))
         x = x * (255.0 / std) - mean / std
         edges = (0, -y.shape[2] % self.takes.divisor, 0, -y.shape[1] % self.takes.divisor)
-        return F.pad(x, edges, mode="replicate"), F.pad(y, edges, value=IGNORE)
+        return (F.pad(x, edges, mode="replicate"), F.pad(y, edges, value=IGNORE)) if any(edges) else (x, y)
 
     def step(self) -> float:
         """Make one optimiser step and return its loss."""
@@ -270,8 +272,8 @@ class Trainer:
 
 def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int, batch: int = 8) -> np.ndarray:
     """Pool one confusion matrix (C, C) over all images of `data`, whole, with the model in eval mode."""
-    engine, device = TorchEngine(model), next((weight.device for weight in model.parameters()), torch.device("cpu"))
-    n = np.zeros((num_classes, num_classes), np.int64)
+    engine, n = TorchEngine(model), np.zeros((num_classes, num_classes), np.int64)
+    device = engine.weight().device
     with torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
         for first in range(0, len(data), batch):
             z = engine.padded([engine.takes.scaled(data.rgb[first : first + batch].numpy())])
@@ -330,11 +332,15 @@ def finish_run(trainer: Trainer, val_data: ImagesInMemory, out: Path) -> None:
     """Take the class weights back out of a trained network as far as validation likes it, and save it for good."""
     config, model = trainer.config, copy.deepcopy(trainer.model)
     share, n = undo_weights(model, trainer.weights, val_data, config.num_classes, config.batch)
-    scores = {"mean_iou": mean_iou(n), "iou": iou(n).tolist(), "weights_undone": share}
-    trainer.history[-1] |= scores
-    meta = {**trainer.history[-1], "config": asdict(config)}
-    save_model(model, out / f"{config.model}.pt", **meta)
-    write_atomically(out / f"{config.model}.history.json", json.dumps(trainer.history, indent=1).encode())
+    trainer.history[-1] |= {"mean_iou": mean_iou(n), "iou": iou(n).tolist(), "weights_undone": share}
+    save_weights(model, trainer, out)
+
+
+def save_weights(model: nn.Module, trainer: Trainer, out: Path) -> None:
+    """Write a model as the run's weights, with the last row of the history, and the history."""
+    name = trainer.config.model
+    save_model(model, out / f"{name}.pt", **trainer.history[-1], config=asdict(trainer.config))
+    write_atomically(out / f"{name}.history.json", json.dumps(trainer.history, indent=1).encode())
 
 
 def undo_weights(
@@ -378,15 +384,10 @@ def finish_epoch(trainer: Trainer, val_data: ImagesInMemory | None, out: Path) -
         n = evaluate(trainer.model, val_data, config.num_classes, config.batch)
         row |= {"mean_iou": mean_iou(n), "iou": iou(n).tolist()}
     trainer.history.append(row)
-    save_model(trainer.model, out / f"{config.model}.pt", **row, config=asdict(config))
-    write_atomically(out / f"{config.model}.history.json", json.dumps(trainer.history, indent=1).encode())
+    save_weights(trainer.model, trainer, out)
 
 
 def progress_line(loss: float, history: list[dict]) -> str:
     """Say the last loss and validation scores for the progress bar."""
-    scored = [row for row in history if "mean_iou" in row]
-    if not scored:
-        return f"loss {loss:.3f}"
-    row = scored[-1]
-    target = f", target {row['iou'][TARGET]:.3f}" if len(row["iou"]) == len(CLASSES) else ""
-    return f"loss {loss:.3f}, val mIoU {row['mean_iou']:.3f}{target}"
+    scores = [f", val mIoU {row['mean_iou']:.3f}" for row in history if "mean_iou" in row]
+    return f"loss {loss:.3f}{''.join(scores[-1:])}"

@@ -20,6 +20,12 @@ app = typer.Typer(
 )
 
 
+# Options that several commands share.
+Model = Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")]
+Refine = Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")]
+Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
+
+
 @app.callback()
 def options(debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False) -> None:
     """Options before the command's name; `main` looks for --debug itself."""
@@ -75,10 +81,10 @@ def evaluate(
     masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
         "predicted"
     ),
-    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
-    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")] = False,
+    model: Model = "unet",
+    crf: Refine = False,
     json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    workers: Workers = 1,
 ) -> None:
     """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
     from data_gen import sample_scene
@@ -99,7 +105,7 @@ def evaluate(
 @app.command()
 def export(
     onnx: Annotated[Path, typer.Option(help="The file to write.")],
-    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    model: Model = "unet",
 ) -> None:
     """Write a network as one ONNX file, which OpenCV, onnxruntime and other stacks read."""
     from labkit.network import load_model, weights_path
@@ -123,7 +129,7 @@ def compare(
 @app.command()
 def study(
     out: Annotated[Path, typer.Option(help="Where to write the table.")] = Path("out/07_grasp.csv"),
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    workers: Workers = 1,
 ) -> None:
     """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it goes on where it was."""
     from labkit.apps import mask_study
@@ -138,8 +144,8 @@ def demo(
     seed: Annotated[
         int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
     ] = None,
-    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
-    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's mask with the CRF.")] = False,
+    model: Model = "unet",
+    crf: Refine = False,
     out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
 ) -> None:
     """Show the whole chain on one random scene: from the camera's image to the object in the air."""
@@ -174,7 +180,7 @@ def perceive(
     depth_scale: Annotated[
         float | None, typer.Option(help="Metres per unit of the depth file; else the camera file's, or 0.001.")
     ] = None,
-    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    model: Model = "unet",
     mask: Annotated[
         Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
     ] = None,
@@ -207,10 +213,10 @@ def node(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="The bag to write, of either kind.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene of --sim.", min=0)] = 0,
-    model: Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")] = "unet",
+    model: Model = "unet",
     engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch",
     mirror: Annotated[bool, typer.Option(help="Look at the mirror image, too: better, at twice the time.")] = True,
-    crf: Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")] = False,
+    crf: Refine = False,
     target: Annotated[int, typer.Option(help="The class to grasp.")] = 2,
     table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
     camera_pose: Annotated[

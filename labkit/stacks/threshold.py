@@ -7,8 +7,6 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Integer, UInt8
 
-from labkit.frame import read_image
-from labkit.support.files import write_atomically
 from labkit.support.validation import check_rgb, check_same_size, check_shape
 
 HUES = 180  # OpenCV's hue is half an angle, so that it fits into a byte
@@ -59,16 +57,6 @@ def hsv_mask(rgb: UInt8[np.ndarray, "H W 3"], colours: HSVRange) -> Bool[np.ndar
     above = cv2.inRange(hsv, low, (HUES - 1, *high[1:]))
     below = cv2.inRange(hsv, (0, *low[1:]), high)
     return (above | below) > 0
-
-
-def segment_file(image, mask, colours: HSVRange = BROWN) -> Bool[np.ndarray, "H W"]:
-    """Do the listing's work: read an image file, write its mask as an 8-bit PNG of 0 and 255; also returns the mask.
-
-    Raises FileNotFoundError for a missing image, ValueError for a damaged one, OSError if the mask cannot be written.
-    """
-    inside = hsv_mask(read_image("image", image, np.uint8, colour=True), colours)
-    write_atomically(mask, cv2.imencode(".png", np.where(inside, 255, 0).astype(np.uint8))[1].tobytes())
-    return inside
 
 
 def fit_hsv(images: Sequence[UInt8[np.ndarray, "H W 3"]], masks: Sequence[Bool[np.ndarray, "H W"]]) -> HSVRange:

@@ -17,7 +17,7 @@ from labkit.stacks.blocks import Block, Diagram, perception_diagram
 from labkit.stacks.engines import open_engine
 from labkit.stacks.matlab import cloud_of_mask, montage, semanticseg
 from labkit.stacks.small_fcn import SmallFCN, train_small_fcn
-from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, segment_file, things_on_table
+from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, things_on_table
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +47,6 @@ def test_a_range_round_red_is_all_hues_but_those_between():
     seen = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[0, :, 0]
     inside = hsv_mask(rgb, HSVRange((170, 0, 0), (9, 255, 255)))[0]
     assert np.array_equal(inside, (seen >= 170) | (seen <= 9))
-
-
-def test_the_listings_work_on_files(frames, tmp_path):
-    rgb = frames[0].rgb
-    cv2.imwrite(str(tmp_path / "scene.png"), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
-    mask = segment_file(tmp_path / "scene.png", tmp_path / "mask_table.png")
-    written = cv2.imread(str(tmp_path / "mask_table.png"), cv2.IMREAD_UNCHANGED)
-    assert written.dtype == np.uint8 and set(np.unique(written)) <= {0, 255}
-    assert np.array_equal(written > 0, mask) and np.array_equal(mask, hsv_mask(rgb, BROWN))
 
 
 def test_fitting_finds_the_colours_that_made_the_mask(frames):
