@@ -17,13 +17,7 @@ from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
 from labkit.inference import Engine
 from labkit.labels import IGNORE, TARGET
 from labkit.stacks.engines import open_engine
-from labkit.support.validation import (
-    check_finite,
-    check_height,
-    check_labels,
-    check_rgb,
-    check_shape,
-)
+from labkit.support.validation import check_finite, check_height, check_labels, check_rgb, check_shape
 
 # What the Panda can reach and meet, in front of it: x, y from its base, z from the table; metres.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
@@ -141,7 +135,7 @@ class Pipeline:
         """
         labels = _check_labels_of(frame, labels)
         if probabilities is not None:
-            probabilities = check_probabilities(probabilities, labels.shape, self.target_class)
+            probabilities = self._with_target(check_probabilities(probabilities, labels.shape))
         return self._locate(self._on_table(frame), labels, probabilities, {})
 
     def _on_table(self, frame: RGBDFrame) -> RGBDFrame:
@@ -149,15 +143,17 @@ class Pipeline:
         known = frame.table_z if self.table_z is None else self.table_z
         return replace(frame, table_z=known or 0.0)
 
+    def _with_target(self, probabilities: Float[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
+        if self.target_class >= probabilities.shape[-1]:
+            C = probabilities.shape[-1]
+            raise ValueError(f"target_class: expected one of the {C} classes of probabilities, got {self.target_class}")
+        return probabilities
+
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
         if self.model is None:
             raise ValueError("model: expected one to perceive with, got None; `locate` takes labels from elsewhere")
         with _timed(seconds, "network"):
-            probabilities = class_probabilities(self.model, frame, self.mirror)
-        if self.target_class >= probabilities.shape[-1]:
-            raise ValueError(
-                f"target_class: expected one of the model's {probabilities.shape[-1]} classes, got {self.target_class}"
-            )
+            probabilities = self._with_target(class_probabilities(self.model, frame, self.mirror))
         with _timed(seconds, "labels"):
             labels = most_probable(probabilities)
         if self.crf:
@@ -242,10 +238,10 @@ def class_probabilities(
     return check_finite("probabilities", model(picture, mirror))
 
 
-def check_probabilities(p, size: tuple[int, int], target_class: int = 0) -> Float[np.ndarray, "H W C"]:
+def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
     """Return what a model gave as an array (H, W, C) if these are probabilities of its classes at each pixel.
 
-    Raises ValueError for another shape, too few classes, NaN (the weights may hold it), and logits or 0..255 scores.
+    Raises ValueError for another shape, NaN (the weights may hold it), and logits or 0..255 scores.
 
     >>> check_probabilities([[[20, 235]]], (1, 1))
     Traceback (most recent call last):
@@ -253,8 +249,6 @@ def check_probabilities(p, size: tuple[int, int], target_class: int = 0) -> Floa
     ValueError: probabilities: expected numbers in 0..1 that sum to 1 at each pixel, got 20 to 235; are they scores?
     """
     p = check_finite("probabilities", check_shape("probabilities", p, (*size, None)))
-    if p.shape[-1] <= target_class:
-        raise ValueError(f"probabilities: expected more than {target_class} classes, the target's, got {p.shape[-1]}")
     low, high = p.min(), p.max()
     total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
     if low < -1e-3 or high > 1.001 or np.abs(total - 1.0).max() > 0.01:

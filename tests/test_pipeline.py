@@ -227,6 +227,7 @@ class Broken(nn.Module):
         (lambda f: Pipeline(grasp=np.asarray, gripper=Gripper()), "gripper"),
         (lambda f: Pipeline().locate(f, np.zeros((3, 3), int)), "labels"),
         (lambda f: Pipeline().locate(f, np.full(f.labels.shape, 256)), "labels"),
+        (lambda f: Pipeline(target_class=4).locate(f, f.labels, one_hot(f.labels)), "target_class"),
         (lambda f: Pipeline().locate(f, f.labels, one_hot(f.labels)[..., :2]), "probabilities"),
         (lambda f: Pipeline().locate(f, f.labels, one_hot(f.labels) * 255), "probabilities"),
         (lambda f: Pipeline(lambda rgb: rgb[:5]).run(f), "probabilities"),
