@@ -1,19 +1,19 @@
-"""Does the arm touch anything? The arm as convex hulls, the world as what the camera saw: points and a table plane.
+"""What would the arm touch? The arm as convex hulls, the world as what the camera saw: points and a table plane.
 
 A convex hull is a list of half-spaces, so a point p is inside it, grown by a margin, when A p + b <= margin in every
 row. That one test serves the scene's cloud and, with points sampled on the arm's own surface, self-collision.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
+import trimesh
 from jaxtyping import Bool, Float
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import cKDTree
 
 from labkit.sim.kinematics import HAND_TO_FINGERS, link_frames
 from labkit.sim.shapes import data_path, read_mesh
-from labkit.support.validation import check_finite, check_shape
 
 ARM = (*(f"link{i}" for i in range(8)), "hand")
 FINGERS = ("left finger", "right finger")
@@ -56,30 +56,26 @@ class Margin:
     table: float = 0.01
 
 
-@lru_cache(maxsize=1)
+@cache
 def hulls() -> dict[str, Hull]:
     """The convex hulls of the arm's collision meshes, as PyBullet takes them too; the fingers in the hand's frame."""
-    meshes = {name: _corners(name) for name in ARM}
-    finger = _corners("finger") + np.array([0.0, 0.0, HAND_TO_FINGERS])
+    folder = data_path() / "franka_panda/meshes/collision"
+    meshes = {name: read_mesh(folder / f"{name}.obj").vertices for name in ARM}
+    finger = read_mesh(folder / "finger.obj").vertices + np.array([0.0, 0.0, HAND_TO_FINGERS])
     meshes["left finger"], meshes["right finger"] = finger, finger * np.array([-1.0, -1.0, 1.0])
-    return {name: _hull(corners) for name, corners in meshes.items()}
+    return {name: _hull(trimesh.convex.convex_hull(vertices)) for name, vertices in meshes.items()}
 
 
-def _corners(mesh: str) -> Float[np.ndarray, "V 3"]:
-    return np.asarray(read_mesh(data_path() / f"franka_panda/meshes/collision/{mesh}.obj").vertices)
-
-
-def _hull(points: Float[np.ndarray, "V 3"]) -> Hull:
-    hull = ConvexHull(points)
-    triangles = points[hull.simplices]
-    corners = points[hull.vertices]
-    planes = np.unique(hull.equations.round(4), axis=0)
-    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+def _hull(mesh: trimesh.Trimesh) -> Hull:
+    """The half-spaces of a convex mesh, one for each plane, and points on it."""
+    offsets = -np.einsum("fi,fi->f", mesh.face_normals, mesh.triangles[:, 0])
+    planes = np.unique(np.column_stack([mesh.face_normals, offsets]).round(4), axis=0)
+    corners, centre = np.asarray(mesh.vertices), mesh.bounds.mean(axis=0)
     return Hull(
         A=planes[:, :3],
         b=planes[:, 3],
         corners=corners,
-        surface=np.vstack([corners, triangles.mean(axis=1)]),
+        surface=np.vstack([corners, mesh.triangles_center]),
         centre=centre,
         radius=float(np.linalg.norm(corners - centre, axis=1).max()),
     )
@@ -106,13 +102,11 @@ def first_contact(
     """What the arm would touch along a path of joint angles, in words, or None if it stays clear.
 
     points: what is in the way, base frame, metres. table_z: height of the table, a plane. finger: how far each finger
-    is from the middle, metres. Raises ValueError if a shape does not fit. Section 5 of the text.
+    is from the middle, metres. The caller checks them.
 
     >>> first_contact(np.array([[0.0, 1.2, 0.0, -1.5, 0.0, 2.7, 0.8]]), 0.04, np.zeros((0, 3)), 0.0, Margin())
     'link5 would touch the table'
     """
-    path = check_finite("path", check_shape("path", path, (None, 7)))
-    points = check_finite("points", check_shape("points", points, (None, 3)))
     frames = hull_frames(path, finger)
     for name in ABOVE_TABLE:
         height = frames[name][:, 2, :3] @ hulls()[name].corners.T + frames[name][:, 2, 3:]

@@ -1,12 +1,13 @@
 """The Panda's kinematics in NumPy: where the links are for given joints, and which joints put the hand on a grasp.
 
 Frames: the base frame is link 0's and the world's. The grasp frame (the URDF's panda_grasptarget) lies between the
-pads: z is the approach direction, the jaws close along y, x runs across the pads. Nothing here imports PyBullet.
+pads: z is the approach direction, the jaws close along y, x runs across the pads (topic 07). Metres and radians.
+Nothing here imports PyBullet.
 """
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from labkit.support.validation import check_finite, check_shape, check_T
 
@@ -24,17 +25,17 @@ MAX_EFFORT = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])  # N m
 FINGER_MAX = 0.04  # m, how far each finger opens from the middle
 FINGER_MAX_VELOCITY = 0.2  # m/s
 FINGER_MAX_EFFORT = 20.0  # N, each finger
-FINGERTIP_BELOW_GRASP = 0.0072  # m, how far the fingertips reach beyond the grasp frame
-PALM_ABOVE_GRASP = 0.039  # m, what stands higher above the grasp frame between the jaws meets the palm
 
-# One row a joint, in the order of Craig's convention: turn about x by alpha, shift along x by a, turn about z by the
-# joint angle, shift along z by d.
+# One entry per joint, in the order of Craig's convention: turn about x by alpha, shift along x by a, turn about z by
+# the joint angle, shift along z by d.
 ALPHA = np.pi / 2 * np.array([0, -1, 1, 1, -1, 1, 1])
 A = np.array([0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088])
 D = np.array([0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0])
 FLANGE = 0.107  # from joint 7 to the hand, along z; the hand is turned by -45 degrees about it
 HAND_TO_FINGERS = 0.0584
 HAND_TO_GRASP = 0.105
+T_LINK7_HAND = RigidTransform.from_components((0, 0, FLANGE), Rotation.from_euler("z", -np.pi / 4)).as_matrix()
+T_HAND_GRASP = RigidTransform.from_translation((0, 0, HAND_TO_GRASP)).as_matrix()
 
 POSITION_TOLERANCE = 1e-4  # m
 ANGLE_TOLERANCE = 1e-3  # rad
@@ -47,31 +48,19 @@ def link_frames(q: Float[np.ndarray, "*batch 7"]) -> Float[np.ndarray, "*batch 9
     array([0.107, 0.   , 0.547])
     """
     q = np.asarray(q, dtype=np.float64)
-    frames = np.zeros((*q.shape[:-1], 9, 4, 4))
-    frames[..., 0, :, :] = np.eye(4)
-    c, s = np.cos(q), np.sin(q)
-    T_prev_link = np.zeros((*q.shape, 4, 4))
     ca, sa = np.round(np.cos(ALPHA)), np.round(np.sin(ALPHA))  # alpha is a multiple of 90 degrees
-    T_prev_link[..., 0, 0], T_prev_link[..., 0, 1], T_prev_link[..., 0, 3] = c, -s, A
-    T_prev_link[..., 1, 0], T_prev_link[..., 1, 1], T_prev_link[..., 1, 2] = s * ca, c * ca, -sa
-    T_prev_link[..., 2, 0], T_prev_link[..., 2, 1], T_prev_link[..., 2, 2] = s * sa, c * sa, ca
-    T_prev_link[..., 1, 3], T_prev_link[..., 2, 3], T_prev_link[..., 3, 3] = -sa * D, ca * D, 1.0
+    c, s, o = np.cos(q), np.sin(q), np.zeros_like(q)
+    T_prev_link = np.array([[     c,      -s,       o,       o + A],
+                            [s * ca,  c * ca,  o - sa,  o - sa * D],
+                            [s * sa,  c * sa,  o + ca,  o + ca * D],
+                            [     o,       o,       o,       o + 1]])  # fmt: skip
+    T_prev_link = np.moveaxis(T_prev_link, (0, 1), (-2, -1))
+    frames = np.empty((*q.shape[:-1], 9, 4, 4))
+    frames[..., 0, :, :] = np.eye(4)
     for i in range(7):
         frames[..., i + 1, :, :] = frames[..., i, :, :] @ T_prev_link[..., i, :, :]
     frames[..., 8, :, :] = frames[..., 7, :, :] @ T_LINK7_HAND
     return frames
-
-
-def _turn_and_shift(angle: float, distance: float) -> Float[np.ndarray, "4 4"]:
-    """Turn about z, shift along z."""
-    T = np.eye(4)
-    T[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    T[2, 3] = distance
-    return T
-
-
-T_LINK7_HAND = _turn_and_shift(-np.pi / 4, FLANGE)
-T_HAND_GRASP = _turn_and_shift(0.0, HAND_TO_GRASP)
 
 
 def forward_kinematics(q: Float[np.ndarray, "*batch 7"]) -> Float[np.ndarray, "*batch 4 4"]:
@@ -124,22 +113,25 @@ def inverse_kinematics(
     """Joint angles within the limits that put the grasp frame at T_base_grasp to 0.1 mm and 0.001 rad, or None.
 
     Damped least squares from several starts: first q0 (the way to stay near it) and the closed form for a grasp from
-    above, then random ones, always the same. Raises ValueError if T_base_grasp is no rigid transform. Section 5 of the
-    text.
+    above, then random ones, always the same. Raises ValueError if T_base_grasp is no rigid transform, or q0 not seven
+    finite angles.
 
     >>> T = forward_kinematics(np.array([0.1, 0.2, 0.3, -2.0, 0.1, 2.0, 0.5]))
     >>> np.allclose(forward_kinematics(inverse_kinematics(T)), T, atol=1e-3)
     True
     """
     T = check_T("T_base_grasp", T_base_grasp)
-    starts = [top_down_joints(T)]
-    if q0 is not None:
-        starts.insert(0, check_finite("q0", check_shape("q0", q0, (7,))))
-    if _wrist_out_of_reach(T):
+    return solve(T, None if q0 is None else check_finite("q0", check_shape("q0", q0, (7,))))
+
+
+def solve(T_base_grasp, q0=None) -> Float[np.ndarray, "7"] | None:
+    """As `inverse_kinematics`, for arguments that are already checked."""
+    if _wrist_out_of_reach(T_base_grasp):
         return None
-    q = _damped_least_squares(T, np.array(starts))
+    first = [q for q in (q0, top_down_joints(T_base_grasp)) if q is not None]
+    q = _damped_least_squares(T_base_grasp, np.array(first))
     if q is None:
-        q = _damped_least_squares(T, np.random.default_rng(0).uniform(LOWER, UPPER, (24, 7)))
+        q = _damped_least_squares(T_base_grasp, np.random.default_rng(0).uniform(LOWER, UPPER, (24, 7)))
     return q
 
 

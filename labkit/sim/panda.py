@@ -1,7 +1,7 @@
-"""The arm that acts in a World: plan, move, grasp, lift, place. It moves by its motors alone.
+"""The arm that acts in a World: plan, move, grasp, lift, place (topic 07). It moves by its motors alone.
 
 No joint is set, no constraint made, no object touched but by the fingers' friction. The simulator's true poses are read
-in one place, `_Witness`, and only to score a lift.
+in one place, `_Witness`, and only to score a lift. Metres, radians, base frame.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ from labkit.sim.planning import (
     trajectory,
 )
 from labkit.sim.world import TIME_STEP, World
-from labkit.support.validation import check_shape, check_T
+from labkit.support.validation import check_finite, check_shape, check_T
 
 ARM_JOINTS = tuple(range(7))
 FINGER_JOINTS = (9, 10)
@@ -69,8 +69,9 @@ class LiftResult:
 class Panda:
     """The Franka Panda of a World.
 
-    Grasps have the attributes of `labkit.grasp.Grasp`: T_base_grasp, (4, 4), and width, the distance of the pads to
-    start from in metres. Raises ValueError if the world has no robot. Section 5 of the text.
+    A grasp is a `labkit.grasp.Grasp` or anything with its T_base_grasp, (4, 4), and width, the distance of the pads to
+    come down with. `scene`, where a method takes one, is the points (M, 3) that the camera saw. Raises ValueError if
+    the world has no robot.
 
     >>> from labkit.sim.spec import Camera, SceneSpec
     >>> with World(SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.3, 0.8))) as world:
@@ -116,12 +117,12 @@ class Panda:
     def plan(self, grasp: Any, scene: Float[np.ndarray, "M 3"] | None = None) -> MotionPlan | str:
         """Plan a motion from here to a grasp and up; the reason in words if there is none.
 
-        scene: the points that the camera saw, base frame, metres. The height of the table comes from the scene's
-        calibration, nothing else from the simulator.
+        The height of the table comes from the scene's calibration, nothing else from the simulator.
         """
-        points = np.zeros((0, 3)) if scene is None else check_shape("scene", scene, (None, 3))
+        if not hasattr(grasp, "T_base_grasp"):
+            raise ValueError(f"grasp: expected a Grasp, such as perception.plan.grasps[0], got {type(grasp).__name__}")
         table_z = self.world.spec.table.z
-        return plan_grasp(grasp.T_base_grasp, grasp.width, self.q, points, table_z, self.opening / 2)
+        return plan_grasp(grasp.T_base_grasp, grasp.width, self.q, _points(scene), table_z, self.opening / 2)
 
     def execute(self, plan: MotionPlan) -> str | None:
         """Move by a plan: over, down, close until the fingers stall, and up; None, or what the arm felt go wrong.
@@ -147,8 +148,9 @@ class Panda:
     def lift(self, grasp: Any, scene: Float[np.ndarray, "M 3"] | None = None) -> LiftResult:
         """Try to lift: plan, execute, hold for a second, and ask the simulator what is up.
 
-        grasp: a MotionPlan, a grasp, or grasps from best to worst, of which the first with a path is tried. scene: as
-        in `plan`. Success is a target 10 cm up, still so and in contact one simulated second later.
+        grasp: a grasp, a GraspPlan (`perception.plan`) or grasps from best to worst, of which the first with a path is
+        tried, or a MotionPlan of `plan`. Success is a target 10 cm up, still so and in contact one simulated second
+        later. Raises ValueError for anything else.
         """
         plan = self._first_plan(grasp, scene)
         if isinstance(plan, str):
@@ -170,8 +172,9 @@ class Panda:
     def _first_plan(self, grasp, scene) -> MotionPlan | str:
         if isinstance(grasp, MotionPlan):
             return grasp
-        plan = "no grasp"
-        for candidate in grasp if isinstance(grasp, Sequence) else [grasp]:
+        plan = getattr(grasp, "reason", "") or "no grasp"  # of a GraspPlan without grasps
+        grasps = getattr(grasp, "grasps", grasp)
+        for candidate in grasps if isinstance(grasps, Sequence) else [grasps]:
             plan = self.plan(candidate, scene)
             if isinstance(plan, MotionPlan):
                 break
@@ -186,20 +189,21 @@ class Panda:
         orientation; the height at which it was gripped puts an object back on the table. scene: points to keep clear
         of, without those of the held object.
         """
-        T = forward_kinematics(self.q)
+        T_now = forward_kinematics(self.q)
+        T = T_now.copy()
         if np.shape(where) == (3,):
             T[:3, 3] = where
         else:
             T = check_T("where", where)
         T_above = T.copy()
-        T_above[2, 3] = max(T[2, 3], forward_kinematics(self.q)[2, 3])
+        T_above[2, 3] = max(T[2, 3], T_now[2, 3])
         across = self.inverse_kinematics(T_above)
         down = None if across is None else straight_line(T_above, T, across)
         if down is None:
             return "out of reach"
         finger, table_z = self.opening / 2, self.world.spec.table.z
-        points = np.zeros((0, 3)) if scene is None else check_shape("scene", scene, (None, 3))
-        transit = plan_transit(self.q, across, finger, points_in_the_way(points, self.q, finger, table_z), table_z)
+        points = points_in_the_way(_points(scene), self.q, finger, table_z)
+        transit = plan_transit(self.q, across, finger, points, table_z)
         if isinstance(transit, str):
             return f"no path: {transit}"
         if not all(self._follow_or_back_off(leg, LINE_SPEED) for leg in (*transit, down)):
@@ -279,6 +283,10 @@ class Panda:
         self._target = q
         self._steps += 1
         self.world.step()
+
+
+def _points(scene) -> Float[np.ndarray, "M 3"]:
+    return np.zeros((0, 3)) if scene is None else check_finite("scene", check_shape("scene", scene, (None, 3)))
 
 
 class _Witness:

@@ -1,7 +1,7 @@
-"""From a grasp to a motion: over, straight down, straight up, checked against what the robot knows.
+"""From a grasp to a motion: over, straight down, straight up, checked against what the robot knows (topic 07).
 
 The planner sees the grasp, the joint angles, the camera's points, the table plane and the robot model. The simulator's
-objects are never asked.
+objects are never asked. Metres, radians, base frame.
 """
 
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from labkit.sim.collision import Margin, first_contact, thin, without_robot
-from labkit.sim.kinematics import FINGER_MAX, MAX_VELOCITY, forward_kinematics, inverse_kinematics
+from labkit.sim.kinematics import FINGER_MAX, MAX_VELOCITY, forward_kinematics, solve
 from labkit.support.validation import check_finite, check_shape, check_T
 
 LIFT = 0.18  # m
@@ -52,10 +52,9 @@ def plan_grasp(
 ) -> MotionPlan | str:
     """Plan from joint angles q to a grasp and up again; the reason in words if there is no way.
 
-    opening: distance of the pads to descend with, metres. points: what the camera saw, base frame; those on the table
-    plane and on the arm itself (as it stands at q, each finger `finger` from the middle) are left out here. The jaws
-    are symmetric, so the grasp turned by pi about its approach is tried too. Raises ValueError for an argument that
-    does not fit. Section 5 of the text.
+    opening: distance of the pads to descend with. points: what the camera saw; those on the table plane and on the arm
+    itself (as it stands at q, each finger `finger` from the middle) are left out here. The jaws are symmetric, so the
+    grasp turned by pi about its approach is tried too. Raises ValueError for an argument that does not fit.
 
     >>> from labkit.sim.kinematics import HOME
     >>> T = np.diag([1.0, -1.0, -1.0, 1.0]); T[:3, 3] = 0.5, 0.1, 0.02
@@ -126,15 +125,13 @@ def straight_line(
     steps = int(np.ceil(np.linalg.norm(T_to[:3, 3] - T_from[:3, 3]) / LINE_STEP)) + 1
     share = np.linspace(0.0, 1.0, max(steps, 2))
     turn = Slerp([0.0, 1.0], Rotation.from_matrix([T_from[:3, :3], T_to[:3, :3]]))
-    path, q = [], q0
-    for s, R in zip(share, turn(share).as_matrix(), strict=True):
-        T = np.eye(4)
-        T[:3, :3], T[:3, 3] = R, (1.0 - s) * T_from[:3, 3] + s * T_to[:3, 3]
-        q_next = inverse_kinematics(T, q)
-        if q_next is None or (path and np.abs(q_next - q).max() > 10 * JOINT_STEP):
+    shift = np.outer(1.0 - share, T_from[:3, 3]) + np.outer(share, T_to[:3, 3])
+    path = []
+    for T in RigidTransform.from_components(shift, turn(share)).as_matrix():
+        q = solve(T, path[-1] if path else q0)
+        if q is None or (path and np.abs(q - path[-1]).max() > 10 * JOINT_STEP):
             return None
-        path.append(q_next)
-        q = q_next
+        path.append(q)
     return np.array(path)
 
 
@@ -168,7 +165,7 @@ def _detours(q_from, q_to):
 
 
 def straight_joints(q_from: Float[np.ndarray, "7"], q_to: Float[np.ndarray, "7"]) -> Float[np.ndarray, "_ 7"]:
-    """Evenly spaced joint angles from q_from to q_to, no joint moving more than 0.03 rad a row.
+    """Evenly spaced joint angles from q_from to q_to, no joint moving more than 0.03 rad from row to row.
 
     >>> straight_joints(np.zeros(7), np.full(7, 0.05))[:, 0]
     array([0.   , 0.025, 0.05 ])

@@ -1,5 +1,6 @@
 """The grasp planner: measured against PyBullet's gripper, and against brute force on scenes whose answer is known."""
 
+import re
 import subprocess
 import sys
 
@@ -141,20 +142,16 @@ def test_closes_across_the_short_side_of_a_box(yaw):
     assert 0.0 < best.score <= 1.0
 
 
-def test_grasp_frame_points_down_and_is_a_rotation():
+def test_grasps_are_ranked_and_their_frames_are_rotations_that_point_down():
     target = box((0.06, 0.04, 0.04), yaw=0.5)
-    for grasp in plan_grasps([target], scene(target), TABLE).grasps:
+    grasps = plan_grasps([target], scene(target), TABLE).grasps
+    scores = [grasp.score for grasp in grasps]
+    assert len(scores) > 1 and scores == sorted(scores, reverse=True)
+    for grasp in grasps:
         R = grasp.T_base_grasp[:3, :3]
         np.testing.assert_allclose(R[:, 2], (0.0, 0.0, -1.0))
         np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
         assert np.linalg.det(R) > 0.0
-
-
-def test_grasps_are_ranked():
-    target = box((0.06, 0.04, 0.04), yaw=0.5)
-    scores = [grasp.score for grasp in plan_grasps([target], scene(target), TABLE).grasps]
-    assert len(scores) > 1
-    assert scores == sorted(scores, reverse=True)
 
 
 def test_walls_on_both_sides_turn_the_grasp():
@@ -195,10 +192,11 @@ def test_low_obstacles_may_stand_under_the_palm_and_high_ones_may_not():
     assert angle_between(closing(best(0.09)), 90.0) > 10.0
 
 
-def test_two_targets_are_told_apart():
-    targets = [box((0.05, 0.03, 0.04), centre=centre, yaw=0.4) for centre in ((0.45, -0.1), (0.55, 0.1))]
+def test_several_targets_are_told_apart_and_one_without_a_grasp_hides_no_other():
+    sizes = ((0.05, 0.03, 0.04), (0.12, 0.11, 0.05), (0.05, 0.03, 0.04))
+    targets = [box(size, (0.5, y), 0.4) for size, y in zip(sizes, (-0.12, 0.0, 0.13), strict=True)]
     plan = plan_grasps(targets, scene(*targets), TABLE)
-    assert {grasp.target for grasp in plan.grasps} == {0, 1}
+    assert {grasp.target for grasp in plan.grasps} == {0, 2} and plan.reason == ""
     for grasp in plan.grasps:
         others = [np.linalg.norm(target[:, :2] - grasp.T_base_grasp[:2, 3], axis=1).min() for target in targets]
         assert np.argmin(others) == grasp.target
@@ -214,9 +212,20 @@ def test_tall_things_are_held_as_low_as_the_palm_lets():
 # No candidate -------------------------------------------------------------------------------------------------------
 
 
-def test_too_wide_is_a_reason():
-    target = box((0.12, 0.11, 0.05))
+@pytest.mark.parametrize("yaw", [0.0, 0.25, 0.5, 0.785])
+@pytest.mark.parametrize("edge", [0.085, 0.10, 0.11, 0.13])
+def test_too_wide_is_a_reason_and_no_grip_at_a_corner_which_slips(edge, yaw):
+    """At a corner the jaws would fit, and squeeze the box out: the two faces there are at right angles."""
+    target = box((edge, edge, 0.05), yaw=yaw)
     assert plan_grasps([target], scene(target), TABLE) == GraspPlan((), "too wide for the gripper in every direction")
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.25, 0.5, 0.785])
+def test_what_just_fits_is_held_by_its_faces(yaw):
+    target = box((0.07, 0.07, 0.05), yaw=yaw)
+    plan = plan_grasps([target], scene(target), TABLE)
+    off = [min(angle_between(closing(g), np.degrees(yaw) + turn) for turn in (0.0, 90.0)) for g in plan.grasps]
+    assert off and max(off) < 12.0
 
 
 def test_no_room_is_a_reason():
@@ -246,11 +255,8 @@ def test_no_target_is_a_reason():
     assert plan_grasps([], table(), TABLE).reason == "no target points"
     assert plan_grasps([nothing, nothing], table(), TABLE).reason == "no target points"
     assert plan_grasps([], nothing, TABLE).grasps == ()
-
-
-def test_every_target_may_have_its_own_reason():
     wide = box((0.12, 0.11, 0.05))
-    plan = plan_grasps([wide, np.zeros((0, 3)), wide], scene(wide), TABLE)
+    plan = plan_grasps([wide, nothing, wide], scene(wide), TABLE)
     assert plan.reason == "too wide for the gripper in every direction; no target points"
 
 
@@ -259,13 +265,6 @@ def test_a_single_point_is_no_error():
     plan = plan_grasps([point], scene(point), TABLE)
     assert plan.grasps
     np.testing.assert_allclose(plan.grasps[0].T_base_grasp[:2, 3], (0.5, 0.0), atol=0.005)
-
-
-def test_one_target_without_a_grasp_does_not_hide_the_others():
-    wide, narrow = box((0.12, 0.11, 0.05), centre=(0.5, 0.12)), box((0.05, 0.03, 0.04), centre=(0.5, -0.1))
-    plan = plan_grasps([wide, narrow], scene(wide, narrow), TABLE)
-    assert {grasp.target for grasp in plan.grasps} == {1}
-    assert plan.reason == ""
 
 
 # What must hold in every scene --------------------------------------------------------------------------------------
@@ -364,23 +363,16 @@ def test_nothing_taller_can_hide_than_the_bound_says(height, azimuth, elevation)
 # The simple entrances -----------------------------------------------------------------------------------------------
 
 
-def test_top_down_grasp_is_the_best_of_the_plan():
-    target = box((0.06, 0.04, 0.04), yaw=0.5)
+def test_top_down_grasp_is_the_best_of_the_plan_or_else_the_one_of_the_principal_axis():
+    target = box((0.07, 0.03, 0.04), yaw=0.5)
     best = plan_grasps([target], scene(target), TABLE).grasps[0]
     np.testing.assert_array_equal(top_down_grasp(target, scene(target), TABLE).T_base_grasp, best.T_base_grasp)
-
-
-def test_top_down_grasp_needs_only_a_cloud():
-    grasp = top_down_grasp(box((0.07, 0.03, 0.04), yaw=0.5))
-    assert angle_between(closing(grasp), np.degrees(0.5) + 90.0) < 4.0
-    assert grasp.score > 0.0
-
-
-def test_top_down_grasp_falls_back_on_the_principal_axis():
+    alone = top_down_grasp(target)  # a cloud is enough
+    assert angle_between(closing(alone), np.degrees(0.5) + 90.0) < 4.0 and alone.score > 0.0
     wide = box((0.14, 0.1, 0.05))
-    grasp = top_down_grasp(wide, table_z=TABLE)
-    assert grasp.score == 0.0
-    np.testing.assert_array_equal(grasp.T_base_grasp, principal_axis_grasp(wide, TABLE).T_base_grasp)
+    fallback = top_down_grasp(wide, table_z=TABLE)
+    assert fallback.score == 0.0
+    np.testing.assert_array_equal(fallback.T_base_grasp, principal_axis_grasp(wide, TABLE).T_base_grasp)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.0])
@@ -401,23 +393,53 @@ def test_importing_the_planner_compiles_nothing():
 # Bad input ----------------------------------------------------------------------------------------------------------
 
 
+def test_grasps_and_plans_print_in_a_line():
+    target = box((0.06, 0.04, 0.04), yaw=0.5)
+    plan = plan_grasps([target], scene(target), TABLE)
+    assert re.fullmatch(
+        r"GraspPlan\(10 grasps, the best Grasp\(at \(0.500, .*, closing at 119 degrees, .*\)\)", repr(plan)
+    )
+    assert repr(plan_grasps([], target, TABLE)) == "GraspPlan(no grasp: no target points)"
+
+
 @pytest.mark.bad_input
 @pytest.mark.parametrize(
-    ("changed", "name"),
+    ("changed", "says"),
     [
-        ({"targets": [np.full((5, 3), np.nan)]}, r"targets\[0\]"),
-        ({"targets": [np.zeros((5, 3)), np.zeros((5, 2))]}, r"targets\[1\]"),
-        ({"scene": np.full((5, 3), np.inf)}, "scene"),
-        ({"scene": np.zeros((4, 4, 3))}, "scene"),
-        ({"table_z": np.nan}, "table_z"),
-        ({"camera_position": np.zeros(2)}, "camera_position"),
-        ({"camera_position": np.array([0.0, np.nan, 1.0])}, "camera_position"),
+        ({"targets": [np.full((5, 3), np.nan)]}, r"targets\[0\]: expected finite"),
+        ({"targets": [np.zeros((5, 3)), np.zeros((5, 2))]}, r"targets\[1\]: expected shape"),
+        ({"targets": [1000.0 * box((0.05, 0.03, 0.04))]}, r"targets\[0\]: expected metres"),
+        ({"scene": np.full((5, 3), np.inf)}, "scene: expected finite"),
+        ({"scene": np.zeros((4, 4, 3))}, "scene: expected shape"),
+        ({"scene": 1000.0 * table()}, "scene: expected metres"),
+        ({"table_z": np.nan}, "table_z: expected finite"),
+        ({"table_z": 20.0}, "table_z: expected metres"),
+        ({"camera_position": np.zeros(2)}, "camera_position: expected shape"),
+        ({"camera_position": np.array([0.0, np.nan, 1.0])}, "camera_position: expected finite"),
+        ({"camera_position": np.array([400.0, 0.0, 900.0])}, "camera_position: expected metres"),
     ],
 )
-def test_bad_arguments_are_named(changed, name):
+def test_bad_arguments_are_named(changed, says):
     good = {"targets": [box((0.05, 0.03, 0.04))], "scene": table(), "table_z": TABLE}
-    with pytest.raises(ValueError, match=name):
+    with pytest.raises(ValueError, match=f"^{says}"):
         plan_grasps(**{**good, **changed})
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("measures", "name"),
+    [
+        ({"max_opening": 140}, "max_opening"),
+        ({"palm_length": 0.0}, "palm_length"),
+        ({"finger_width": np.nan}, "finger_width"),
+        ({"tips_below_grasp": -0.01}, "tips_below_grasp"),
+        ({"tip_thickness": 0.03}, "tip_thickness"),
+        ({"pad_width": 0.03}, "pad_width"),
+    ],
+)
+def test_measures_that_no_gripper_has_are_named(measures, name):
+    with pytest.raises(ValueError, match=f"^{name}: expected"):
+        Gripper(**measures)
 
 
 @pytest.mark.bad_input
