@@ -9,6 +9,42 @@ import numpy as np
 
 from labkit.course.questions.relations import NUMBERS, View, relation
 
+
+@relation(NUMBERS)
+def always_the_same(view: View) -> str:
+    """One number, whatever the arguments are."""
+    if not view.shaped:
+        return ""
+    e, g, _ = view.numbers()
+    if g.size < 2 or not view.same(g, np.full(g.shape, g[0])) or view.same(e, np.full(e.shape, e[0])):
+        return ""
+    first = next(a.flat[0] for a in view.got if a.size)
+    return f"Yours is always {first if first.dtype.kind == 'b' else f'{first:.4g}'}, whatever the arguments are."
+
+
+@relation(NUMBERS)
+def values_taken_for_others(view: View) -> str:
+    """Whole numbers: wherever one is expected, there always is another."""
+    if not view.shaped or any(a.dtype.kind not in "iub" for a in (*view.expected, *view.got)):
+        return ""
+    e, g, _ = view.numbers()
+    if not e.size:
+        return ""
+    values = np.unique(e)
+    if values.size > 8:
+        return ""
+    taken = {}
+    for value in values:
+        seen = np.unique(g[e == value])
+        if seen.size != 1:
+            return ""
+        if seen[0] != value:
+            taken[value] = seen[0]
+    if not taken or (len(taken) == values.size and values.size < 2):
+        return ""
+    return " ".join(f"Wherever {e:g} is right, you have {g:g}." for e, g in list(taken.items())[:3])
+
+
 FUNCTIONS = {
     "The sign is the other one.": np.negative,
     "The sign is lost: yours are the absolute values.": np.abs,
@@ -97,7 +133,7 @@ def enough(view: View, told: list) -> bool:
 def several(view: View) -> bool:
     """Whether some wrong cases hold several different numbers, so that one number for each case is no accident."""
     wrong = [e for e, g in zip(view.expected, view.got, strict=True) if not view.same(e, g)]
-    return sum(np.unique(e[np.isfinite(e)]).size > 2 for e in wrong if e.dtype.kind in "iuf") > 1
+    return sum(np.unique(e[np.isfinite(e)]).size > 2 for e in wrong if e.dtype.kind == "f") > 1
 
 
 def factor_of(view: View, e: np.ndarray, g: np.ndarray) -> float | None:
@@ -163,18 +199,6 @@ def straight_line(view: View) -> str:
 
 
 @relation(NUMBERS)
-def always_the_same(view: View) -> str:
-    """One number, whatever the arguments are."""
-    if not view.shaped:
-        return ""
-    e, g, _ = view.numbers()
-    if g.size < 2 or not view.same(g, np.full(g.shape, g[0])) or view.same(e, np.full(e.shape, e[0])):
-        return ""
-    first = next(a.flat[0] for a in view.got if a.size)
-    return f"Yours is always {first if first.dtype.kind == 'b' else f'{first:.4g}'}, whatever the arguments are."
-
-
-@relation(NUMBERS)
 def an_argument(view: View) -> str:
     """A number of the arguments, or a quantity of theirs, in the place of the right one."""
     for name, values in quantities(view):
@@ -183,29 +207,6 @@ def an_argument(view: View) -> str:
         ):
             return f"What stands there is {name}."
     return ""
-
-
-@relation(NUMBERS)
-def values_taken_for_others(view: View) -> str:
-    """Whole numbers: wherever one is expected, there always is another."""
-    if not view.shaped or any(a.dtype.kind not in "iub" for a in (*view.expected, *view.got)):
-        return ""
-    e, g, _ = view.numbers()
-    if not e.size:
-        return ""
-    values = np.unique(e)
-    if values.size > 8:
-        return ""
-    taken = {}
-    for value in values:
-        seen = np.unique(g[e == value])
-        if seen.size != 1:
-            return ""
-        if seen[0] != value:
-            taken[value] = seen[0]
-    if not taken or (len(taken) == values.size and values.size < 2):
-        return ""
-    return " ".join(f"Wherever {e:g} is right, you have {g:g}." for e, g in list(taken.items())[:3])
 
 
 def quantities(view: View) -> Iterator[tuple[str, list[float | None]]]:

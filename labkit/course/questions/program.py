@@ -131,7 +131,7 @@ class Parsed:
     """A cell as statements; `statements` is empty, and `problem` says why, if it is not Python."""
 
     def __init__(self, cell: Cell):
-        self.grade_id = cell.grade_id
+        self.grade_id, self.source = cell.grade_id, cell.source
         self.text = cell.source.replace("\r\n", "\n").replace("\r", "\n")
         self.problem = ""
         self.statements: list[Statement] = []
@@ -165,6 +165,16 @@ class Parsed:
     def binds(self) -> set[str]:
         """All names that the cell gives a value."""
         return set().union(*(statement.binds for statement in self.statements))
+
+    def defines(self, name: str) -> bool:
+        """Whether the cell defines a function of this name, and does not merely use the name for something."""
+        for statement in self.statements:
+            for node in statement.nodes:
+                if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+                    return True
+                if isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda) and name in statement.binds:
+                    return True
+        return False
 
     def is_blank(self, name: str) -> bool:
         """Whether the function of this name is as it was released: it only raises NotImplementedError."""
@@ -332,10 +342,7 @@ class Slicer:
         elsewhere = [
             i
             for i, cell in enumerate(self.cells)
-            if i not in marked
-            and name in cell.binds
-            and (latest or not cell.is_blank(name))
-            and self.is_defined(name, i)
+            if i not in marked and name in cell.binds and (latest or not cell.is_blank(name)) and cell.defines(name)
         ]
         if latest and elsewhere:
             return elsewhere[-1]
@@ -344,22 +351,12 @@ class Slicer:
                 return found[0]
         raise Refused(next((self.cells[i].problem for i in marked if self.cells[i].problem), f"no cell defines {name}"))
 
-    def is_defined(self, name: str, i: int) -> bool:
-        """Whether a cell defines a function of this name, and does not merely use the name for something."""
-        for statement in self.cells[i].statements:
-            for node in statement.nodes:
-                if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
-                    return True
-                if isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda) and name in statement.binds:
-                    return True
-        return False
-
     def place(self, wanted: str, asking: int, latest: bool) -> int | None:
         """The cell that gives a name its value for a cell that needs it."""
         binding = [i for i, cell in enumerate(self.cells) if wanted in cell.binds]
         if wanted in self.blanks:
             binding = [i for i in binding if self.cells[i].grade_id == wanted] or [
-                i for i in binding if self.is_defined(wanted, i)
+                i for i in binding if self.cells[i].defines(wanted)
             ]
         if asking in binding:
             return asking

@@ -1,0 +1,121 @@
+"""How many wrong answers that nobody wrote down get a sentence that is true of them and of few others, by lab.
+
+    python tests/measure_diagnosis.py [--sample N] [--held-out] [--unnamed] [TOPIC ...]
+
+Wrong answers are the mutants of references and alternatives (`mutants`); those of the same outputs count once.
+One is named by a sentence that is true of it and false for nine tenths of the question's others; where it is wrong does
+not count alone. "strict" leaves out slips, which know the operators that are not held out.
+"""
+
+import argparse
+import random
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from alternatives import alternatives
+from mutants import mutants
+
+from labkit.course.questions import diagnosis
+from labkit.course.questions.comparison import Problem, compare, expected_cases, parts
+from labkit.course.questions.diagnosis import Sentence, sentences
+from labkit.course.questions.question import TOPICS, Question, of_topic
+from labkit.course.questions.run import run
+
+SHARE = 0.1  # of the other mutants that a sentence may be true of
+
+
+@dataclass
+class Named:
+    """How many of some wrong answers are named, strictly and with slips, by which kind of sentence, and which not."""
+
+    wrong: int = 0
+    named: int = 0
+    strict: int = 0
+    kinds: Counter = field(default_factory=Counter)
+    unnamed: list[str] = field(default_factory=list)
+
+    def __add__(self, other: "Named") -> "Named":
+        kinds, unnamed = self.kinds + other.kinds, self.unnamed + other.unnamed
+        return Named(self.wrong + other.wrong, self.named + other.named, self.strict + other.strict, kinds, unnamed)
+
+    def __str__(self) -> str:
+        share = f"{self.named / max(self.wrong, 1):.0%} named, strictly {self.strict / max(self.wrong, 1):.0%}"
+        return f"{self.wrong} wrong answers, {share}; {', '.join(f'{k} {n}' for k, n in self.kinds.most_common())}"
+
+
+def wrong_answers(question: Question, held_out: bool | None, sample: int | None) -> dict[str, list[object]]:
+    """Mutants that are refused, by their names, with their outputs; those of the same outputs once."""
+    cases, found, seen = expected_cases(question, 0), {}, set()
+    right = [question.reference, *(a for a in alternatives(question) if "torch" not in a.__name__)]
+    everything = [mutant for function in right for mutant in mutants(function, held_out)]
+    random.Random(question.name).shuffle(everything)
+    for mutant in everything:
+        if sample is not None and len(found) == sample:
+            break
+        outputs, _ = run(mutant.function, [case.args for case in cases], 1.0)
+        pairs = zip(cases, outputs, strict=True)
+        refused = any(isinstance(got, Problem) or compare(question, case.expected, got) for case, got in pairs)
+        if refused and behaviour(outputs) not in seen:
+            seen.add(behaviour(outputs))
+            found[mutant.name] = outputs
+    return found
+
+
+def behaviour(outputs: Sequence[object]) -> str:
+    """The same for outputs that are the same up to rounding."""
+    told = []
+    for got in outputs:
+        if isinstance(got, Problem):
+            told.append(got.says)
+            continue
+        told += [(np.shape(part), np.round(np.nan_to_num(np.asarray(part, float)), 6).tolist()) for part in parts(got)]
+    return repr(told)
+
+
+def measure(question: Question, held_out: bool | None = None, sample: int | None = None) -> Named:
+    """Diagnose the wrong answers to a question."""
+    cases = expected_cases(question, 0)
+    wrong = wrong_answers(question, held_out, sample)
+    said = {name: list(dict.fromkeys(sentences(question, cases, outputs))) for name, outputs in wrong.items()}
+    true_of = Counter(sentence for found in said.values() for sentence in found)
+    result = Named(wrong=len(wrong))
+    for name, found in said.items():
+        good = [s for s in found if s.kind != "place" and true_of[s] - 1 <= SHARE * (len(wrong) - 1)]
+        result.named += bool(good)
+        result.strict += any(s.kind not in ("slip", "property") for s in good)
+        result.kinds[good[0].kind if good else "none"] += 1
+        if not good:
+            result.unnamed.append(f"{question.name}: {name}\n    {first(found)}")
+    return result
+
+
+def first(found: Sequence[Sentence]) -> str:
+    """What is said first."""
+    return found[0].says if found else "nothing is said"
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Measure the labs that are named, or all."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("topics", nargs="*", default=TOPICS)
+    parser.add_argument("--sample", type=int, help="wrong answers to each question; all if not given")
+    parser.add_argument("--held-out", action="store_true", help="only of the operators that slips do not know")
+    parser.add_argument("--unnamed", action="store_true", help="list those that are not named")
+    given = parser.parse_args(arguments)
+    diagnosis.LONGEST_S = 60.0
+    total = Named()
+    for topic in given.topics:
+        questions = of_topic(topic).values()
+        found = sum((measure(q, True if given.held_out else None, given.sample) for q in questions), Named())
+        print(f"{topic}: {found}", *(found.unnamed if given.unnamed else ()), sep="\n  ", flush=True)
+        total += found
+    print(f"all: {total}")
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    main(sys.argv[1:])
