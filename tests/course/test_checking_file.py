@@ -7,8 +7,7 @@ import pytest
 from grading_course import lab_notebook, right_answers
 from submissions import honest
 
-from labkit import check_file
-from labkit.course.checking_file import topic_of
+from labkit.course.checking_file import check_file, topic_of
 from labkit.course.questions.program import Cell
 
 TOPIC = "04_iou"
