@@ -16,8 +16,10 @@ def always_the_same(view: View) -> str:
     if not view.shaped:
         return ""
     e, g, _ = view.numbers()
-    if g.size < 2 or not view.same(g, np.full(g.shape, g[0])) or view.same(e, np.full(e.shape, e[0])):
+    if g.size < 2 or not view.same(g, np.full(g.shape, g[0])):
         return ""
+    if view.same(e, np.full(e.shape, e[0])) and not np.isnan(e[0]):
+        return ""  # then it is an offset
     first = next(a.flat[0] for a in view.got if a.size)
     return f"Yours is always {first if first.dtype.kind == 'b' else f'{first:.4g}'}, whatever the arguments are."
 
@@ -107,19 +109,19 @@ def factor(view: View) -> str:
         return ""
     if all(np.isclose(k, 1.0, rtol=view.rtol, atol=0) for k in told) or not enough(view, told):
         return ""
-    if np.allclose(told, told[0], rtol=max(1e-4, view.rtol)):
+    if np.allclose(told, told[0], rtol=max(1e-4, view.rtol), atol=0.0):
         k = told[0]
         sign = " and the sign is the other one" if k < 0 else ""
         for value, name in CONSTANTS.items():
             for size, words in ((value, "large"), (1.0 / value, "small")):
-                if np.isclose(abs(k), size, rtol=1e-3):
+                if np.isclose(abs(k), size, rtol=1e-3, atol=0.0):
                     return f"Yours are too {words} by a factor of {name}{sign}."
         return f"Yours are the right values times {k:.4g}, in every case."
     for name, values in quantities(view):
         pairs = [(k, q) for k, q in zip(factors, values, strict=True) if k is not None]
         for power, words in ((1, "large"), (-1, "small"), (2, "large"), (-2, "small"), (0.5, "large"), (-0.5, "small")):
             with np.errstate(all="ignore"):
-                if all(q is not None and q > 0 and np.isclose(abs(k), q**power, rtol=1e-3) for k, q in pairs):
+                if all(q is not None and q > 0 and np.isclose(abs(k), q**power, rtol=1e-3, atol=0.0) for k, q in pairs):
                     of = {1: name, 2: f"the square of {name}", 0.5: f"the root of {name}"}[abs(power)]
                     return f"Yours are too {words} by a factor that is {of}: divide or multiply by it."
     return "In each case yours are the right values times one number, another in each case." if several(view) else ""

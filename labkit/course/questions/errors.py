@@ -248,7 +248,7 @@ def not_a_function(found: re.Match, args: dict) -> str:
     )
 
 
-@when(r"TypeError: (\w+)\(\) (?:takes|missing).*positional")
+@when(r"TypeError: .+?\(\) (?:takes|missing).*positional")
 def signature(found: re.Match, args: dict) -> str:
     """Another number of arguments than the check gives."""
     return f"The check calls it with these arguments: {', '.join(args)}. Keep the first line of the cell as it is."
@@ -290,7 +290,7 @@ def no_such_function(found: re.Match, args: dict) -> str:
     return f"NumPy has no {found[1]}" + (f": do you mean np.{near[0]}?" if near else ".")
 
 
-@when(r"AttributeError: '(\w+)' object has no attribute '(\w+)'")
+@when(r"AttributeError: '(?:\w+\.)*(\w+)' object has no attribute '(\w+)'")
 def no_such_attribute(found: re.Match, args: dict) -> str:
     """An attribute that an object does not have."""
     if found[1] == "NoneType":

@@ -12,6 +12,7 @@ from labkit.course.questions.question import Question
 Change = Callable[[tuple], tuple | None]
 
 NUMBERS: dict[str, Callable] = {
+    "were the other one of 0 and 1": lambda x: 1 - x if isinstance(x, int) and x in (0, 1) else None,
     "did not count (as if it were 0)": lambda x: 0 * x,
     "were 1, or left out of a product": lambda x: type(x)(1),
     "had the other sign": lambda x: -x,
@@ -22,6 +23,7 @@ NUMBERS: dict[str, Callable] = {
     "were 1 over what it is": lambda x: None if isinstance(x, int) else 1.0 / x,
     "were one larger": lambda x: x + 1,
     "were one smaller": lambda x: x - 1,
+    "were close to 0": lambda x: None if isinstance(x, int) else 1e-4 * x,
     "were in degrees": lambda x: None if isinstance(x, int) else np.rad2deg(x),
     "were turned from degrees to radians": lambda x: None if isinstance(x, int) else np.deg2rad(x),
     "were 90 degrees less": lambda x: None if isinstance(x, int) else x - np.pi / 2,
@@ -89,7 +91,6 @@ ARRAYS: dict[str, Callable] = {
     "were cast to bytes, which wrap round": lambda x: (
         None if x.dtype.kind == "b" else x.astype(np.int64).astype(np.uint8)
     ),
-    "were cast to signed bytes": integers(lambda x: x.astype(np.int8)),
     "were cast to whole numbers": floats(np.trunc),
     "were rounded": floats(np.round),
 }

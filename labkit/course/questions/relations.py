@@ -249,7 +249,7 @@ def scaled_line_by_line(view: View) -> str:
         if not all(factors_along(view, e, g, axis) for e, g in zip(view.expected, view.got, strict=True)):
             continue
         if not all(np.allclose(e.sum(axis), 1.0) for e in view.expected):
-            return f"Yours are the right values times a factor that is constant {ordinal(axis, view)}, but not 1."
+            return f"Yours are the right values times a number that stays the same {ordinal(axis, view)}, and is not 1."
         for other in axes(view):
             if other != axis and all(np.allclose(g.sum(other), 1.0) for g in view.got):
                 return f"Your values sum to 1 {ordinal(other, view)}; they should sum to 1 {ordinal(axis, view)}."
@@ -258,14 +258,17 @@ def scaled_line_by_line(view: View) -> str:
 
 
 def factors_along(view: View, e: np.ndarray, g: np.ndarray, axis: int) -> bool:
-    """Whether g is e times a factor that is constant along one axis, longer than 1."""
+    """Whether g is e times factors that are constant along one axis, along which there is more than one number each."""
     if e.shape[axis] < 2 or e.dtype.kind == "b" or g.dtype.kind == "b":
         return view.same(e, g)
     with np.errstate(all="ignore"):
         factor = np.sum(g * e, axis, keepdims=True, dtype=float) / np.sum(
             np.square(e, dtype=float), axis, keepdims=True
         )
-    return bool(np.isfinite(factor).all() and (factor != 0).all() and view.same(e * factor, g))
+    if not np.isfinite(factor).all() or (factor == 0).any() or not view.same(e * factor, g):
+        return False
+    scaled = ~np.isclose(factor, 1.0, rtol=view.rtol, atol=0.0)
+    return bool((np.count_nonzero(e, axis=axis, keepdims=True)[scaled] > 1).all())
 
 
 # --------------------------------------------------------------------------------- made of the arguments alone

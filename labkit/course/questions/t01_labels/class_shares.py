@@ -24,7 +24,6 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "These are numbers of pixels; a share lies between 0 and 1.")
 def counts(y, C):
     return np.bincount(y[y != 255], minlength=C)
 

@@ -31,11 +31,6 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "The class comes last here: the shape is (H, W, C).")
-def classes_first(y, C):
-    return np.moveaxis(one_hot(y, C), -1, 0)
-
-
 @wrong(QUESTION, "A pixel that is ignored has no class, not even 0: what should its C entries be?")
 def ignored_as_background(y, C):
     return np.eye(C, dtype=np.uint8)[np.where(y == 255, 0, y)]

@@ -74,11 +74,6 @@ def corner_to_corner(y, height, width):
     return y[rows[:, None], columns]
 
 
-@wrong(QUESTION, "The first axis of an image is its height: check both.")
-def sides_swapped(y, height, width):
-    return resize_labels(y, width, height)
-
-
 @wrong(QUESTION, "np.resize repeats the numbers row after row: is your image still the same scene?")
 def refilled(y, height, width):
     return np.resize(y, (height, width))

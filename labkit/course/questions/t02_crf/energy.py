@@ -74,9 +74,3 @@ def agreement_charged(y, psi, w_right, w_down):
 def pairs_twice(y, psi, w_right, w_down):
     """Each pair counted from both ends."""
     return unary_part(y, psi) + 2.0 * pair_part(y, w_right, w_down)
-
-
-@wrong(QUESTION, "Compare the energy of an image with that of its transpose: columns have neighbours too.")
-def rows_only(y, psi, w_right, w_down):
-    """No pairs downward."""
-    return unary_part(y, psi) + w_right[y[:, 1:] != y[:, :-1]].sum()

@@ -100,9 +100,3 @@ def ahead_only(y, psi, w_right, w_down, v, u):
     """Only the pairs that the energy's loop visits at this pixel."""
     _, right, _, down = padded_weights(w_right, w_down, v, u)
     return charged((0.0, right, 0.0, down), y, psi, v, u)
-
-
-@wrong(QUESTION, "What does each class cost the pixel before any neighbour is asked?")
-def neighbours_only(y, psi, w_right, w_down, v, u):
-    """No unary term."""
-    return charged(padded_weights(w_right, w_down, v, u), y, np.zeros_like(psi), v, u)

@@ -70,7 +70,6 @@ def never_looking_back(psi, w_right):
     return total
 
 
-@wrong(QUESTION, "A valid bound, but a weak one: the pairs of a row cost w_right where the label changes.")
 def switching_for_free(psi, w_right):
     """The pixels' cheapest costs: a bound, but a weak one."""
     return psi.min(axis=2).sum()

@@ -52,11 +52,6 @@ def grad_sign(z, y):
     return -cross_entropy_grad(z, y)
 
 
-@wrong(QUESTION, "Ratio to the numerical gradient of the summed loss: the number of pixels?")
-def grad_mean(z, y):
-    return cross_entropy_grad(z, y) / max(1, np.count_nonzero(y != 255))
-
-
 @wrong(QUESTION, "A pixel that adds no loss has no gradient: look at 255.")
 def grad_counts_ignored(z, y):
     return softmax(z) - one_hot(z, y)

@@ -101,8 +101,3 @@ def the_inside(mask, width):
 @wrong(QUESTION, "Look at a corner that is cut into the mask: a pixel diagonal to it is within one row and one column.")
 def cross_window(mask, width):
     return band_with_window(mask, width, 0) | band_with_window(mask, 0, width)
-
-
-@wrong(QUESTION, "For a 3 x 3 square and width 1 the middle pixel is not in the band: how far does your window reach?")
-def one_pixel_too_wide(mask, width):
-    return band_with_window(mask, width + 1, width + 1)

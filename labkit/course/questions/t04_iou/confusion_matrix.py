@@ -59,12 +59,6 @@ def pair_count(rows, columns, num_classes):
     return np.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, num_classes)
 
 
-@wrong(QUESTION, "Which index of n is the truth? Try one pixel: true 0, predicted 1.")
-def transposed(y_true, y_pred, num_classes, ignore):
-    rows, columns = counted_pairs(y_true, y_pred, ignore)
-    return pair_count(columns, rows, num_classes)
-
-
 @wrong(QUESTION, "No entry exceeds 1: with repeated indices, n[i, j] += 1 writes once. What adds up repeated indices?")
 def each_pair_once(y_true, y_pred, num_classes, ignore):
     n = np.zeros((num_classes, num_classes), np.int64)

@@ -45,16 +45,6 @@ def boundary_of_heights(means, sigma, counts, w):
     return float((means[0] + means[1]) / 2 - sigma**2 / (means[1] - means[0]) * np.log(odds))
 
 
-@wrong(QUESTION, "Raise a weight: which way must the boundary move?")
-def boundary_without_weights(means, sigma, counts, w):
-    return boundary(means, sigma, counts, np.ones(2))
-
-
-@wrong(QUESTION, "With equal weights a rare class still needs stronger evidence.")
-def boundary_without_counts(means, sigma, counts, w):
-    return boundary(means, sigma, np.ones(2), w)
-
-
 @wrong(QUESTION, "The exponent of a Gaussian has sigma squared in it.")
 def boundary_sigma(means, sigma, counts, w):
     return boundary(means, np.sqrt(sigma), counts, w)

@@ -65,11 +65,6 @@ def weights_of_mean_one_over_classes(counts, power):
     return w
 
 
-@wrong(QUESTION, "Which class should weigh more, the rare or the frequent?")
-def weights_of_frequency(counts, power):
-    return class_weights(counts, -power)
-
-
 @wrong(QUESTION, "For power 0 all weights are 1: does yours use the power?")
 def weights_always_inverse(counts, power):
     return class_weights(counts, 1.0)

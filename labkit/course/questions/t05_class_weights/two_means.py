@@ -37,11 +37,6 @@ def losses_and_weights(z, y, w):
     return -log_p[np.arange(len(y)), y], w[y]
 
 
-@wrong(QUESTION, "The number of pixels first, then the sum of their weights.")
-def means_swapped(z, y, w):
-    return two_means(z, y, w)[::-1]
-
-
 @wrong(QUESTION, "Let one pixel of weight 10 be the whole batch: its second mean is as if it had no weight.")
 def means_the_same(z, y, w):
     loss, weight = losses_and_weights(z, y, w)

@@ -36,11 +36,6 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Is the rare class more likely after your change, or less?")
-def undo_twice(z, w, share):
-    return z + share * np.log(w)
-
-
 @wrong(QUESTION, "A factor of a probability is a summand of its logarithm: which?")
 def undo_subtracting_weights(z, w, share):
     return z - share * w
@@ -65,8 +60,3 @@ def undo_share_inside(z, w, share):
 def undo_as_probabilities(z, w, share):
     p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True)) / w**share
     return p / p.sum(axis=-1, keepdims=True)
-
-
-@wrong(QUESTION, "The weights belong to the last axis, the classes.")
-def undo_over_pixels(z, w, share):
-    return z - share * np.log(np.resize(w, z.shape[:-1]))[..., None]

@@ -47,12 +47,6 @@ def pixel_weights(y, w):
     return np.where(y == 255, 0.0, w[np.where(y == 255, 0, y)])[..., None]
 
 
-@wrong(QUESTION, "All weights 1 and all weights 10: does yours change?")
-def grad_of_plain_loss(z, y, w):
-    p, Y, counted = parts(z, y)
-    return (p - Y) * counted
-
-
 @wrong(QUESTION, "One pixel has one weight, that of its true class, and it scales all of its entries alike.")
 def grad_weighted_by_column(z, y, w):
     p, Y, counted = parts(z, y)
@@ -77,17 +71,7 @@ def grad_over_sum_of_weights(z, y, w):
     return weighted_grad(z, y, w) / max(pixel_weights(y, w).sum(), 1e-9)
 
 
-@wrong(QUESTION, "The loss is summed over the pixels: your gradient is N times too small.")
-def grad_of_mean(z, y, w):
-    return weighted_grad(z, y, w) / max(np.count_nonzero(y != 255), 1)
-
-
 @wrong(QUESTION, "A pixel labelled 255 has no class, so it has no weight.")
 def grad_of_ignored_too(z, y, w):
     p, Y, _ = parts(z, y)
     return w[np.where(y == 255, 0, y)][..., None] * (p - Y)
-
-
-@wrong(QUESTION, "A heavier pixel should pull more, not less.")
-def grad_divided_by_weights(z, y, w):
-    return weighted_grad(z, y, 1.0 / w)

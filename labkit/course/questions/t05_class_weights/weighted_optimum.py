@@ -47,11 +47,6 @@ def optimum_not_normalised(p, w):
     return w * p
 
 
-@wrong(QUESTION, "A heavier class should end with more probability, not less.")
-def optimum_divided(p, w):
-    return weighted_optimum(p, 1.0 / w)
-
-
 @wrong(QUESTION, "Normalise over the classes, the last axis.")
 def optimum_over_pixels(p, w):
     q = w * p

@@ -85,12 +85,6 @@ def holes_at_the_camera(depth, K):
     return np.nan_to_num(holes(depth)) * rays(depth.shape, K)
 
 
-@wrong(QUESTION, "K takes a point to a pixel; which way do you want to go?")
-def K_not_inverted(depth, K):
-    v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    return holes(depth) * (np.dstack([u, v, np.ones(depth.shape)]) @ K.T)
-
-
 @wrong(QUESTION, "x is right and y is not: which entry of K belongs to the rows?")
 def one_focal_length(depth, K):
     return back_project(depth, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]))

@@ -56,16 +56,6 @@ def unit_ray(u, v, d, K):
     return np.stack([du, dv, dd / np.linalg.norm(dd)], axis=1)
 
 
-@wrong(QUESTION, "In which direction does K lead, and in which does P?")
-def times_K(u, v, d, K):
-    return np.column_stack([d * K[:, 0], d * K[:, 1], K @ (u, v, 1.0)])
-
-
-@wrong(QUESTION, "Each column is one derivative, of all three coordinates; you have it in a row.")
-def transposed(*arguments):
-    return back_projection_jacobian(*arguments).T
-
-
 @wrong(QUESTION, "Only on the optical axis does depth move a point along z alone; where is this pixel?")
 def ray_straight_ahead(u, v, d, K):
     return straight_ahead(u, v, d, K)

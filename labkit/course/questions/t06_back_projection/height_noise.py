@@ -69,16 +69,6 @@ def along_the_camera(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return shares(u, v, d, K, np.eye(4), sigma_pixel, sigma_depth)[2]
 
 
-@wrong(QUESTION, "z of the base frame is one number of R P + t: does a row or a column of R make it?")
-def column_of_the_rotation(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    return np.linalg.norm(shares(u, v, d, K, T_base_cam.T, sigma_pixel, sigma_depth))
-
-
-@wrong(QUESTION, "With sigma_depth = 0 you get no noise at all: what of u and v?")
-def depth_only(*arguments):
-    return np.abs(shares(*arguments)[2])
-
-
 @wrong(QUESTION, "An error of depth moves the point along its ray, and off the optical axis that is not the z axis.")
 def ray_straight_ahead(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = straight_ahead(u, v, d, K)

@@ -68,8 +68,3 @@ def principal_point_in_the_middle_of_the_pixels(fov_y, width, height):
 @wrong(QUESTION, "u runs along the width: in which row of K does W / 2 belong?")
 def cx_and_cy_swapped(fov_y, width, height):
     return with_centre(fov_y, width, height, height / 2 - 1, width / 2)
-
-
-@wrong(QUESTION, "K is upper triangular: K (x, y, z) = z (u, v, 1).")
-def transposed(*arguments):
-    return intrinsics(*arguments).T

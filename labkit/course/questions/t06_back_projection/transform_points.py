@@ -50,25 +50,9 @@ def rotation_transposed(T, P):
     return P @ T[:3, :3] + T[:3, 3]
 
 
-@wrong(QUESTION, "Where does the camera's own position (0, 0, 0) land?")
-def no_translation(T, P):
-    return P @ T[:3, :3].T
-
-
 @wrong(QUESTION, "Rotate first, then translate: what does T (0, 0, 0, 1) give?")
 def translated_first(T, P):
     return (P + T[:3, 3]) @ T[:3, :3].T
-
-
-@wrong(QUESTION, "You went from base to camera coordinates, as a view matrix does: where must (0, 0, 0) land?")
-def inverse(T, P):
-    return (P - T[:3, 3]) @ T[:3, :3]
-
-
-@wrong(QUESTION, "The last row of T is 0 0 0 1, and the translation stands in the last column: which did you read?")
-def row_major(T, P):
-    """Read T as if its rows were its columns: the rotation is turned round and the translation is lost."""
-    return P @ T[:3, :3] + T[3, :3]
 
 
 @wrong(QUESTION, "Check the sign: (0, 0, 0) must land on t.")

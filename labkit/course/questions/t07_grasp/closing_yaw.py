@@ -56,11 +56,6 @@ def yaw_of(axis):
     return np.arctan2(axis[1], axis[0])
 
 
-@wrong(QUESTION, "You close the jaws along the long side: they have 80 mm. In what order does eigh give its axes?")
-def along_the_long_side(Sigma):
-    return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 1])
-
-
 @wrong(QUESTION, "Check Sigma @ v against w * v for the v that you took: is an eigenvector a row or a column?")
 def axes_as_rows(Sigma):
     return yaw_of(np.linalg.eigh(Sigma)[1][0])
@@ -90,11 +85,6 @@ def middle_of_three(Sigma):
 def yaw_with_x_and_y_swapped(Sigma):
     x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, 0]
     return np.arctan2(x, y)
-
-
-@wrong(QUESTION, "The kit's angles are radians.")
-def yaw_in_degrees(Sigma):
-    return np.degrees(closing_yaw(Sigma))
 
 
 @wrong(QUESTION, "Turn the object by 10 degrees: your yaw turns by 20. The formula gives twice the angle.")

@@ -68,11 +68,6 @@ def tips_taken_off(P, table_z, palm, tips, clearance):
     return grasp_height(P, table_z, palm, -tips, clearance)
 
 
-@wrong(QUESTION, "The base frame's origin is the robot's foot; the table has a height of its own.")
-def table_at_zero(P, table_z, palm, tips, clearance):
-    return grasp_height(P, 0.0, palm, tips, clearance)
-
-
 @wrong(QUESTION, "A bottle is taller than the fingers are long: what does its top meet?")
 def palm_forgotten(P, table_z, palm, tips, clearance):
     return max(P[:, 2].min(), table_z + clearance) + tips
@@ -86,8 +81,3 @@ def unseen_depth(P, table_z, palm, tips, clearance):
 @wrong(QUESTION, "Each bound says: not lower than this. Which of them satisfies all?")
 def least_of_the_bounds(P, table_z, palm, tips, clearance):
     return min(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
-
-
-@wrong(QUESTION, "Your tips touch the table: what is `clearance` for?")
-def clearance_forgotten(P, table_z, palm, tips, clearance):
-    return grasp_height(P, table_z, palm, tips, 0.0)

@@ -70,23 +70,6 @@ def approach_from_below(position, yaw):
     return pose(np.cross(unit(yaw), -DOWN), unit(yaw), -DOWN, position)
 
 
-@wrong(QUESTION, "The jaws close along the frame's y axis; you put the direction into x.")
-def closing_along_x(position, yaw):
-    return pose(unit(yaw), np.cross(DOWN, unit(yaw)), DOWN, position)
-
-
 @wrong(QUESTION, "Right at 0 and 90 degrees, mirrored between: what is the closing direction at 45 degrees?")
 def yaw_the_other_way(position, yaw):
     return grasp_pose(position, -yaw)
-
-
-@wrong(QUESTION, "The yaw comes in radians already.")
-def yaw_as_degrees(position, yaw):
-    return grasp_pose(position, np.radians(yaw))
-
-
-@wrong(QUESTION, "Is your last row 0 0 0 1? The position is the last column.")
-def position_in_the_last_row(position, yaw):
-    T = grasp_pose(np.zeros(3), yaw)
-    T[3, :3] = position
-    return T

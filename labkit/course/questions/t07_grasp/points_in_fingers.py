@@ -111,11 +111,6 @@ def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
     return int(inside.sum())
 
 
-@wrong(QUESTION, "`width` is from pad to pad: how far is a pad from the middle?")
-def pads_at_the_whole_width(P, T_base_grasp, width, half, thickness, tips):
-    return points_in_fingers(P, T_base_grasp, 2.0 * width, half, thickness, tips)
-
-
 @wrong(QUESTION, "The jaws close along the frame's y; along x they have the fingers' breadth.")
 def closing_axis_taken_for_x(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))

@@ -41,21 +41,6 @@ def extent(values):
     return values.max() - values.min()
 
 
-@wrong(QUESTION, "At yaw 0 the jaws close along x: your width is that along y.")
-def width_along(P, yaw):
-    return extent(P[:, 1] * np.cos(yaw) - P[:, 0] * np.sin(yaw))
-
-
-@wrong(QUESTION, "Right at 0 and 90 degrees, wrong between: the unit vector at the angle yaw is (cos, sin).")
-def width_turned_the_other_way(P, yaw):
-    return extent(P[:, 0] * np.cos(yaw) - P[:, 1] * np.sin(yaw))
-
-
-@wrong(QUESTION, "The yaw comes in radians already.")
-def width_in_degrees(P, yaw):
-    return extent(P[:, 0] * np.cos(np.radians(yaw)) + P[:, 1] * np.sin(np.radians(yaw)))
-
-
 @wrong(QUESTION, "Your width does not depend on yaw: measure along the direction in which the jaws close.")
 def width_without_turning(P, yaw):
     return max(extent(P[:, 0]), extent(P[:, 1]))

@@ -69,22 +69,6 @@ def padding_as_pixels(data, height, width, step, is_bigendian):
     return metres(numbers[: height * width].reshape(height, width))
 
 
-@wrong(QUESTION, "Half of the messages come out as noise. What does is_bigendian say about the first of two bytes?")
-def always_little(data, height, width, step, is_bigendian):
-    return metres(units(data, height, width, step, "<"))
-
-
-@wrong(QUESTION, "Do one pixel by hand: bytes 1, 2, little-endian. Which of the two counts 256ths?")
-def order_swapped(data, height, width, step, is_bigendian):
-    return metres(units(data, height, width, step, "<" if is_bigendian else ">"))
-
-
-@wrong(QUESTION, "A table 800 m away? 16UC1 counts millimetres, the kit metres.")
-def still_millimetres(data, height, width, step, is_bigendian):
-    numbers = units(data, height, width, step, ">" if is_bigendian else "<")
-    return np.where(numbers > 0, numbers, np.nan)
-
-
 @wrong(QUESTION, "A 0 says that the sensor saw nothing there. As a distance it would be inside the lens.")
 def zero_is_a_distance(data, height, width, step, is_bigendian):
     return units(data, height, width, step, ">" if is_bigendian else "<") * 0.001

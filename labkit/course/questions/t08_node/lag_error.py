@@ -48,11 +48,6 @@ def place(stamps, positions, when):
     return np.array([np.interp(when, stamps, positions[:, axis]) for axis in range(3)])
 
 
-@wrong(QUESTION, "The arm's maker quotes millimetres, and so does this function.")
-def lag_in_metres(stamps, positions, taken, used):
-    return np.linalg.norm(place(stamps, positions, used) - place(stamps, positions, taken))
-
-
 @wrong(QUESTION, "Between two samples the object does not stand still: it is part of the way along.")
 def nearest_sample(stamps, positions, taken, used):
     here, there = (positions[np.abs(stamps - when).argmin()] for when in (taken, used))

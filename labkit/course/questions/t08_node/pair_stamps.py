@@ -76,11 +76,6 @@ def no_bound(a, b, slop):
     return pairs(a, b, np.iinfo(np.int64).max, lambda x, y: np.abs(x - y))
 
 
-@wrong(QUESTION, "Stamps that are exactly slop apart still belong together.")
-def strictly_within(a, b, slop):
-    return pairs(a, b, slop - 1, lambda x, y: np.abs(x - y))
-
-
 @wrong(QUESTION, "Depth may be stamped a little later than colour as well as a little earlier.")
 def never_later(a, b, slop):
     far = np.iinfo(np.int64).max

@@ -77,11 +77,6 @@ def scalar_first(R):
     return np.roll(right_quaternion(R), 1)
 
 
-@wrong(QUESTION, "All turns go the other way round: try a quarter turn about z, where R[1, 0] is +1.")
-def inverse_turn(R):
-    return right_quaternion(R.T)
-
-
 @wrong(QUESTION, "The axis and the angle say it, too, but what is the length?")
 def rotation_vector(R):
     q = right_quaternion(R)
@@ -95,11 +90,6 @@ def rotation_vector(R):
 def whole_angle(R):
     x, y, z, angle = rotation_vector(R)
     return np.array([*(np.sin(angle) * np.array([x, y, z])), np.cos(angle)])
-
-
-@wrong(QUESTION, "What is the length of a rotation's quaternion?")
-def doubled(R):
-    return 2.0 * right_quaternion(R)
 
 
 @wrong(QUESTION, "The diagonal of R gives the squares alone; the signs stand beside it.")

@@ -68,27 +68,9 @@ def chosen(distance, allowed):
     return 1 + int(np.where(allowed, distance, np.inf).argmin()) if np.any(allowed) else 0
 
 
-@wrong(
-    QUESTION, "A difference of 1 in area and one of 1 in shape are not equally unusual: who knows how much each varies?"
-)
-def chosen_euclidean(features, mean, covariance, allowed):
-    return chosen(((features - mean) ** 2).sum(axis=1), allowed)
-
-
 @wrong(QUESTION, "Your distance does not know that two features go together: what stands off the diagonal?")
 def chosen_by_spread(features, mean, covariance, allowed):
     return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
-
-
-@wrong(QUESTION, "What varies much should count little: yours weighs it most.")
-def chosen_without_inverse(features, mean, covariance, allowed):
-    off = features - mean
-    return chosen((off @ covariance * off).sum(axis=1), allowed)
-
-
-@wrong(QUESTION, "A typical piece is near the mean, not far off.")
-def chosen_unlikeliest(features, mean, covariance, allowed):
-    return 1 + int(np.where(allowed, distances(features, mean, covariance), -np.inf).argmax()) if allowed.any() else 0
 
 
 @wrong(QUESTION, "Pieces count from 1; 0 says that there is none.")

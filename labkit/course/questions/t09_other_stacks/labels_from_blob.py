@@ -58,11 +58,6 @@ def last_of_equals(scores):
     return scores.shape[1] - 1 - scores[0, ::-1].argmax(axis=0)
 
 
-@wrong(QUESTION, "Is a score good when it is large, or when it is small?")
-def worst_class(scores):
-    return scores[0].argmin(axis=0)
-
-
 @wrong(QUESTION, "Background is a class like any other.")
 def without_class_0(scores):
     return scores[0, 1:].argmax(axis=0) + 1

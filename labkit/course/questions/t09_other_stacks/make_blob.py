@@ -46,11 +46,6 @@ def blob_still_bgr(bgr):
     return scaled(bgr.transpose(2, 0, 1)[None])
 
 
-@wrong(QUESTION, "The network was trained on 0..1: what is the largest value of yours?")
-def blob_in_bytes(bgr):
-    return bgr[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32)
-
-
 @wrong(
     QUESTION, "The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?"
 )
