@@ -5,6 +5,8 @@
 #   make release generate labs/ from solutions/
 #   make train   make the data again and train the shipped weights again (over an hour on two cores)
 #   make stacks  build the same in C++, Java and Octave where they are installed, and compare
+#   make ros2    set up .venv-ros2 with wheels of ROS 2, then the node beside a simulated camera, until Ctrl-C
+#   make test-ros2  the tests of ROS 2, there
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
 #   make clean   remove what can be made again in seconds; environments and data/ stay
@@ -14,7 +16,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks bench fresh clean
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench fresh clean
 
 BIN := .venv/bin
 ARGS ?=
@@ -36,6 +38,13 @@ release: .venv/installed
 
 stacks: .venv/installed
 	$(BIN)/python -m pytest -q tests/stacks/test_programs.py $(ARGS)
+
+ros2: .venv-ros2/installed
+	.venv-ros2/bin/labkit node --ros --sim $(ARGS)
+
+test-ros2: export OMP_NUM_THREADS := 1
+test-ros2: .venv-ros2/installed
+	.venv-ros2/bin/python -m pytest tests/node/test_ros2.py $(ARGS)
 
 bench: .venv-bench/installed
 	.venv-bench/bin/python -m tests.bench.run $(ARGS)
@@ -68,11 +77,14 @@ train: .venv/installed
 .venv/installed: EXTRAS := course,instructor,stacks,test
 .venv/installed-lab: EXTRAS := course,stacks
 .venv-bench/installed: EXTRAS := course,instructor,stacks,test,bench
+.venv-ros2/installed: EXTRAS := stacks,test
+.venv-ros2/installed: MORE := -r constraints-ros2.txt
+.venv-ros2/installed: constraints-ros2.txt
 
 # A file `installing` is there while an installation runs and becomes `installed` when it ends. One that was killed leaves
 # `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
 # A changed pyproject.toml or constraints.txt only installs the difference.
-.venv/installed .venv/installed-lab .venv-bench/installed: pyproject.toml constraints.txt
+.venv/installed .venv/installed-lab .venv-bench/installed .venv-ros2/installed: pyproject.toml constraints.txt
 	@is_right='import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))'
 	for python in $(or $(PYTHON),python3.11 python3 python) ""; do
 	    if "$$python" -c "$$is_right" 2>/dev/null; then break; fi
@@ -91,5 +103,5 @@ train: .venv/installed
 	install() { $(@D)/bin/python -m pip install --disable-pip-version-check "$$@"; }
 	if [ -n "$(TORCH_INDEX)" ]; then install --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"; fi
 	install -c constraints.txt setuptools
-	install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]'
+	install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]' $(MORE)
 	mv $(@D)/installing $@

@@ -204,25 +204,37 @@ def perceive(
         typer.echo(f"wrote {path}")
 
 
-@app.command()
+@app.command(context_settings={"ignore_unknown_options": True})
 def node(
+    extra: Annotated[
+        list[str] | None, typer.Argument(metavar="[--ros-args ...]", help="ROS's own arguments, behind all others.")
+    ] = None,
     sim: Annotated[bool, typer.Option("--sim", help="Rehearse in this process: camera, node, and an arm.")] = False,
-    ros: Annotated[bool, typer.Option("--ros", help="Run on ROS 1 until SIGINT.")] = False,
+    ros: Annotated[bool, typer.Option("--ros", help="Run on ROS 2 until SIGINT; with --sim also a camera.")] = False,
+    ros1: Annotated[bool, typer.Option("--ros1", help="The same on ROS 1.")] = False,
     bag: Annotated[
         Path | None, typer.Option(help="Answer the frames of a bag: NAME.bag, or a folder of ROS 2.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="The bag to write, of either kind.")] = None,
+    storage: Annotated[str, typer.Option(help="How ROS 2 shall hold it: mcap or sqlite3.")] = "mcap",
     seed: Annotated[int, typer.Option(help="Seed of the scene of --sim.", min=0)] = 0,
     model: Model = "unet",
     engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch",
     mirror: Annotated[bool, typer.Option(help="Look at the mirror image, too: better, at twice the time.")] = True,
     crf: Refine = False,
     target: Annotated[int, typer.Option(help="The class to grasp.")] = 2,
-    table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
+    table_z: Annotated[
+        float | None, typer.Option(help="Height of the table in the base frame, metres; else 0.")
+    ] = None,
     camera_pose: Annotated[
         str | None, typer.Option(help='Where the camera stands in the base frame, "x y z qx qy qz qw"; else /tf says.')
     ] = None,
     base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link",
+    slop: Annotated[float, typer.Option(help="How far the stamps of a frame may lie apart, seconds.")] = 0.02,
+    depth_scale: Annotated[float, typer.Option(help="Metres per unit of 16-bit depth.")] = 0.001,
+    qos_inputs: Annotated[str, typer.Option(help="What to ask of cameras: best_effort or reliable.")] = "best_effort",
+    qos_outputs: Annotated[str, typer.Option(help="What to offer: reliable or best_effort.")] = "reliable",
+    qos_depth: Annotated[int, typer.Option(help="Messages that are kept for a slow reader.")] = 10,
     topic: Annotated[list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image, mask=/my/mask ...")] = None,
     probabilities: Annotated[
         bool, typer.Option("--probabilities", help="Write class probabilities to OUT, too.")
@@ -231,21 +243,25 @@ def node(
     """Run the segmentation node: on a simulated scene, on a bag, or on ROS."""
     from labkit.apps import node_command as command
 
-    if (sim, ros, bag is not None).count(True) != 1:
-        raise ValueError("node: expected one of --sim, --ros and --bag")
+    on_ros = ros or ros1
+    if (sim and not on_ros, ros, ros1, bag is not None).count(True) != 1:
+        raise ValueError("node: expected one of --sim, --ros, --ros1 and --bag, or --sim beside one of ROS")
     if (bag is None) != (out is None):
         raise ValueError("out: expected --out with --bag, and only with it")
-    settings = command.Settings(
-        model, engine, crf, target, table_z, camera_pose, base_frame, tuple(topic or ()), mirror
-    )
+    if extra and not (on_ros and extra[0] == "--ros-args"):
+        raise ValueError(f"node: expected options of `labkit node --help`, and ROS's behind --ros-args, got {extra[0]}")
+    given = (model, engine, crf, target, table_z, camera_pose, base_frame, mirror, slop, depth_scale)
+    settings = command.Settings(*given, qos_inputs, qos_outputs, qos_depth, tuple(topic or ()))
     if sim:
-        from data_gen import sample_scene
+        from data_gen import render, sample_scene
 
-        typer.echo(command.rehearse(settings, sample_scene(seed, "test")))
-    elif ros:
-        command.run_on_ros(settings)
+        spec = sample_scene(seed, "test")
+    if on_ros:
+        command.run_on_ros(settings, 1 if ros1 else 2, extra or [], render(spec, (320, 240)) if sim else None)
+    elif sim:
+        typer.echo(command.rehearse(settings, spec))
     else:
-        line, answered = command.answer_bag(settings, bag, out, probabilities)
+        line, answered = command.answer_bag(settings, bag, out, probabilities, storage)
         typer.echo(line)
         raise typer.Exit(0 if answered else 1)
 

@@ -1,43 +1,58 @@
 """What `labkit node` does: turn the command's words into a pipeline and a node, and say in a line what happened."""
 
 import re
-from dataclasses import dataclass, fields, replace
+import threading
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import repeat
 
-from labkit.node import ros, ros1
+from labkit.frame import RGBDFrame
+from labkit.node import ros
+from labkit.node.actors import Camera
 from labkit.node.bags import process
 from labkit.node.convert import rigid
-from labkit.node.messages import DEFAULT_TOPICS, Topics
+from labkit.node.messages import DEFAULT_TOPICS, ROS_TOPICS, Topics
 from labkit.node.rehearsal import camera_to_lift
-from labkit.node.segmentation import Counts
+from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.pipeline import Pipeline
+
+SIMULATED_RATE = 5.0  # frames per second of --ros --sim
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The options that --sim, --ros and --bag share, as they were typed; `labkit node --help` explains them."""
+    """The options that --sim, --ros and --bag share, as they were typed; `labkit node --help` explains them.
+
+    With --ros each is also a ROS parameter of the same name, which wins.
+    """
 
     model: str = "unet"
     engine: str = "torch"
     crf: bool = False
     target: int = 2
-    table_z: float = 0.0
+    table_z: float | None = None
     camera_pose: str | None = None
     base_frame: str = "base_link"
-    renamed: tuple[str, ...] = ()
     mirror: bool = True
+    slop: float = 0.02
+    depth_scale: float = 0.001
+    qos_inputs: str = "best_effort"
+    qos_outputs: str = "reliable"
+    qos_depth: int = 10
+    renamed: tuple[str, ...] = ()
 
     def pipeline(self, table_z: float | None = None) -> Pipeline:
-        """The pipeline that is asked for; table_z: the height of the table, if it is known better."""
+        """The pipeline that is asked for; table_z: the height of the table, if none is asked for."""
         from labkit.network import load_model, weights_path
 
         path = weights_path(self.model)
         model = path if path.suffix == ".onnx" else load_model(path)
-        height = self.table_z if table_z is None else table_z
+        height = table_z if self.table_z is None else self.table_z
         return Pipeline(model, height, self.target, mirror=self.mirror, engine=self.engine, crf=self.crf)
 
-    def node(self) -> dict:
-        """The options of SegmentationNode."""
-        return {"T_base_cam": self.T_base_cam(), "base_frame": self.base_frame, "topics": self.topics()}
+    def node(self, topics: Topics = DEFAULT_TOPICS) -> dict:
+        """The options of SegmentationNode; topics: their names where they are not renamed."""
+        given = {"base_frame": self.base_frame, "slop": self.slop, "depth_scale": self.depth_scale}
+        return given | {"T_base_cam": self.T_base_cam(), "topics": self.topics(topics)}
 
     def T_base_cam(self):
         """The camera's pose as a matrix, or None; raises ValueError if it is not seven numbers with a unit quaternion.
@@ -45,7 +60,7 @@ class Settings:
         >>> Settings(camera_pose="0.5 0 0.8 1 0 0 0").T_base_cam()[:3, 3].tolist()
         [0.5, 0.0, 0.8]
         """
-        if self.camera_pose is None:
+        if not self.camera_pose:
             return None
         words = re.split(r"[\s,]+", self.camera_pose.strip())
         try:
@@ -56,7 +71,7 @@ class Settings:
             raise ValueError(f"camera_pose: expected seven numbers, x y z qx qy qz qw, got {self.camera_pose!r}")
         return rigid(numbers[:3], numbers[3:])
 
-    def topics(self) -> Topics:
+    def topics(self, default: Topics = DEFAULT_TOPICS) -> Topics:
         """The names of the topics; raises ValueError for a renaming of one that there is not.
 
         >>> Settings(renamed=("rgb=/left/image",)).topics().rgb
@@ -67,7 +82,7 @@ class Settings:
         for name, _, topic in named:
             if name not in known or not topic:
                 raise ValueError(f"topic: expected NAME=TOPIC with NAME of {', '.join(known)}, got {name}={topic}")
-        return replace(DEFAULT_TOPICS, **{name: topic for name, _, topic in named})
+        return replace(default, **{name: topic for name, _, topic in named})
 
 
 def rehearse(settings: Settings, spec) -> str:
@@ -75,16 +90,30 @@ def rehearse(settings: Settings, spec) -> str:
     return camera_to_lift(spec, settings.pipeline(spec.table.z))
 
 
-def run_on_ros(settings: Settings) -> Counts | None:
-    """Run on ROS until SIGINT."""
-    options = settings.node()
-    ros1.ros("rospy")  # what is missing is said before the weights are loaded
-    return ros.run(settings.pipeline(), **options)
+def run_on_ros(settings: Settings, version: int = 2, arguments=(), frame: RGBDFrame | None = None) -> Counts | None:
+    """Run on ROS until SIGINT. version: 2 or 1. arguments: ROS's own. frame: what a simulated camera shall publish."""
+    settings.node(), ros.require(version)  # what is wrong or missing is said before anything else happens
+
+    def build(transport, stop: threading.Event) -> SegmentationNode:
+        chosen = settings
+        if version == 2:
+            parameters = asdict(settings)
+            del parameters["renamed"]  # ROS has remappings
+            chosen = replace(settings, **transport.parameters(parameters))
+            transport.quality(chosen.qos_inputs, chosen.qos_outputs, chosen.qos_depth)
+        options = chosen.node(ROS_TOPICS)
+        if frame is not None:
+            camera = Camera(transport, base_frame=chosen.base_frame, topics=options["topics"])
+            threading.Thread(target=camera.run, args=(repeat(frame), SIMULATED_RATE, stop), daemon=True).start()
+        return SegmentationNode(chosen.pipeline(frame and frame.table_z), transport, **options)
+
+    return ros.run(build, version=version, arguments=arguments)
 
 
-def answer_bag(settings: Settings, bag, out, probabilities: bool) -> tuple[str, bool]:
+def answer_bag(settings: Settings, bag, out, probabilities: bool, storage: str = "mcap") -> tuple[str, bool]:
     """Answer the frames of a bag; a line, and whether any frame was answered."""
-    counts = process(bag, out, settings.pipeline(), probabilities=probabilities, **settings.node())
+    options = {"probabilities": probabilities, "storage": storage} | settings.node()
+    counts = process(bag, out, settings.pipeline(), **options)
     bad = f"{counts.lost} lost, {counts.failed} unusable, {counts.skipped} malformed messages"
     reasons = ", ".join(f"{reason} ({n})" for reason, n in counts.reasons.most_common(5))
     line = f"wrote {out}: {counts.answered} frames answered, {bad}" + (f": {reasons}" if reasons else "")

@@ -61,7 +61,7 @@ class Camera:
 
     def publish(self, frame: RGBDFrame, stamp: int | None = None) -> None:
         """Publish one frame; stamp in nanoseconds, default now."""
-        header = Header(time.time_ns() if stamp is None else stamp, self.frame_id)
+        header = Header(self.transport.now() if stamp is None else stamp, self.frame_id)
         pose = convert.encode_pose(frame.T_base_cam, Header(header.stamp, self.base_frame))
         where = Transform(pose.header, self.frame_id, pose.position, pose.orientation)
         depth = frame.depth

@@ -1,6 +1,7 @@
 """Bags of ROS 1 and ROS 2 through `rosbags`, without ROS: the node answers what a bag holds and writes another.
 
-A bag is a file NAME.bag in ROS 1, and a folder in ROS 2 (topic 08).
+A bag is a file NAME.bag in ROS 1. In ROS 2 it is a folder, as `ros2 bag record` writes it, with messages in a file of
+MCAP or of SQLite; either file is read on its own, too (topic 08).
 """
 
 from collections.abc import Callable
@@ -9,31 +10,51 @@ from pathlib import Path
 
 from rosbags import rosbag1, rosbag2
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.typesys import Stores, get_typestore
 from tqdm.auto import tqdm
 
+from labkit.node.bus import Transport
 from labkit.node.messages import DEFAULT_TOPICS, Message, Topics, Transforms
 from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.node.transforms import TransformTree
 from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline
 
+STORAGES = {"mcap": rosbag2.StoragePlugin.MCAP, "sqlite3": rosbag2.StoragePlugin.SQLITE3}
+FOREVER = QosTime(0, 0)
+RELIABLE = Qos(
+    history=QosHistory.KEEP_LAST,
+    depth=10,
+    reliability=QosReliability.RELIABLE,
+    durability=QosDurability.VOLATILE,
+    deadline=FOREVER,
+    lifespan=FOREVER,
+    liveliness=QosLiveliness.AUTOMATIC,
+    liveliness_lease_duration=FOREVER,
+    avoid_ros_namespace_conventions=False,
+)
 
-class BagWriter:
+
+class BagWriter(Transport):
     """A transport that writes what is published to a bag, at each message's own stamp; a context manager.
 
-    path: NAME.bag for ROS 1, else a new folder for ROS 2. wants: topics to write that are made only if wanted. Raises
-    FileExistsError rather than write over anything.
+    path: NAME.bag for ROS 1, else a new folder for ROS 2. wants: topics to write that are made only if wanted. storage:
+    of ROS 2, "mcap" or "sqlite3". Raises FileExistsError rather than write over anything, ValueError for another
+    storage.
     """
 
-    def __init__(self, path, wants=()):
+    def __init__(self, path, wants=(), storage: str = "mcap"):
+        if storage not in STORAGES:
+            raise ValueError(f"storage: expected one of {', '.join(STORAGES)}, got {storage!r}")
         self.path, self.wants = Path(path), frozenset(wants)
         if self.path.exists():
             raise FileExistsError(17, "it is there already", str(self.path))
         self.path.parent.mkdir(parents=True, exist_ok=True)
         ros1 = self.path.suffix == ".bag"
         self._wire = Wire(ros1)
-        self._writer = rosbag1.Writer(self.path) if ros1 else rosbag2.Writer(self.path, version=8)
+        newest = {"version": 9, "storage_plugin": STORAGES[storage]}
+        self._writer = rosbag1.Writer(self.path) if ros1 else rosbag2.Writer(self.path, **newest)
         self._connections = {}
 
     def __enter__(self) -> "BagWriter":
@@ -46,8 +67,12 @@ class BagWriter:
     def advertise(self, topic: str, kind: type) -> None:
         """Prepare a topic, so that it is in the bag even without messages."""
         if topic not in self._connections:
-            store = self._wire.store
-            self._connections[topic] = self._writer.add_connection(topic, TYPES[kind], typestore=store)
+            # What `ros2 bag play` shall offer: static transforms also to those who come late.
+            durability = QosDurability.TRANSIENT_LOCAL if topic.endswith("/tf_static") else QosDurability.VOLATILE
+            qos = {} if self._wire.ros1 else {"offered_qos_profiles": [RELIABLE._replace(durability=durability)]}
+            self._connections[topic] = self._writer.add_connection(
+                topic, TYPES[kind], typestore=self._wire.store, **qos
+            )
 
     def publish(self, topic: str, message: Message) -> None:
         """Write a message."""
@@ -66,8 +91,8 @@ class BagWriter:
 class _Between(BagWriter):
     """A transport between two bags: messages of the one are delivered, those of the node written to the other."""
 
-    def __init__(self, path, wants=()):
-        super().__init__(path, wants)
+    def __init__(self, path, wants=(), storage="mcap"):
+        super().__init__(path, wants, storage)
         self.callbacks = {}
 
     def subscribe(self, topic, kind, callback):
@@ -81,14 +106,15 @@ def process(
     *,
     topics: Topics = DEFAULT_TOPICS,
     probabilities: bool = False,
+    storage: str = "mcap",
     progress: bool = True,
     **options,
 ) -> Counts:
     """Answer every frame of a bag and write the results to another; returns what became of messages and frames.
 
-    source, out: bags of ROS 1 or ROS 2, told by their names. probabilities: write those, too. options: those of
-    SegmentationNode. Transforms may stand anywhere in the bag. Raises FileNotFoundError, FileExistsError, or ValueError
-    if the bag cannot be read or lacks one of the camera's topics.
+    source, out: bags of ROS 1 or ROS 2, told by their names. probabilities: write those, too. storage: as in BagWriter.
+    options: those of SegmentationNode. Transforms may stand anywhere in the bag. Raises FileNotFoundError,
+    FileExistsError, or ValueError if the bag cannot be read or lacks one of the camera's topics.
     """
     needed = [topics.rgb, topics.depth, topics.info]
     with _reader(Path(source)) as reader:
@@ -96,7 +122,7 @@ def process(
         if missing := [topic for topic in needed if topic not in there]:
             found = ", ".join(sorted(there)) or "none"
             raise ValueError(f"topics: expected {', '.join(missing)} in {source}, got {found}")
-        with _Between(out, {topics.probabilities} if probabilities else ()) as between:
+        with _Between(out, {topics.probabilities} if probabilities else (), storage) as between:
             # All transforms come first, for an image may ask for one that was recorded after it; then none will come.
             tree = TransformTree(seconds=float("inf"))
             node = SegmentationNode(pipeline, between, topics=topics, tree=tree, patience=0.0, **options)

@@ -1,14 +1,46 @@
-"""A transport within one process: topics by name, delivered at once, in the publisher's thread."""
+"""What a node needs of a transport, and the simplest one: topics within one process."""
 
 import threading
+import time
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable
 
 
-class Bus:
-    """What a node needs of a transport: `advertise`, `publish`, `subscribe`, and `wanted`.
+class Transport(ABC):
+    """Topics by name. The bus, the edges to ROS and to bags: a node does not know which one it uses (topic 08)."""
 
-    The edges to ROS and to bags have the same four methods, so that nodes do not know which one they use.
+    @abstractmethod
+    def advertise(self, topic: str, kind: type) -> None:
+        """Say that messages of the class `kind` are going to be published on a topic."""
+
+    @abstractmethod
+    def subscribe(self, topic: str, kind: type, callback: Callable) -> None:
+        """Call `callback` with every message of a topic from now on; with a ValueError for one that cannot be read."""
+
+    @abstractmethod
+    def publish(self, topic: str, message) -> None:
+        """Send a message to all who have subscribed."""
+
+    @abstractmethod
+    def wanted(self, topic: str) -> bool:
+        """Whether anybody listens: what is large and asked for by nobody need not be made."""
+
+    def now(self) -> int:
+        """The time, nanoseconds: by default this machine's."""
+        return time.time_ns()
+
+    def on_restart(self, callback: Callable[[], None]) -> None:
+        """Call `callback` whenever the time is set back, as a simulator does; by default it never is."""
+        return None
+
+    def troubles(self) -> dict[str, str]:
+        """What the middleware knows to go wrong, in words, by topic; by default nothing."""
+        return {}
+
+
+class Bus(Transport):
+    """A transport within one process, which delivers at once, in the publisher's thread.
 
     >>> bus, seen = Bus(), []
     >>> bus.subscribe("/mask", object, seen.append)
@@ -22,21 +54,21 @@ class Bus:
         self._lock = threading.Lock()
 
     def advertise(self, topic: str, kind: type) -> None:
-        """Say that messages of the class `kind` are going to be published on a topic; here nobody needs to know."""
+        """Nobody needs to know."""
 
     def subscribe(self, topic: str, kind: type, callback: Callable[[object], None]) -> None:
-        """Call `callback` with every message of a topic from now on; `kind` is the class that is expected."""
+        """Deliver every message to the callback, whatever its class."""
         with self._lock:
             self._subscribers[topic].append(callback)
 
     def publish(self, topic: str, message: object) -> None:
-        """Deliver a message to all who have subscribed."""
+        """Deliver a message."""
         with self._lock:
             callbacks = tuple(self._subscribers.get(topic, ()))
         for callback in callbacks:
             callback(message)
 
     def wanted(self, topic: str) -> bool:
-        """Whether anybody listens: what is large and asked for by nobody need not be made."""
+        """Whether anybody has subscribed."""
         with self._lock:
             return bool(self._subscribers.get(topic))

@@ -124,7 +124,7 @@ Message = Image | CameraInfo | PointCloud2 | Pose | Transforms | JointState | Di
 
 @dataclass(frozen=True)
 class Topics:
-    """The names under which messages travel; each can be changed."""
+    """The names under which messages travel; each can be changed. Without the leading slash they follow a namespace."""
 
     rgb: str = "/camera/rgb/image_raw"
     depth: str = "/camera/depth/image_raw"
@@ -133,6 +133,7 @@ class Topics:
     tf_static: str = "/tf_static"
     mask: str = "/segmentation/mask"
     probabilities: str = "/segmentation/probabilities"
+    overlay: str = "/segmentation/overlay"
     cloud: str = "/segmentation/target_cloud"
     grasp: str = "/segmentation/grasp"
     gripper: str = "/segmentation/gripper"
@@ -141,3 +142,5 @@ class Topics:
 
 
 DEFAULT_TOPICS = Topics()
+SHARED = ("tf", "tf_static", "diagnostics")  # one for all robots, whatever namespace each has
+ROS_TOPICS = Topics(**{name: topic if name in SHARED else topic[1:] for name, topic in vars(DEFAULT_TOPICS).items()})

@@ -1,11 +1,14 @@
-"""The node as a process of ROS, and the text's `run_ros_node` (topic 08)."""
+"""The node as a process of ROS 2 or ROS 1, and the text's `run_ros_node` (topic 08)."""
 
 import logging
 import signal
 import threading
+from collections.abc import Callable
 from contextlib import contextmanager
 
-from labkit.node.ros1 import Ros1Transport, ros
+from labkit.node import ros1, ros2
+from labkit.node.bus import Transport
+from labkit.node.messages import ROS_TOPICS
 from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.pipeline import Pipeline
 
@@ -24,18 +27,27 @@ def stopped_by_signals():
             signal.signal(number, handler)
 
 
-def run(pipeline: Pipeline, name: str = "segmentation_node", **options) -> Counts | None:
-    """Run the node on ROS until a signal or ROS ends it.
+def run(
+    build: Callable[[Transport, threading.Event], SegmentationNode],
+    name: str = "segmentation_node",
+    *,
+    version: int = 2,
+    arguments=(),
+) -> Counts | None:
+    """Run a node on ROS until a signal or ROS ends it.
 
-    options: those of SegmentationNode. Returns what became of the frames, or None if a signal came before ROS did.
+    build: function of the transport, and of an event that is set at the end, to the node. version: of ROS, 1 or 2.
+    arguments: ROS's own, such as those behind --ros-args. Returns what became of the frames, or None if a signal came
+    before ROS did.
     """
+    edge = ros1.Ros1Transport if version == 1 else ros2.Ros2Transport
     with stopped_by_signals() as stop:
-        transport = Ros1Transport.open(name, stop)
+        transport = edge.open(name, stop, arguments)
         if transport is None:
             return None
         with transport:
             log_to_terminal()
-            node = SegmentationNode(pipeline, transport, **options)
+            node = build(transport, stop)
             logger.info("%s listens to %s", name, node.topics.rgb)
             node.spin(stop)
             return node.counts
@@ -51,17 +63,31 @@ def log_to_terminal() -> None:
 
 
 def run_ros_node(
-    weights_path, num_classes: int, target_class: int, *, table_z: float = 0.0, crf: bool = False, **options
+    weights_path,
+    num_classes: int,
+    target_class: int,
+    *,
+    table_z: float | None = None,
+    crf: bool = False,
+    version: int = 2,
+    **options,
 ) -> Counts | None:
     """Run the text's node until SIGINT: a network's weights, its number of classes, and the class to grasp.
 
     The text's version ignores the target class, depth, intrinsics and the camera's pose, and publishes a mask alone;
     this one uses all of them. weights_path: as in `labkit.network.load_model`. table_z: height of the table in the base
-    frame, metres. crf: refine the labels. options: those of SegmentationNode, T_base_cam and topics among them. Raises
-    FileNotFoundError or ValueError for weights that cannot be used, ModuleNotFoundError without ROS.
+    frame, metres. crf: refine the labels. version: of ROS, 2 or 1. options: those of SegmentationNode, T_base_cam and
+    topics among them. Raises FileNotFoundError or ValueError for weights that cannot be used, ModuleNotFoundError
+    without ROS.
     """
     from labkit.network import load_model  # torch takes its time to import
 
-    ros("rospy")  # what is missing is said before the weights are loaded
+    require(version)
     pipeline = Pipeline(load_model(weights_path, num_classes), table_z, target_class, crf=crf)
-    return run(pipeline, **options)
+    options = {"topics": ROS_TOPICS} | options
+    return run(lambda transport, _: SegmentationNode(pipeline, transport, **options), version=version)
+
+
+def require(version: int) -> None:
+    """Raise ModuleNotFoundError, which says what to install, if this version of ROS is missing."""
+    ros1.ros("rospy") if version == 1 else ros2.ros("rclpy")

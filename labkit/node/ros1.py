@@ -12,6 +12,7 @@ import threading
 import xmlrpc.client
 from collections.abc import Callable
 
+from labkit.node.bus import Transport
 from labkit.node.messages import Message
 from labkit.node.wire import TYPES, Wire
 
@@ -32,16 +33,16 @@ def ros(module: str):
         raise ModuleNotFoundError(f"{error.name} is missing; ROS 1 on Debian: apt install python3-rospy") from error
 
 
-class Ros1Transport:
+class Ros1Transport(Transport):
     """A node of ROS 1 as a transport: what it publishes and subscribes goes over TCP to and from other nodes.
 
     A process holds one. Unlike rospy alone it survives a master that is started anew, to which every node is unknown:
     it registers again, so that nodes that come later find it. Use it as a context manager, or call `close`.
     """
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, arguments=()):
         self._rospy = ros("rospy")
-        self._rospy.init_node(name, disable_signals=True)
+        self._rospy.init_node(name, argv=[name, *arguments], disable_signals=True)
         self._wire = Wire(ros1=True)
         self._publishers, self._subscribers = {}, {}
         self._closing = threading.Event()
@@ -49,7 +50,7 @@ class Ros1Transport:
         self._keeper.start()
 
     @classmethod
-    def open(cls, name: str, stop: threading.Event) -> "Ros1Transport | None":
+    def open(cls, name: str, stop: threading.Event, arguments=()) -> "Ros1Transport | None":
         """Join ROS as soon as a master answers; None if `stop` is set before. ROS sets it when it ends the node."""
         uri = ros("rosgraph").get_master_uri()
         said = False
@@ -64,7 +65,7 @@ class Ros1Transport:
                 stop.wait(CHECK_SECONDS)
         else:
             return None
-        transport = cls(name)
+        transport = cls(name, arguments)
         ros("rospy").on_shutdown(stop.set)  # `rosnode kill`, or another node took this one's name
         return transport
 
@@ -109,6 +110,10 @@ class Ros1Transport:
     def wanted(self, topic: str) -> bool:
         """Whether any node listens."""
         return self._publishers[topic].get_num_connections() > 0
+
+    def now(self) -> int:
+        """The time of ROS: the simulator's with use_sim_time, else this machine's; nanoseconds."""
+        return self._rospy.Time.now().to_nsec()
 
     @functools.cache  # noqa: B019 - a process holds one transport
     def _message_class(self, name: str) -> type:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from jaxtyping import Float
 
+from labkit.labels import overlay
 from labkit.node import convert
 from labkit.node.messages import (
     DEFAULT_TOPICS,
@@ -33,6 +34,7 @@ logger = logging.getLogger(__name__)
 OUTPUTS = {
     "mask": Image,
     "probabilities": Image,
+    "overlay": Image,
     "cloud": PointCloud2,
     "scene": PointCloud2,
     "gripper": JointState,
@@ -70,8 +72,8 @@ class SegmentationNode:
     Messages may come from any thread, which only checks them; frames are perceived by the thread that calls `spin` or
     `spin_once`. One frame waits: a newer one takes its place, and the old one is counted as dropped. Whatever is
     malformed or does not fit together is logged with the reason and skipped; a transport delivers a ValueError in place
-    of a message that it cannot read. Every result carries the colour image's stamp. Probabilities, the planner's scene
-    and the gripper's opening are published if anybody wants them.
+    of a message that it cannot read. Every result carries the colour image's stamp. Probabilities, an
+    overlay for people to look at, the planner's scene and the gripper's opening are published if anybody wants them.
 
     >>> from labkit.node.bus import Bus
     >>> node = SegmentationNode(Pipeline(lambda rgb: rgb / 255.0), Bus(), T_base_cam=np.eye(4))
@@ -104,6 +106,7 @@ class SegmentationNode:
         self._sync = Synchronizer(("rgb", "depth", "info"), round(slop * NANOSECONDS))
         self._pending: tuple[dict, float] | None = None
         self._news = threading.Condition()
+        transport.on_restart(self.restart)
         self._distortion_said = False
         checks = {
             "rgb": (Image, lambda message: convert.check_image(message, ("rgb8", *convert.COLOUR))),
@@ -179,7 +182,7 @@ class SegmentationNode:
                 said = time.monotonic()
             elif time.monotonic() - said > HEARTBEAT:
                 said = time.monotonic()
-                self._report(Header(time.time_ns()), "waiting for frames", {})
+                self._report(Header(self.transport.now()), "waiting for frames", {})
 
     def spin_once(self, timeout: float = 0.0) -> bool:
         """Answer the frame that waits, or the next one within `timeout` seconds; False if there was none to use."""
@@ -191,11 +194,10 @@ class SegmentationNode:
             self._pending = None
         header = together["rgb"].header
         try:
-            T_base_cam = self._base_transform(header, arrived)
-            perception = self.pipeline.run(
-                convert.to_frame(**together, T_base_cam=T_base_cam, depth_scale=self.depth_scale)
-            )
-            self._publish(header, perception)
+            T_base_cam = self._base_transform(header)
+            frame = convert.to_frame(**together, T_base_cam=T_base_cam, depth_scale=self.depth_scale)
+            perception = self.pipeline.run(frame)
+            self._publish(header, frame.rgb, perception)
         except (ValueError, LookupError) as error:
             self._fail(header, error)
             return False
@@ -216,6 +218,12 @@ class SegmentationNode:
         )
         return True
 
+    def restart(self) -> None:
+        """Forget what belongs to the time before, because the clock was set back."""
+        with self._news:
+            self._sync.flush()
+            self.tree.forget()
+
     def flush(self) -> None:
         """Count what waits for its partners as lost: nothing more will come."""
         with self._news:
@@ -231,16 +239,17 @@ class SegmentationNode:
             self.counts.reasons[f"frame lost: no {what} {bound}"] = frames
         self.counts.reasons = +self.counts.reasons  # without zeros
 
-    def _base_transform(self, header: Header, arrived: float) -> Float[np.ndarray, "4 4"]:
+    def _base_transform(self, header: Header) -> Float[np.ndarray, "4 4"]:
         """Where the camera stood at an image's stamp; its transform may arrive a little later than the image."""
         if self.T_base_cam is not None:
             return self.T_base_cam
+        begin = time.monotonic()
         while True:
             with self._news:
                 try:
                     return self.tree.lookup(self.base_frame, header.frame_id, header.stamp)
                 except LookupError:
-                    left = arrived + self.patience - time.monotonic()
+                    left = begin + self.patience - time.monotonic()
                     if left <= 0.0:
                         raise
                     self._news.wait(left)
@@ -253,13 +262,15 @@ class SegmentationNode:
             self.counts.reasons[f"frame: {text.partition(':')[0]}"] += 1
         self._report(header, f"frame skipped: {text}", {}, level=1)
 
-    def _publish(self, header: Header, perception: Perception) -> None:
+    def _publish(self, header: Header, rgb: np.ndarray, perception: Perception) -> None:
         topics, base = self.topics, Header(header.stamp, self.base_frame)
         publish, wanted = self.transport.publish, self.transport.wanted
         publish(topics.mask, convert.encode_image(perception.labels, "mono8", header))
         if wanted(topics.probabilities):
             p = perception.probabilities.astype(np.float32, copy=False)
             publish(topics.probabilities, convert.encode_image(p, f"32FC{p.shape[-1]}", header))
+        if wanted(topics.overlay):
+            publish(topics.overlay, convert.encode_image(overlay(rgb, perception.labels), "rgb8", header))
         cloud = np.concatenate([np.zeros((0, 3), np.float32), *perception.clouds])
         publish(topics.cloud, convert.encode_cloud(cloud, base))
         if wanted(topics.scene):
@@ -278,6 +289,7 @@ class SegmentationNode:
             counted = {f.name: getattr(self.counts, f.name) for f in fields(Counts) if f.name != "reasons"}
             values = values | {name: str(n) for name, n in counted.items()}
             values |= {reason: str(n) for reason, n in self.counts.reasons.most_common(5)}
+        values |= self.transport.troubles()
         self.transport.publish(self.topics.diagnostics, Diagnostics(header, "segmentation", level, message, values))
 
 

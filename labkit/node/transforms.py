@@ -61,6 +61,12 @@ class TransformTree:
             while history[-1][0] - history[0][0] > self._span:
                 history.pop(0)
 
+    def forget(self) -> None:
+        """Forget where moving frames were, because the clock was set back; static ones stay."""
+        with self._lock:
+            for child in self._histories.keys() - self._static:
+                del self._histories[child], self._parents[child]
+
     def lookup(self, target: str, source: str, stamp: int) -> Float[np.ndarray, "4 4"]:
         """Give T_target_source at a time: it maps the source frame's coordinates to the target's.
 

@@ -57,8 +57,10 @@ def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        ([], "expected one of --sim, --ros and --bag"),
-        (["--sim", "--ros"], "expected one of"),
+        ([], "expected one of --sim, --ros, --ros1 and --bag"),
+        (["--ros", "--ros1"], "expected one of"),
+        (["--sim", "--modle", "unet"], "--modle"),
+        (["--sim", "--ros-args", "-r", "__ns:=/left"], "--ros-args"),
         (["--bag", "a.bag"], "out"),
         (["--sim", "--out", "a.bag"], "out"),
         (["--bag", "nowhere.bag", "--out", "a.bag", "--model", "smallsegnet"], "nowhere.bag"),

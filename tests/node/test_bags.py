@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from ruamel.yaml import YAML
 
 import data_gen
 from labkit.frame import RGBDFrame
@@ -47,8 +48,8 @@ class Truth:
         return self.answers[rgb.tobytes()]
 
 
-def record(path, frames, **options):
-    with BagWriter(path) as bag:
+def record(path, frames, storage="mcap", **options):
+    with BagWriter(path, storage=storage) as bag:
         camera = Camera(bag, **options)
         for number, frame in enumerate(frames):
             camera.publish(frame, (number + 1) * 100 * MS)
@@ -116,6 +117,26 @@ def test_a_bag_is_answered_frame_by_frame(tmp_path, frames, name, depth):
         assert found[TOPICS.cloud][number][1].header.frame_id == "base_link"
     assert found[TOPICS.grasp] and not found[TOPICS.scene]
     assert found[TOPICS.diagnostics][-1][1].values["answered"] == "2"
+
+
+@pytest.mark.parametrize("storage, ending", [("mcap", "mcap"), ("sqlite3", "db3")])
+def test_both_storages_of_ros_2_are_folders_as_ros_2_writes_them_and_their_files_are_bags(
+    tmp_path, frames, storage, ending
+):
+    """The folder has its description, with what `ros2 bag play` shall offer; the file in it is answered alone, too."""
+    source = record(tmp_path / "in", frames, storage, topics=dataclasses.replace(TOPICS, tf="/tf_static"))
+    (file,) = source.glob(f"*.{ending}")
+    described = YAML().load(source / "metadata.yaml")["rosbag2_bagfile_information"]
+    assert described["storage_identifier"] == storage and described["relative_file_paths"] == [file.name]
+    offered = {
+        told["topic_metadata"]["name"]: told["topic_metadata"]["offered_qos_profiles"][0]
+        for told in described["topics_with_message_count"]
+    }
+    assert offered["/tf_static"]["durability"] == "transient_local" and offered[TOPICS.rgb]["durability"] == "volatile"
+    for number, bag in enumerate((source, file)):
+        out = tmp_path / f"out{number}"
+        counts = process(bag, out, Pipeline(Truth(frames)), storage=storage, progress=False)
+        assert counts.answered == 2 and list(out.glob(f"*.{ending}"))
 
 
 def test_from_ros_2_to_ros_1_and_with_names_and_pose_as_parameters(tmp_path, frames):
@@ -196,4 +217,6 @@ def test_what_cannot_be_done_with_bags_is_said(tmp_path, frames):
         process(whole, tmp_path / "out.bag", pipeline, topics=dataclasses.replace(TOPICS, rgb="/color"))
     with pytest.raises(FileExistsError):
         process(whole, cut, pipeline)
+    with pytest.raises(ValueError, match=r"^storage: expected one of mcap, sqlite3, got 'zip'"):
+        process(whole, tmp_path / "out.bag", pipeline, storage="zip")
     assert not (tmp_path / "out.bag").exists(), "nothing is written before the input is known to be good"

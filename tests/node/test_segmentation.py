@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from labkit.frame import RGBDFrame
-from labkit.labels import SURFACE, TARGET, one_hot
+from labkit.labels import SURFACE, TARGET, one_hot, overlay
 from labkit.node import convert
 from labkit.node.actors import Arm, Camera
 from labkit.node.bus import Bus
@@ -76,7 +76,7 @@ def messages(frame, stamp=0, frame_id="camera_optical_frame"):
 
 
 def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
-    node, camera, out, _ = system(frame, "probabilities", "scene", "gripper", base_frame="base_link")
+    node, camera, out, _ = system(frame, "probabilities", "overlay", "scene", "gripper", base_frame="base_link")
     camera.publish(frame, stamp=123456789)
     assert node.spin_once()
     p = node.pipeline.run(frame)
@@ -87,6 +87,7 @@ def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
     assert np.allclose(convert.decode_cloud(cloud), np.concatenate(p.clouds), atol=1e-6)
     assert np.allclose(convert.decode_pose(grasp), p.plan.grasps[0].T_base_grasp, atol=1e-6)
     assert np.allclose(convert.decode_image(out.probabilities[0]), p.probabilities)
+    assert np.array_equal(convert.decode_image(out.overlay[0]), overlay(frame.rgb, p.labels))
     assert np.allclose(convert.decode_cloud(out.scene[0]), p.scene, atol=1e-6)
     assert sum(out.gripper[0].position) == pytest.approx(p.plan.grasps[0].width)
 
@@ -97,7 +98,7 @@ def test_what_nobody_wants_is_not_made(frame):
     publish, bus.publish = bus.publish, lambda topic, message: (sent.append(topic), publish(topic, message))
     camera.publish(frame)
     node.spin_once()
-    assert TOPICS.mask in sent and not {TOPICS.probabilities, TOPICS.scene, TOPICS.gripper} & set(sent)
+    assert TOPICS.mask in sent and not {TOPICS.probabilities, TOPICS.overlay, TOPICS.scene, TOPICS.gripper} & set(sent)
 
 
 def test_millimetres_of_16_bit_are_metres_inside(frame):
@@ -283,6 +284,25 @@ def test_a_node_without_frames_still_says_that_it_lives(frame, monkeypatch):
     stop.set()
     thread.join()
     assert out.diagnostics and out.diagnostics[0].message == "waiting for frames"
+
+
+def test_when_the_clock_is_set_back_the_time_before_is_forgotten(frame):
+    """A transport that says so: what waited pairs with nothing, and where the camera was then is not known any more."""
+    told = []
+    bus = Bus()
+    bus.on_restart = told.append
+    node = SegmentationNode(Pipeline(Truth(frame.labels)), bus, patience=0.0)
+    (restart,) = told
+    good = messages(frame, 100 * MS)
+    Camera(bus).publish(frame, 100 * MS)
+    assert node.spin_once()
+    bus.publish(TOPICS.depth, good["depth"])
+    restart()
+    bus.publish(TOPICS.rgb, good["rgb"])
+    bus.publish(TOPICS.info, good["info"])
+    assert not node.spin_once() and node.counts.failed == 0, "the old depth is gone"
+    bus.publish(TOPICS.depth, good["depth"])
+    assert not node.spin_once() and node.counts.failed == 1, "and so is the old pose"
 
 
 def test_distortion_is_told_once(frame, caplog):

@@ -1,0 +1,220 @@
+"""The edge to ROS 2: a transport over rclpy (topic 08).
+
+rclpy comes from a sourced ROS 2, or from the unofficial wheels of `make ros2`; see README. Messages travel as bytes,
+which `Wire` reads and writes: that is faster than rclpy's own classes, and a message that cannot be read is an error of
+one message and not of a thread.
+"""
+
+import importlib
+import logging
+import threading
+from collections import Counter
+from collections.abc import Callable
+
+from labkit.node import ros2_types
+from labkit.node.bus import Transport
+from labkit.node.messages import Message, Transforms
+from labkit.node.wire import TYPES, Wire
+
+logger = logging.getLogger(__name__)
+STATIC = "tf_static"  # the last part of the topic whose messages a late listener must get, too
+RELIABILITIES = ("reliable", "best_effort")
+SILENT = "nobody publishes it"
+MISSING = "rclpy is missing; ROS 2: source a distribution's setup file, or `make ros2` for wheels in .venv-ros2"
+
+
+def ros(module: str):
+    """Import a module of ROS 2; raises ModuleNotFoundError that says where to get it."""
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"{MISSING} ({error})") from error
+
+
+class Ros2Transport(Transport):
+    """A node of ROS 2 as a transport.
+
+    name: the node's. arguments: what stood behind --ros-args, that words included: namespace, remappings, parameters.
+    A process may hold several transports. Use one as a context manager, or call `close`.
+    """
+
+    def __init__(self, name: str, arguments=()):
+        rclpy = ros("rclpy")
+        self.quality()
+        self._wire = Wire(ros1=False)
+        self._publishers, self._readers, self._numbers = {}, {}, {}
+        self._lost, self._refused = Counter(), {}
+        self._publishing, self._closed = threading.Lock(), False
+        self._context = rclpy.Context()
+        self._context.init([name, *arguments])
+        self.node = rclpy.create_node(name, context=self._context)
+        self._executor = ros("rclpy.executors").SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    @classmethod
+    def open(cls, name: str, stop: threading.Event, arguments=()) -> "Ros2Transport":
+        """Join ROS, which needs no master; ROS sets `stop` when it ends the node."""
+        transport = cls(name, arguments)
+        transport._context.on_shutdown(stop.set)
+        return transport
+
+    def __enter__(self) -> "Ros2Transport":
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self) -> None:
+        """Leave ROS."""
+        with self._publishing:
+            self._closed = True
+        self._executor.shutdown()
+        self._thread.join()
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except Exception as error:  # how rclpy says that the context is gone
+            if self._context.ok():
+                logger.exception("the thread of ROS ended: %s", error)
+
+    # ------------------------------------------------------------------------------------------ messages
+
+    def quality(self, inputs: str = "best_effort", outputs: str = "reliable", depth: int = 10) -> None:
+        """Set the quality of service of the topics to come.
+
+        inputs: what to ask of those who publish, outputs: what to offer to those who listen; "reliable" (what is lost
+        is sent again) or "best_effort" (the newest, as sensors send). depth: messages kept for a slow reader. ROS
+        parameters override a topic's: "qos_overrides.TOPIC.subscription.reliability" and so on. Raises ValueError for
+        another reliability or depth.
+        """
+        for option, value in (("inputs", inputs), ("outputs", outputs)):
+            if value not in RELIABILITIES:
+                raise ValueError(f"qos_{option}: expected one of {', '.join(RELIABILITIES)}, got {value!r}")
+        if depth < 1:
+            raise ValueError(f"qos_depth: expected at least one message, got {depth}")
+        self._inputs, self._outputs, self._depth = inputs, outputs, depth
+
+    def advertise(self, topic: str, kind: type) -> None:
+        """Offer messages of the class `kind`."""
+        events = ros("rclpy.event_handler").PublisherEventCallbacks(incompatible_qos=self._refuse(topic, "listener"))
+        self._publishers[topic] = self.node.create_publisher(
+            self._class(kind), topic, event_callbacks=events, **self._qos(topic, self._outputs)
+        )
+        ros2_types.reset_error()
+
+    def publish(self, topic: str, message: Message) -> None:
+        """Send a message to all who listen."""
+        self.publish_bytes(topic, bytes(self._wire.encode(message)))
+
+    def publish_bytes(self, topic: str, data: bytes) -> None:
+        """Send the bytes of a message of the topic's class, whatever they are."""
+        with self._publishing:
+            if self._context.ok() and not self._closed:  # afterwards nobody is left
+                self._publishers[topic].publish(data)
+
+    def subscribe(self, topic: str, kind: type, callback: Callable[[Message | ValueError], None]) -> None:
+        """Call `callback` in the thread of ROS with every message, or with the error if it cannot be read."""
+        name = TYPES[kind]
+
+        def receive(data: bytes, info: dict) -> None:
+            self._count_lost(topic, info)
+            try:
+                message = self._wire.decode(name, data)
+            except ValueError as error:
+                message = error
+            callback(message)
+
+        events = ros("rclpy.event_handler").SubscriptionEventCallbacks(
+            incompatible_qos=self._refuse(topic, "publisher")
+        )
+        # Transforms are small, and each is needed: nobody sends them with less than reliability.
+        qos = self._qos(topic, "reliable" if kind is Transforms else self._inputs)
+        self._readers[topic] = self.node.create_subscription(
+            self._class(kind), topic, receive, raw=True, event_callbacks=events, **qos
+        )
+        ros2_types.reset_error()
+
+    def wanted(self, topic: str) -> bool:
+        """Whether any node listens."""
+        return self._context.ok() and self._publishers[topic].get_subscription_count() > 0
+
+    def _class(self, kind: type) -> type:
+        return ros2_types.message_class(TYPES[kind], self._wire.store.hash_rihs01(TYPES[kind]))
+
+    def _count_lost(self, topic: str, info: dict) -> None:
+        """Publishers number their messages: a gap is what the network lost, or what came too fast for this process."""
+        number, publisher = info.get("publication_sequence_number"), info.get("publisher_gid", {}).get("data")
+        if number is not None:  # some middlewares do not tell
+            last = self._numbers.get((topic, publisher), number - 1)
+            self._numbers[topic, publisher] = number
+            self._lost[topic] += max(0, number - last - 1)
+
+    def _qos(self, topic: str, reliability: str) -> dict:
+        qos = ros("rclpy.qos")
+        static = topic.rpartition("/")[2] == STATIC
+        durability = qos.DurabilityPolicy.TRANSIENT_LOCAL if static else qos.DurabilityPolicy.VOLATILE
+        profile = qos.QoSProfile(
+            depth=100 if topic.startswith("/tf") else self._depth,
+            reliability=qos.ReliabilityPolicy.get_from_short_key(reliability),
+            durability=durability,
+        )
+        overriding = ros("rclpy.qos_overriding_options").QoSOverridingOptions.with_default_policies()
+        return {"qos_profile": profile, "qos_overriding_options": overriding}
+
+    # ------------------------------------------------------------------------------- time, troubles, parameters
+
+    def now(self) -> int:
+        """The time of ROS: the simulator's with use_sim_time, else this machine's; nanoseconds."""
+        return self.node.get_clock().now().nanoseconds
+
+    def on_restart(self, callback: Callable[[], None]) -> None:
+        """Call `callback` whenever the time of /clock is set back, or begins to be followed."""
+        clock, duration = ros("rclpy.clock"), ros("rclpy.duration")
+        threshold = clock.JumpThreshold(
+            min_forward=None, min_backward=duration.Duration(nanoseconds=-1), on_clock_change=True
+        )
+        self._jumps = self.node.get_clock().create_jump_callback(threshold, post_callback=lambda jump: callback())
+
+    def troubles(self) -> dict[str, str]:
+        """Topics that nobody publishes, messages that were lost on the way, and peers that cannot be talked to."""
+        inputs = {topic: reader for topic, reader in self._readers.items() if not topic.endswith(STATIC)}
+        silent = {topic: SILENT for topic, reader in inputs.items() if not reader.get_publisher_count()}
+        lost = {topic: f"{count} messages lost on the way" for topic, count in tuple(self._lost.items()) if count}
+        return silent | lost | self._refused
+
+    def _refuse(self, topic: str, peer: str):
+        """Say in words that a peer's quality of service does not fit."""
+        does, ours, option = (
+            ("offers less than this node asks for", self._inputs, "qos_inputs")
+            if peer == "publisher"
+            else ("asks for more than this node offers", self._outputs, "qos_outputs")
+        )
+
+        def say(event) -> None:
+            policy = ros("rclpy.qos").qos_policy_name_from_kind(event.last_policy_kind).lower()
+            told = f"no messages pass, for a {peer} {does}: {policy}, here {ours} (see {option})"
+            self._refused[topic] = told
+            logger.warning("%s: %s", topic, told)
+
+        return say
+
+    def parameters(self, defaults: dict) -> dict:
+        """Declare ROS parameters that are fixed at the start, with these defaults; returns their values.
+
+        A whole number will do for a default of float or None. Raises ValueError for a value of another type.
+        """
+        descriptor = ros("rcl_interfaces.msg").ParameterDescriptor(read_only=True, dynamic_typing=True)
+        found = {}
+        for name, default in defaults.items():
+            value = self.node.declare_parameter(name, default, descriptor).value
+            if isinstance(default, float) and type(value) is int:
+                value = float(value)
+            if default is not None and type(value) is not type(default):
+                raise ValueError(f"{name}: expected a {type(default).__name__}, got {value!r}")
+            found[name] = value
+        return found
