@@ -17,13 +17,12 @@ ROOT = Path(__file__).resolve().parents[2]  # the checkout, when labkit is insta
 NEEDED_GB = 2.0  # free disk for a data set to train on, checkpoints and pictures
 NEEDED_RENDER_MM = 0.1
 
-# Who needs the packages of an extra.
+# Who needs the packages of an extra; the peers of `make bench` have an environment of their own.
 USERS = {
     "course": "`make lab` needs",
     "instructor": "`labkit release` and `labkit grade` need",
     "stacks": "`labkit export` and the engines of topic 09 need",
     "test": "`make test` needs",
-    "bench": "`make bench` needs, which sets up .venv-bench for",
 }
 
 OK, NOTE, WRONG = "ok", "note", "WRONG"
@@ -82,7 +81,7 @@ def check_packages(constraints: Path = ROOT / "constraints.txt") -> Iterator[Fin
         yield Finding("pins", NOTE, f"no {constraints.name} beside the package: versions are not compared")
     runtime = requirements("labkit")
     yield compare("packages", runtime, pins)
-    for extra in metadata.metadata("labkit").get_all("Provides-Extra", []):
+    for extra in USERS:
         of_extra = requirements("labkit", extra)
         yield compare(f"[{extra}]", {name: of_extra[name] for name in of_extra.keys() - runtime.keys()}, pins, extra)
 
