@@ -19,7 +19,6 @@ from data_gen import dataset
 from data_gen.families import FAMILIES
 from data_gen.sensor import DepthSensor
 from data_gen.statistics import statistics
-from data_gen.torch_dataset import TorchFrames
 from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
 from labkit.pipeline import Pipeline
@@ -233,13 +232,6 @@ def test_the_sensor_loses_pixels_at_edges():
     frame = RGBDFrame(np.zeros((100, 100, 3), np.uint8), depth, np.diag([50.0, 50.0, 1.0]), np.eye(4))
     seen = DepthSensor(noise=0.0, step=0.0, edge_loss=1.0, loss=0.0).apply(frame, np.random.default_rng(0)).depth
     assert (seen[:, 49:51] == 0).all() and (seen[:, :49] > 0).all() and (seen[:, 51:] > 0).all()
-
-
-def test_the_torch_dataset_gives_images_and_labels(undisturbed):
-    frames = data_gen.load(undisturbed)
-    pairs = TorchFrames(frames)
-    rgb, labels = pairs[3]
-    assert len(pairs) == 6 and np.array_equal(rgb, frames[3].rgb) and np.array_equal(labels, frames[3].labels)
 
 
 # Bad input ----------------------------------------------------------------------------------------------------------
