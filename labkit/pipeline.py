@@ -53,8 +53,9 @@ class Perception:
 class Pipeline:
     """The chain as one object: `Pipeline(model).run(frame)`, which is `perceive` and then `locate`.
 
-    model: a network of labkit.network, or any function from an RGB image, uint8 (H, W, 3), to class probabilities
-    (H, W, C); None if labels come from elsewhere, and only `locate` is used. table_z: height of the table in the base
+    model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes), or any function from an
+    RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1; None if labels come from elsewhere, and
+    only `locate` is used. table_z: height of the table in the base
     frame, metres; None takes the frame's own, or else 0. target_class: what to grasp.
     mirror: let a network look at the image and at its mirror image, and average: better, at twice the time.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.stacks.engines): equal numbers, other

@@ -96,7 +96,17 @@ def to_onnx(model) -> bytes:
     import onnx
     import torch
 
-    from labkit.network import TorchEngine, evaluating
+    from labkit.network import TorchEngine, evaluating, logits_of
+
+    class LogitsOnly(torch.nn.Module):
+        """The network without what it may return beside its logits."""
+
+        def __init__(self):
+            super().__init__()
+            self.network = model
+
+        def forward(self, *arrays):
+            return logits_of(self.network(*arrays))
 
     engine = TorchEngine(_check_network(model))
     takes = engine.takes
@@ -111,7 +121,7 @@ def to_onnx(model) -> bytes:
     with warnings.catch_warnings(), evaluating(model):
         warnings.simplefilter("ignore")  # the older exporter is meant: the newer one writes what OpenCV 4.6 cannot read
         torch.onnx.export(
-            model,
+            LogitsOnly().train(model.training),
             tuple(torch.from_numpy(array).to(device) for array in example.values()),
             buffer,
             dynamo=False,
