@@ -45,7 +45,7 @@ def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool =
         built = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
-        pipeline = Pipeline(model, spec.table.z, crf=crf)
+        pipeline = Pipeline(model, crf=crf)
         pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
         warm = time.perf_counter()
         perception = pipeline.run(frame)

@@ -45,7 +45,7 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
         raise ValueError("crf: expected none with true masks, which there is nothing to refine in")
     if isinstance(model, (str, Path)):
         model = _loaded(str(model), Path(model).stat().st_mtime_ns)
-    pipeline = Pipeline(model, spec.table.z, crf=crf)
+    pipeline = Pipeline(model, crf=crf)
     with World(spec) as world:
         start = time.perf_counter()
         frame = world.render(size)

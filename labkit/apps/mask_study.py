@@ -74,11 +74,11 @@ def mask_iou(a: Bool[np.ndarray, "H W"], b: Bool[np.ndarray, "H W"]) -> float:
     return float((a & b).sum() / (a | b).sum())
 
 
-def see(spec, frame: RGBDFrame, mask: Bool[np.ndarray, "H W"]) -> Perception:
+def see(frame: RGBDFrame, mask: Bool[np.ndarray, "H W"]) -> Perception:
     """Run the pipeline on a frame in which `mask` is all that is labelled target; other targets are obstacles."""
     others = np.where(frame.labels == TARGET, OBSTACLE, frame.labels)
     labels = np.where(mask, TARGET, others).astype(np.uint8)
-    return Pipeline(table_z=spec.table.z).locate(frame, labels)
+    return Pipeline().locate(frame, labels)
 
 
 def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None = None) -> list[Row]:
@@ -97,7 +97,7 @@ def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None =
     rows = []
     for kind, strength in kinds:
         mask = spoil(truth, kind, strength, seed)
-        lifted, reason = try_lift(spec, see(spec, frame, mask), name)
+        lifted, reason = try_lift(spec, see(frame, mask), name)
         rows.append(Row(seed, kind, float(strength), round(mask_iou(mask, truth), 4), int(lifted), reason))
     return rows
 

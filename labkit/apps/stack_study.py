@@ -133,7 +133,7 @@ def trials_of_scene(seed: int, ways: dict[str, Method]) -> list[Row]:
         labels = way(frame)
         milliseconds = round(1000.0 * (time.perf_counter() - start), 2)
         if labels.tobytes() not in tried:  # equal labels make the same lift: the simulator is deterministic
-            perception = Pipeline(table_z=spec.table.z).locate(frame, labels)
+            perception = Pipeline().locate(frame, labels)
             with World(spec) as world:
                 tried[labels.tobytes()] = lift(world, perception)
         result = tried[labels.tobytes()]

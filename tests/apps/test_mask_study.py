@@ -67,13 +67,13 @@ def test_only_the_masks_target_is_a_target_and_only_that_one_counts():
         frame = world.render((160, 120))
     name, truth = mask_study.target_mask(spec, frame)
     assert name == "large" and truth.sum() == (frame.instances == 2).sum()
-    perception = mask_study.see(spec, frame, truth)
+    perception = mask_study.see(frame, truth)
     assert len(perception.clouds) == 1
     assert (perception.labels[frame.instances == 1] == OBSTACLE).all()
     assert (perception.labels[truth] == TARGET).all()
     assert mask_study.try_lift(spec, perception, "large") == (True, "lifted")
     assert mask_study.try_lift(spec, perception, "small") == (False, "lifted another target")
-    nothing = mask_study.see(spec, frame, np.zeros_like(truth))
+    nothing = mask_study.see(frame, np.zeros_like(truth))
     assert mask_study.try_lift(spec, nothing, "large") == (False, "no target points")
 
 

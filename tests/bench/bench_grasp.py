@@ -32,7 +32,7 @@ def problems(targets: int, scenes: int = SCENES) -> list[tuple]:
             continue
         with World(spec) as world:
             frame = world.render((320, 240))
-        perception = Pipeline(table_z=spec.table.z).locate(frame, frame.labels)
+        perception = Pipeline().locate(frame, frame.labels)
         if len(perception.clouds) == targets:
             found.append((perception.clouds, perception.scene, spec.table.z, frame.T_base_cam[:3, 3]))
     return found

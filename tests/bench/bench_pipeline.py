@@ -18,7 +18,7 @@ def main() -> str:
     candidates = []
     for spec in three:
         frame = render(spec)
-        pipeline = Pipeline(table_z=spec.table.z)
+        pipeline = Pipeline()
         pipeline.locate(frame, frame.labels)
         for _ in range(REPEATS):
             perception = pipeline.locate(frame, frame.labels)
