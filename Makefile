@@ -8,6 +8,7 @@
 #   make ros2    set up .venv-ros2 with wheels of ROS 2, then the node beside a simulated camera, until Ctrl-C
 #   make test-ros2  the tests of ROS 2, there
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
+#   make mutants how many wrong answers that nobody wrote down a check can name, by lab (an hour)
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
 #   make clean   remove what can be made again in seconds; environments and data/ stay
 # make PYTHON=/path/to/python3.11 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
@@ -16,7 +17,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench fresh clean
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench mutants fresh clean
 
 BIN := .venv/bin
 ARGS ?=
@@ -48,6 +49,9 @@ test-ros2: .venv-ros2/installed
 
 bench: .venv-bench/installed
 	.venv-bench/bin/python -m tests.bench.run $(ARGS)
+
+mutants: .venv/installed
+	PYTHONPATH=. $(BIN)/python tests/measure_diagnosis.py $(ARGS)
 
 fresh: .venv/installed
 	$(BIN)/python tests/fresh/run $(ARGS)

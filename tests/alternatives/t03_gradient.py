@@ -19,12 +19,6 @@ def softmax_einsum(z):
     return np.einsum("...c,...->...c", e, 1.0 / np.einsum("...c->...", e))
 
 
-def softmax_torch(z):
-    import torch
-
-    return torch.softmax(torch.from_numpy(z), dim=-1).numpy()
-
-
 def softmax_float32(z):
     return softmax_einsum(z.astype(np.float32))
 
@@ -42,12 +36,6 @@ def log_sum_exp_loops(z):
         top = max(z[place])
         out[place] = top + np.log(sum(np.exp(value - top) for value in z[place]))
     return out
-
-
-def log_sum_exp_torch(z):
-    import torch
-
-    return torch.logsumexp(torch.from_numpy(z), dim=-1).numpy()
 
 
 def log_sum_exp_float32(z):
@@ -70,13 +58,6 @@ def cross_entropy_one_hot(z, y):
     Y = (y[..., None] == np.arange(z.shape[-1])).astype(float)
     log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
     return -(Y * log_p).sum()
-
-
-def cross_entropy_torch(z, y):
-    import torch
-
-    logits, labels = torch.from_numpy(z).reshape(-1, z.shape[-1]), torch.from_numpy(y.astype(np.int64)).reshape(-1)
-    return torch.nn.functional.cross_entropy(logits, labels, ignore_index=255, reduction="sum").item()
 
 
 def cross_entropy_float32(z, y):
@@ -104,16 +85,6 @@ def grad_in_place(z, y):
     return np.einsum("...c,...->...c", p, counted)
 
 
-def grad_torch(z, y):
-    import torch
-
-    logits = torch.from_numpy(z).requires_grad_()
-    labels = torch.from_numpy(y.astype(np.int64)).reshape(-1)
-    loss = torch.nn.functional.cross_entropy(logits.reshape(-1, z.shape[-1]), labels, ignore_index=255, reduction="sum")
-    loss.backward()
-    return logits.grad.numpy()
-
-
 def grad_float32(z, y):
     return grad_in_place(z.astype(np.float32), y)
 
@@ -137,17 +108,6 @@ def numerical_grad_at_once(z, y, h):
     both = z + np.multiply.outer([h, -h], np.eye(len(z)))  # (2, C, C): up and down, the moved logit, the logits
     losses = np.logaddexp.reduce(both, axis=-1) - both[..., y]
     return (losses[0] - losses[1]) / (2.0 * h)
-
-
-def numerical_grad_torch(z, y, h):
-    import torch
-
-    logits, steps = torch.from_numpy(z), h * torch.eye(len(z), dtype=torch.float64)
-
-    def loss(rows):
-        return torch.nn.functional.cross_entropy(rows, torch.full((len(z),), int(y)), reduction="none")
-
-    return ((loss(logits + steps) - loss(logits - steps)) / (2.0 * h)).numpy()
 
 
 def numerical_grad_float32(z, y, h):
@@ -179,10 +139,10 @@ def field_by_counting(kernels, strides):
 
 
 ALTERNATIVES = {
-    "softmax": (softmax_loops, softmax_einsum, softmax_torch, softmax_float32),
-    "log_sum_exp": (log_sum_exp_pairwise, log_sum_exp_loops, log_sum_exp_torch, log_sum_exp_float32),
-    "cross_entropy": (cross_entropy_loops, cross_entropy_one_hot, cross_entropy_torch, cross_entropy_float32),
-    "cross_entropy_grad": (grad_loops, grad_in_place, grad_torch, grad_float32),
-    "numerical_grad": (numerical_grad_in_place, numerical_grad_at_once, numerical_grad_torch, numerical_grad_float32),
+    "softmax": (softmax_loops, softmax_einsum, softmax_float32),
+    "log_sum_exp": (log_sum_exp_pairwise, log_sum_exp_loops, log_sum_exp_float32),
+    "cross_entropy": (cross_entropy_loops, cross_entropy_one_hot, cross_entropy_float32),
+    "cross_entropy_grad": (grad_loops, grad_in_place, grad_float32),
+    "numerical_grad": (numerical_grad_in_place, numerical_grad_at_once, numerical_grad_float32),
     "receptive_field": (field_backwards, field_products, field_by_counting),
 }

@@ -51,16 +51,6 @@ def weighted_grad_loops(z, y, w):
     return out
 
 
-def weighted_grad_torch(z, y, w):
-    import torch
-
-    logits, labels = torch.from_numpy(z).requires_grad_(), torch.from_numpy(y.astype(np.int64)).reshape(-1)
-    torch.nn.functional.cross_entropy(
-        logits.reshape(-1, z.shape[-1]), labels, weight=torch.from_numpy(w), ignore_index=255, reduction="sum"
-    ).backward()
-    return logits.grad.numpy()
-
-
 def weighted_grad_float32(z, y, w):
     return weighted_grad_one_hot(z.astype(np.float32), y, w.astype(np.float32))
 
@@ -82,16 +72,6 @@ def two_means_loops(z, y, w):
             total += weight * (top + np.log(np.exp(z[place] - top).sum()) - z[place][y[place]])
             pixels, weights = pixels + 1, weights + weight
     return total / pixels, total / weights
-
-
-def two_means_torch(z, y, w):
-    import torch
-
-    logits, labels = torch.from_numpy(z).reshape(-1, z.shape[-1]), torch.from_numpy(y.astype(np.int64)).reshape(-1)
-    options = {"weight": torch.from_numpy(w), "ignore_index": 255}
-    total = torch.nn.functional.cross_entropy(logits, labels, reduction="sum", **options)
-    mean = torch.nn.functional.cross_entropy(logits, labels, **options)
-    return (total / (labels != 255).sum()).item(), mean.item()
 
 
 def two_means_float32(z, y, w):
@@ -190,8 +170,8 @@ def undo_float32(z, w, share):
 
 ALTERNATIVES = {
     "class_weights": (weights_loops, weights_einsum, weights_torch, weights_float32),
-    "weighted_grad": (weighted_grad_one_hot, weighted_grad_loops, weighted_grad_torch, weighted_grad_float32),
-    "two_means": (two_means_weighted, two_means_loops, two_means_torch, two_means_float32),
+    "weighted_grad": (weighted_grad_one_hot, weighted_grad_loops, weighted_grad_float32),
+    "two_means": (two_means_weighted, two_means_loops, two_means_float32),
     "weighted_optimum": (
         weighted_optimum_einsum,
         weighted_optimum_loops,

@@ -26,7 +26,7 @@ QUESTION = Question(
         (SURE, np.array([255, 255], np.uint8)),
     ),
     properties=(Property("a loss is never negative", lambda arguments, out: bool(out >= -1e-6)),),
-    forbidden=("scipy",),
+    forbidden=("scipy", "torch"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

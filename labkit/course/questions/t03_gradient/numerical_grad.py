@@ -29,7 +29,7 @@ QUESTION = Question(
     by_hand=((TOY, 1, 0.5), (TOY, 0, 1.0)),
     atol=1e-5,
     properties=(Property("one number a logit", lambda arguments, out: np.shape(out) == np.shape(arguments[0])),),
-    forbidden=("scipy",),
+    forbidden=("scipy", "torch"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

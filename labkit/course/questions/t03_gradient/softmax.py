@@ -23,7 +23,7 @@ QUESTION = Question(
             lambda arguments, p: bool(np.allclose(p.sum(axis=-1), 1.0, atol=1e-4)),
         ),
     ),
-    forbidden=("scipy",),
+    forbidden=("scipy", "torch"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

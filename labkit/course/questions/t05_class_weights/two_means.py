@@ -23,7 +23,7 @@ QUESTION = Question(
         (TOY, np.array([1], np.uint8), np.array([1.0, 10.0, 3.0])),
         (SURE, np.array([0, 255], np.uint8), np.array([2.0, 5.0, 0.5])),
     ),
-    forbidden=("scipy",),
+    forbidden=("scipy", "torch"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

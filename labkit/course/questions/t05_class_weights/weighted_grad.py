@@ -30,7 +30,7 @@ QUESTION = Question(
             lambda arguments, grad: bool(np.allclose(grad.sum(axis=-1), 0.0, atol=1e-3)),
         ),
     ),
-    forbidden=("scipy",),
+    forbidden=("scipy", "torch"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
