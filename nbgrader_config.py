@@ -6,3 +6,5 @@ c.CourseDirectory.course_id = "labkit"
 c.CourseDirectory.source_directory = "solutions"
 c.CourseDirectory.release_directory = "labs"
 c.CourseDirectory.ignore = [".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"]
+# Whose a file is in a zip of Moodle's or Canvas's: downloaded/TOPIC/archive/ANY.zip, then `nbgrader zip_collect TOPIC`.
+c.ZipCollectApp.collector_plugin = "labkit.course.collect.LmsCollector"

@@ -272,16 +272,21 @@ def release(
     check: Annotated[
         bool, typer.Option("--check", help="Change nothing; exit status 1 if something would change.")
     ] = False,
+    bundle: Annotated[
+        Path | None, typer.Option(help="Write a zip of what students get: no solutions, no tests.")
+    ] = None,
     course: Annotated[Path, typer.Option(help="Folder that holds lessons, solutions and labs.")] = Path("."),
 ) -> None:
     """Generate labs/ from solutions/ with nbgrader, and tidy the notebooks of solutions/ and lessons/."""
-    from labkit.course.release import release
+    from labkit.course import release as releasing
 
-    changed = release(course, topics or (), check=check)
+    changed = releasing.release(course, topics or (), check=check)
     for path in changed:
         typer.echo(f"{path}: not what `labkit release` makes of it" if check else f"changed {path}")
     if not changed:
         typer.echo("labs, solutions and lessons are as they should be")
+    if bundle is not None:
+        typer.echo(f"wrote {bundle}: {len(releasing.bundle(course, bundle))} files")
     raise typer.Exit(1 if check and changed else 0)
 
 
@@ -299,6 +304,9 @@ def grade(
     out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
     course: Annotated[Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.")] = Path("."),
     dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to grade on.")] = None,
+    comment: Annotated[
+        tuple[str, str] | None, typer.Option(help="A group of wrong answers, see class.html, and what all in it read.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Without bubblewrap: submissions may do anything here.")
@@ -313,7 +321,7 @@ def grade(
 
     workers = workers or os.cpu_count() or 1
     how = {"workers": workers, "dask": dask, "force": force, "unsafe": unsafe}
-    graded = grade_course(topic, course, submissions, out, seed, new_round, **how)
+    graded = grade_course(topic, course, submissions, out, seed, new_round, comment, **how)
     typer.echo(terminal_table(graded.lab, graded.records))
     for student, failure in graded.failures.items():
         typer.echo(f"{student}: {failure}", err=True)

@@ -8,10 +8,12 @@ execution, the state of widgets, the version of Python. Their outputs stay.
 
 import ast
 import hashlib
+import io
 import logging
 import os
 import shutil
 import tempfile
+import zipfile
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +21,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from labkit import __version__
 from labkit.course.questions.question import TOPICS, of_topic
 from labkit.support.files import write_atomically
 
@@ -125,7 +128,17 @@ def generate(solution: Path, tidied: bytes) -> dict[str, bytes]:
     lab = tidy(lab)
     for cell, kept in zip(lab.cells, ids, strict=True):
         cell["id"] = kept  # the solution's: a lab's cells are found again in it
+    lab.metadata["labkit"] = {"version": __version__, "tasks": task_names(lab)}
     return made | {solution.name: to_bytes(lab)}
+
+
+def task_names(lab: NotebookNode) -> dict[str, str]:
+    """A short name for each task as its blank states it, so that grading knows a lab of another version of the kit."""
+    cells = {cell.metadata.nbgrader.grade_id: cell for cell in lab.cells if "nbgrader" in cell.metadata}
+    blanks = {
+        name: cell.source for name, cell in cells.items() if cell.cell_type == "code" and f"check_{name}" in cells
+    }
+    return {name: hashlib.sha256(source.encode()).hexdigest()[:12] for name, source in blanks.items()}
 
 
 def convert(course: Path, topic: str) -> None:
@@ -190,6 +203,56 @@ def replace_folders(made: dict[Path, dict[str, bytes]]) -> None:
                 if (old / folder.name).exists():
                     os.rename(old / folder.name, folder)
             raise
+
+
+# ------------------------------------------------------------------------------------- what students get
+
+FOLDERS = ("lessons", "labs", "labkit", "data_gen", "docs")
+STUDENTS_GET = (
+    *FOLDERS,
+    "Makefile",
+    "pyproject.toml",
+    "constraints.txt",
+    "README.md",
+    "LICENSE",
+    "CITATION.cff",
+)
+INSTRUCTORS_KEEP = ("docs/grading.md",)
+
+
+def bundle(course: Path, target: Path) -> list[str]:
+    """Write a zip of what students get, in a folder of its name; returns the names in it, in order.
+
+    That is lessons, labs, the kit and what installs it; not the solutions, which hold the model answers, and not the
+    tests. The same course gives the same bytes. Raises ValueError if the labs are not as the solutions make them.
+    """
+    course, target = Path(course), Path(target)
+    if drift := release(course, check=True):
+        raise ValueError(f"course: run `labkit release` first, {drift[0]} is not what it makes")
+    found = [
+        path for name in STUDENTS_GET for path in ((course / name).rglob("*") if name in FOLDERS else [course / name])
+    ]
+    files = {path.relative_to(course).as_posix(): path for path in found if path.is_file()}
+    names = sorted(name for name in files if name not in INSTRUCTORS_KEEP and not is_left_over(name))
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in names:
+            entry = zipfile.ZipInfo(f"{target.stem}/{name}", date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (0o755 if os.access(files[name], os.X_OK) else 0o644) << 16
+            archive.writestr(entry, files[name].read_bytes())
+    write_atomically(target, content.getvalue())
+    return names
+
+
+def is_left_over(name: str) -> bool:
+    """Whether a file is one that running or editing leaves behind.
+
+    >>> [is_left_over(name) for name in ("labkit/__pycache__/a.pyc", "labs/.ipynb_checkpoints/a.ipynb", "README.md")]
+    [True, True, False]
+    """
+    parts = name.split("/")
+    return any(part.startswith(".") or part == "__pycache__" or part.endswith(".egg-info") for part in parts)
 
 
 # ---------------------------------------------------------------------------------- what an assignment must be

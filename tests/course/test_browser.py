@@ -4,23 +4,15 @@ It needs the Debian package `chromium`, and skips without it. `pytest tests/cour
 leaves its screenshots in DIR.
 """
 
-import os
 import shutil
-import socket
-import subprocess
-import sys
-import urllib.error
-import urllib.request
 from pathlib import Path
-from time import monotonic, sleep
 
 import nbformat
 import pytest
+import serving
+from serving import TOKEN
 
 ROOT = Path(__file__).parents[2]
-CHROMIUM = shutil.which("chromium")
-TOKEN = "a-token-of-this-test"
-PATIENCE_MS = 150_000  # a kernel that imports torch on a busy machine takes its time
 
 pytestmark = [
     pytest.mark.debian("chromium"),
@@ -32,78 +24,12 @@ CHANGED = "#jp-main-dock-panel .lm-TabBar-tab.jp-mod-dirty"
 
 @pytest.fixture(scope="module")
 def jupyterlab(tmp_path_factory):
-    """JupyterLab as `make lab` starts it, on a copy of the course and at nobody's home; gives the URL of the server."""
+    """JupyterLab on a copy of the course; gives the URL of the server."""
     folder = tmp_path_factory.mktemp("course")
     for name in ("lessons", "labs"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns(".*"))
-    home = tmp_path_factory.mktemp("jupyter")
-    (home / "settings/@jupyterlab/notebook-extension").mkdir(parents=True)  # all cells are there, also unseen ones
-    (home / "settings/@jupyterlab/notebook-extension/tracker.jupyterlab-settings").write_text(
-        '{"windowingMode": "none"}'
-    )
-    places = {"CONFIG": "config", "DATA": "data", "RUNTIME": "runtime"}
-    environment = {key: value for key, value in os.environ.items() if key != "LABKIT_STRICT"}
-    environment |= {f"JUPYTER_{name}_DIR": str(home / place) for name, place in places.items()}
-    environment |= {"IPYTHONDIR": str(home / "ipython"), "JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces")}
-    environment["JUPYTERLAB_SETTINGS_DIR"] = str(home / "settings")
-    environment |= dict.fromkeys(("JUPYTER_PATH", "JUPYTER_CONFIG_PATH"), str(ROOT / "labkit/course/jupyter"))
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ip=127.0.0.1", f"--port={port}"]
-    command += ["--ServerApp.port_retries=0", f"--IdentityProvider.token={TOKEN}", f"--ServerApp.root_dir={folder}"]
-    log = (home / "log").open("w")
-    server = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
-    url = f"http://127.0.0.1:{port}"
-    try:
-        wait_for(url, server, home / "log")
+    with serving.jupyterlab(folder, tmp_path_factory.mktemp("jupyter")) as url:
         yield url
-    finally:
-        server.terminate()  # it ends its kernels
-        try:
-            server.wait(20)
-        except subprocess.TimeoutExpired:
-            server.kill()
-            server.wait()
-        log.close()
-
-
-def wait_for(url: str, server: subprocess.Popen, log: Path) -> None:
-    """Wait until the server answers."""
-    end = monotonic() + 90
-    while True:
-        try:
-            urllib.request.urlopen(f"{url}/api?token={TOKEN}", timeout=5).close()
-            return
-        except (urllib.error.URLError, ConnectionError, TimeoutError):
-            assert server.poll() is None and monotonic() < end, log.read_text()[-2000:]
-            sleep(0.2)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """One Chromium without a window."""
-    from playwright.sync_api import sync_playwright
-
-    options = ["--no-sandbox", "--disable-dev-shm-usage"] if os.geteuid() == 0 else ["--disable-dev-shm-usage"]
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=options)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def page(browser, tmp_path):
-    """A page that remembers the errors of its console in `page.errors`, and leaves a picture of how it ended."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900})
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE_MS)
-    page.errors = []
-    page.on("console", lambda message: page.errors.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: page.errors.append(str(error)))
-    yield page
-    page.screenshot(path=tmp_path / "end.png")
-    context.close()
 
 
 def open_notebook(page, url: str, path: str) -> None:

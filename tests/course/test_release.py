@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import nbformat
@@ -12,8 +13,9 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from labkit.apps import cli
 from labkit.course import release as module
 from labkit.course.questions.question import of_topic
-from labkit.course.release import mistakes, read, release, tidy, to_bytes
+from labkit.course.release import bundle, mistakes, read, release, tidy, to_bytes
 
+ROOT = Path(__file__).parents[2]
 SOLUTION = '''def double(x):
     """Twice x, an array."""
     ### BEGIN SOLUTION
@@ -290,3 +292,52 @@ def test_the_command_runs_by_itself(course):
     )
     assert done.returncode == 0 and b"changed labs/90_one/90_one.ipynb" in done.stdout, done.stderr
     assert done.stderr == b""
+
+
+# ------------------------------------------------------------------------------------- what students get
+
+
+def test_the_bundle_holds_what_students_need_and_no_model_answer(tmp_path):
+    """Of this course: no solution, no test, nothing left over; the same bytes again; lab and demo in it run."""
+    names = bundle(ROOT, tmp_path / "course.zip")
+    first = (tmp_path / "course.zip").read_bytes()
+    bundle(ROOT, tmp_path / "course.zip")
+    assert (tmp_path / "course.zip").read_bytes() == first
+    assert {name.split("/")[0] for name in names} >= {"lessons", "labs", "labkit", "data_gen", "Makefile", "README.md"}
+    kept = (
+        "solutions",
+        "tests",
+        "docs/grading.md",
+        "nbgrader_config.py",
+        "grades",
+        "submitted",
+        "gradebook.db",
+        ".git",
+    )
+    assert not [name for name in names if name.startswith(kept) or "__pycache__" in name or "checkpoint" in name]
+    with zipfile.ZipFile(tmp_path / "course.zip") as archive:
+        archive.extractall(tmp_path)
+    course = tmp_path / "course"
+    for path in ROOT.glob("solutions/*/*.ipynb"):
+        for cell in read(path).cells:
+            mark = cell.metadata.get("nbgrader", {})
+            if mark.get("solution") and cell.cell_type == "markdown":
+                lines = [line for line in cell.source.splitlines() if len(line) > 60]
+                assert not [
+                    name for name in names if name.endswith("ipynb") and lines[0] in (course / name).read_text()
+                ]
+    lab = [sys.executable, "-m", "pytest", "-q", "--nbval-lax", "--nbval-current-env", "-p", "no:cacheprovider"]
+    environment = os.environ | {"PYTHONPATH": str(course)}
+    done = subprocess.run([*lab, "labs/04_iou"], cwd=course, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    demo = [sys.executable, "-m", "labkit.apps.cli", "demo", "--seed", "1", "--out", str(tmp_path / "out")]
+    done = subprocess.run(demo, cwd=course, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0 and (tmp_path / "out/demo.png").exists(), done.stderr
+
+
+def test_a_bundle_of_labs_that_drifted_is_not_written(course, tmp_path):
+    release(course)
+    spoil(course / "labs/90_one/90_one.ipynb", "raise NotImplementedError", "return 2 * x")
+    with pytest.raises(ValueError, match=r"run `labkit release` first, .*90_one.ipynb"):
+        bundle(course, tmp_path / "x.zip")
+    assert not (tmp_path / "x.zip").exists()

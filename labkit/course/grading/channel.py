@@ -6,6 +6,7 @@ of replies to secret cases are for nobody to read: what students are told comes 
 
 import builtins
 import contextlib
+import json
 import math
 import pickle
 import re
@@ -19,8 +20,13 @@ import numpy as np
 
 from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_MESSAGE, MOST_PARTS, ONE
 from labkit.course.questions.judge import Problem
+from labkit.course.questions.program import Program
 
 KINDS = {"c": "complex numbers", "O": "objects", "U": "text", "S": "bytes", "M": "dates", "m": "spans of time"}
+
+
+class Text(str):
+    """What a worker says that has run nothing of a student's; no answer's output."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,17 @@ class Worker:
         """Send a request and return what the reply holds; raises WorkerLost, and kills the worker, if none came."""
         data = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL)
         return self.exchange(struct.pack("<I", len(data)) + data, limit_s)
+
+    def programs(self, cells: list, asked: list, limit_s: float) -> list[tuple[Program, list[str]]]:
+        """Have programs cut out of a notebook, by a worker in which nothing of it has run; each with its shapes."""
+        found = self.ask(("cut", cells, asked), limit_s)
+        if not isinstance(found, Text):
+            raise WorkerLost(found if isinstance(found, Problem) else Problem("ended", "its cells cannot be read"))
+        made = json.loads(found)
+        return [
+            (Program(tuple(map(tuple, pieces)), tuple(calls), refused), shapes)
+            for pieces, calls, refused, shapes in made
+        ]
 
     def greet(self, limit_s: float) -> None:
         """Wait until the worker has loaded its packages; no student's code has run by then."""
@@ -130,11 +147,13 @@ def decode(reply: bytes) -> object:
     letter, rest = reply[:1], reply[1:]
     if letter == b"V":
         return decode_values(rest)
+    if letter == b"J":
+        return Text(rest.decode("utf-8", "replace"))
     if letter == b"C" and rest[1:2] == b"V":
         return Changed(rest[0], decode_values(rest[2:]))
-    if letter == b"E" and len(rest) >= 4:
-        (line,) = struct.unpack("<I", rest[:4])
-        return Problem("exception", f"it raises {exception_text(rest[4:])}", ((line, ""),))
+    if letter == b"E" and len(rest) >= 5:
+        line, piece = struct.unpack("<IB", rest[:5])
+        return Problem("exception", f"it raises {exception_text(rest[5:])}", ((line, str(piece)),))
     if letter in (b"K", b"M", b"D"):
         return worded(letter, rest.decode("ascii", "replace"))
     fixed = {

@@ -1,27 +1,32 @@
-"""Copies of the kit's own code among answers: found by their structure, whatever their names, comments and layout."""
+"""Copies of the kit's own code among answers: each student has the references, since `check` needs them."""
 
-import ast
 import functools
 import inspect
+import threading
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import labkit
-from labkit.course.questions.question import Question
+from labkit.course.grading.shapes import shapes_in
+from labkit.course.questions.program import Cell, program
 
-LEAST_NODES = 45  # of a syntax tree: anybody may write a shorter function just so
+parsing = threading.Lock()  # Python 3.11's parser fails when two threads make syntax trees at a time
 
 
-def found_in(source: str, question: Question) -> list[str]:
-    """Say of which functions of the kit an answer has copies; an empty list if of none, or if it is no Python."""
-    wrong = {misconception.answer.__name__ for misconception in question.misconceptions}
-    own = shapes_in(inspect.getsource(inspect.getmodule(question.reference)))
-    known = known_functions() | {shape: name for shape, name in own.items() if name not in wrong}
-    return [f"has a copy of the kit's {known[shape]}" for shape in shapes_in(source) if shape in known]
+def of_the_kit(shapes: Iterable[str], reference: Callable) -> list[str]:
+    """Say of which functions of the kit there are copies, by the shapes of the functions of an answer to a question."""
+    known = known_functions() | shapes_of(reference)
+    return [f"has a copy of the kit's {known[shape]}" for shape in shapes if shape in known]
+
+
+def known_functions() -> dict[str, str]:
+    """The names of the library's functions that are long enough to be known by their shape."""
+    with parsing:
+        return _known_functions()
 
 
 @functools.cache
-def known_functions() -> dict[str, str]:
-    """The names of the kit's functions that are long enough to be known by their shape; the course's own left out."""
+def _known_functions() -> dict[str, str]:
     root, found = Path(labkit.__file__).parent, {}
     for path in sorted(root.rglob("*.py")):
         if "course" not in path.relative_to(root).parts:
@@ -30,39 +35,19 @@ def known_functions() -> dict[str, str]:
     return found
 
 
-def shapes_in(source: str) -> dict[str, str]:
-    """The shapes of the functions in a source that are long enough, with their names; {} if it is no Python."""
-    try:
-        tree = ast.parse(source)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return {}
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    with_sizes = [(shape_of(node), node.name) for node in functions]
-    return {shape: name for (shape, size), name in with_sizes if size >= LEAST_NODES}
+@functools.cache
+def shapes_of(reference: Callable) -> dict[str, str]:
+    """The shapes of a question's reference and of what it calls; not of the wrong answers beside it."""
+    source = reference_source(reference)
+    with parsing:
+        return shapes_in(source)
 
 
-def shape_of(function: ast.FunctionDef) -> tuple[str, int]:
-    """A function's syntax tree without names of its own, docstring and annotations, and how many nodes it has.
-
-    Names of variables are numbered in the order in which they occur; attributes and called names stay.
-    """
-    numbers: dict[str, str] = {}
-    words = []
-    body = function.body[1:] if ast.get_docstring(function) is not None else function.body
-    waiting = [*reversed(body)]
-    for argument in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs):
-        numbers.setdefault(argument.arg, f"v{len(numbers)}")
-    while waiting:
-        node = waiting.pop()
-        words.append(type(node).__name__)
-        if isinstance(node, ast.Name):
-            words.append(numbers.setdefault(node.id, f"v{len(numbers)}"))
-        elif isinstance(node, ast.Attribute):
-            words.append(node.attr)
-        elif isinstance(node, ast.Constant):
-            words.append(repr(node.value))
-        elif isinstance(node, ast.arg):
-            words.append(numbers.setdefault(node.arg, f"v{len(numbers)}"))
-            continue
-        waiting += reversed([child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr_context)])
-    return " ".join(words), len(words)
+@functools.cache
+def reference_source(reference: Callable) -> str:
+    """A question's reference as a student would write it, with all that it needs."""
+    reference = inspect.unwrap(reference)
+    module = Cell(inspect.getsource(inspect.getmodule(reference)))
+    with parsing:
+        ((_, text),) = program([module], reference.__name__).pieces
+    return "\n".join(line for line in text.splitlines() if line.strip()) + "\n"

@@ -8,7 +8,6 @@ on the public cases that `check` uses. So nothing that an answer does with secre
 import functools
 import hashlib
 import pickle
-import re
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -19,16 +18,18 @@ import numpy as np
 from labkit.course.checking import PUBLIC_SEED
 from labkit.course.grading import copies, sandbox
 from labkit.course.grading.channel import Changed, Worker, WorkerLost
-from labkit.course.grading.reading import Lab, Submission, imported_roots
+from labkit.course.grading.reading import Lab, Submission
 from labkit.course.grading.sandbox import Limits
 from labkit.course.questions.judge import Case, Problem, Verdict, expected_cases, parts, verdict
+from labkit.course.questions.program import Program
 from labkit.course.questions.question import Question, of_topic
 
-ON_DEMAND = ("scipy", "torch")  # they take long to load, so only where an answer names them
+PACKAGES = ("numpy", "scipy", "torch")  # beside the standard library; a process gets those that its program names
 LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at
 ONLY_HIDDEN = (
     "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
 )
+WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Result:
     """What a question earned. says: what was right or wrong, from public cases; hint: of a misconception.
 
     flag: what the instructor should look at, "" if nothing. behaviour: the same for answers that give the same wrong
-    outputs, "" for a right one and for none.
+    outputs, "" for a right one and for none. program: what was run.
     """
 
     question: str
@@ -46,6 +47,7 @@ class Result:
     hint: str = ""
     flag: str = ""
     behaviour: str = ""
+    program: str = ""
 
 
 def grade_submission(
@@ -54,41 +56,77 @@ def grade_submission(
     """Grade every question of a submission that can be read, in the lab's order.
 
     secret: what the random cases are drawn from; the same gives the same cases. unsafe: without a sandbox.
-    Raises ValueError if no sandbox can be made, or if the lab's own setup cell does not run in it.
+    Raises ValueError if no sandbox can be made.
     """
-    questions, limits = of_topic(lab.topic), limits or Limits()
-    runs = {name: Run(lab, submission, questions[name], limits, unsafe) for name in lab.answers}
-    return [
-        grade_question(runs[name], secret) if name in submission.cells else not_graded(lab, name, submission)
-        for name in lab.answers
-    ]
+    grading = Grading(lab, submission, secret, limits or Limits(), unsafe)
+    return [grading.result(name) for name in lab.answers]
 
 
-def grade_question(run: "Run", secret: str) -> Result:
-    """Judge an answer on the secret cases, and say what is wrong with a wrong one by the public cases."""
-    question, source = run.question, run.submission.cells[run.question.function]
-    name, worth = question.function, run.lab.points[question.function]
-    hidden, _ = run.judged(cases_of(question, secret))
-    flags = [f"names {word}" for word in named_modules(source, question) if not named(word, run.lab.answers[name])]
-    flags += copies.found_in(source, question)
-    if hidden.problem is None:
-        return Result(
-            name, worth, worth, f"right in all {len(cases_of(question, secret))} cases", flag="; ".join(flags)
-        )
-    if hidden.problem.kind in LOOK_AT:
-        flags.append(hidden.problem.says)
-    public, outputs = run.judged(cases_of(question, None))
-    if public.problem is None:
-        return Result(name, 0.0, worth, ONLY_HIDDEN, flag="; ".join(flags), behaviour="wrong in secret cases only")
-    problem = with_line(public.problem, source)
-    blank = problem.kind == "unanswered"
-    says = problem.says if blank or problem.kind == "missing" else f"{problem.says} ({public.where})"
-    return Result(name, 0.0, worth, says, public.hint or "", "; ".join(flags), "" if blank else behaviour_of(outputs))
+class Grading:
+    """The grading of one submission, question by question."""
+
+    def __init__(self, lab: Lab, submission: Submission, secret: str, limits: Limits, unsafe: bool):
+        self.lab, self.submission, self.secret, self.limits, self.unsafe = lab, submission, secret, limits, unsafe
+        self.questions = of_topic(lab.topic)
+        self.results: dict[str, Result] = {}
+        self.cuts = dict(zip(lab.answers, self.cut(tuple(lab.answers), {}), strict=True))
+
+    def cut(self, names: Sequence[str], given: dict[str, str]) -> list[tuple[Program, list[str]]]:
+        """Cut the programs of some answers out of the notebook, in the sandbox; each with the shapes of its functions.
+
+        given: the kit's answers, in the place of those that are wrong.
+        """
+        blanks = tuple(self.lab.answers)
+        asked = [(name, blanks, PACKAGES, self.questions[name].forbidden, given) for name in names]
+        cells = [(cell.source, cell.grade_id) for cell in self.submission.code]
+        try:
+            with sandbox.fresh_worker(("numpy",), self.limits, self.unsafe) as worker:
+                return worker.programs(cells, asked, self.limits.case_s)
+        except WorkerLost as lost:
+            return [(Program(refused=f"its notebook cannot be read: {lost.problem.says}"), []) for _ in names]
+
+    def result(self, name: str) -> Result:
+        """What a question earned; answers that it calls are graded before."""
+        if name not in self.results:
+            self.results[name] = not_gradable(self.lab, name, "it calls itself through another answer")
+            self.results[name] = self.graded(name)
+        return self.results[name]
+
+    def graded(self, name: str) -> Result:
+        """Judge an answer on the secret cases, and say what is wrong with a wrong one by the public cases."""
+        question, worth = self.questions[name], self.lab.points[name]
+        if name in self.submission.outdated:
+            version = self.submission.outdated[name]
+            return not_gradable(self.lab, name, f"this task was another one in the lab that labkit {version} released")
+        program, shapes = self.cuts[name]
+        wrong = {other: self.questions[other] for other in program.calls if self.result(other).points == 0.0}
+        if wrong:
+            given = {other: copies.reference_source(callee.reference) for other, callee in wrong.items()}
+            ((program, _),) = self.cut((name,), given)
+        if program.refused:
+            return not_gradable(self.lab, name, program.refused)
+        run = Run(question, program, self.limits, self.unsafe)
+        hidden, _ = run.judged(cases_of(question, self.secret))
+        flags = copies.of_the_kit(shapes, question.reference)
+        text = "\n\n".join("\n".join(filter(str.strip, piece.splitlines())) for _, piece in program.pieces)
+        if hidden.problem is None:
+            says = f"right in all {len(cases_of(question, self.secret))} cases"
+            return Result(name, worth, worth, says, flag="; ".join(flags), program=text)
+        if hidden.problem.kind in LOOK_AT:
+            flags.append(hidden.problem.says)
+        public, outputs = run.judged(cases_of(question, None))
+        base = Result(name, 0.0, worth, ONLY_HIDDEN, "", "; ".join(flags), WRONG_IN_SECRET, text)
+        if public.problem is None:
+            return base
+        problem = with_line(public.problem, program)
+        if problem.kind in ("unanswered", "missing"):
+            return replace(base, says=problem.says, behaviour="")
+        says = f"{problem.says} ({public.where})"
+        return replace(base, says=says, hint=public.hint or "", behaviour=behaviour_of(outputs))
 
 
-def not_graded(lab: Lab, name: str, submission: Submission) -> Result:
-    """The result of a question whose cell cannot be read."""
-    problem = submission.problems[name]
+def not_gradable(lab: Lab, name: str, problem: str) -> Result:
+    """The result of a question whose answer is not run."""
     return Result(name, 0.0, lab.points[name], problem, flag=problem)
 
 
@@ -113,11 +151,10 @@ def _cases(topic: str, function: str, secret: str | None) -> tuple[Case, ...]:
 
 @dataclass(frozen=True)
 class Run:
-    """An answer to a question, and all that is needed to run it in a fresh worker."""
+    """An answer to a question as a program, which runs in a fresh worker each time."""
 
-    lab: Lab
-    submission: Submission
     question: Question
+    program: Program
     limits: Limits
     unsafe: bool
 
@@ -140,11 +177,11 @@ class Run:
 
         After a case that cost the worker, the answer is not called again.
         """
-        outputs, end, name = [], time.monotonic() + self.limits.question_s, self.question.function
+        outputs, name = [], self.question.function
         try:
             with sandbox.fresh_worker(self.packages(), self.limits, self.unsafe) as worker:
-                run_setup(worker, self.lab, self.limits)
-                problem = self.run_cells(worker, end)
+                end = time.monotonic() + self.limits.question_s
+                problem = self.run_pieces(worker, end)
                 for case in cases:
                     output = worker.ask(("call", name, pickle.dumps(case.args)), self.time_left(end))
                     missing = isinstance(output, Problem) and output.kind == "missing"
@@ -153,33 +190,19 @@ class Run:
             outputs += [lost.problem] * (len(cases) - len(outputs))
         return outputs
 
-    def run_cells(self, worker: Worker, end: float) -> Problem | None:
-        """Run the answer's cell after those of the answers that it names; what is wrong with it, None if nothing."""
-        done = None
-        for name in self.needed(self.question.function):
-            done = worker.ask(("cell", name, self.submission.cells[name]), self.time_left(end))
-        return done if isinstance(done, Problem) else None
-
-    def needed(self, name: str) -> list[str]:
-        """An answer, last, and the answers that it names, and so on; in the lab's order."""
-        found, waiting = {name}, [name]
-        while waiting:
-            source = self.submission.cells[waiting.pop()]
-            more = {other for other in self.lab.answers if other in self.submission.cells and named(other, source)}
-            waiting += more - found
-            found |= more
-        return [other for other in self.lab.answers if other in found - {name}] + [name]
+    def run_pieces(self, worker: Worker, end: float) -> Problem | None:
+        """Run the program; what is wrong with it, None if nothing."""
+        for label, text in self.program.pieces:
+            done = worker.ask(("run", label, text), self.time_left(end))
+            if isinstance(done, Problem):
+                return done
+        return None
 
     def packages(self) -> tuple[str, ...]:
-        """NumPy, what the lab's setup imports, and of ON_DEMAND what the program names; not what is forbidden."""
-        setup = imported_roots(self.lab.setup)
-        program = " ".join(self.submission.cells[name] for name in self.needed(self.question.function))
-        wanted = {*setup, *(package for package in ON_DEMAND if package in program)}
+        """NumPy, and the other packages that the program names and the question allows."""
         forbidden = {name.partition(".")[0] for name in self.question.forbidden}
-        if not forbidden.isdisjoint(setup):
-            words = ", ".join(sorted(forbidden))
-            raise ValueError(f"{self.question.name}: forbids what its lab's setup cell imports, {words}")
-        return tuple(sorted(wanted - forbidden))
+        text = " ".join(text for _, text in self.program.pieces)
+        return tuple(name for name in PACKAGES if name == "numpy" or (name in text and name not in forbidden))
 
     def time_left(self, end: float) -> float:
         """Seconds for the next request; raises WorkerLost when the question has used up its time."""
@@ -187,16 +210,6 @@ class Run:
         if left <= 0.0:
             raise WorkerLost(Problem("time", f"all its cases together took more than {self.limits.question_s:g} s"))
         return min(left, self.limits.case_s)
-
-
-def run_setup(worker: Worker, lab: Lab, limits: Limits) -> None:
-    """Run the lab's own setup cell; raises ValueError if it does not run."""
-    try:
-        done = worker.ask(("cell", "setup", lab.setup), limits.start_s)
-    except WorkerLost as lost:
-        done = lost.problem
-    if done is not None:
-        raise ValueError(f"{lab.topic}: its setup cell does not run where answers are graded: {done.says}")
 
 
 # ---------------------------------------------------------------------------------------------- in words
@@ -219,26 +232,13 @@ def told(output: object) -> str:
     return "; ".join(found)
 
 
-def with_line(problem: Problem, source: str) -> Problem:
+def with_line(problem: Problem, program: Program) -> Problem:
     """Say in which of the student's lines an exception was raised, if it is one of them."""
     if not problem.lines:
         return problem
-    number, lines = problem.lines[0][0], source.splitlines()
+    number, piece = problem.lines[0][0], int(problem.lines[0][1])
+    lines = program.pieces[piece][1].splitlines() if piece < len(program.pieces) else []
     if not 1 <= number <= len(lines):
         return replace(problem, lines=())
     line = "".join(c if c.isprintable() else " " for c in lines[number - 1]).strip()
     return replace(problem, says=f"{problem.says} in line {number}: {line[:80]}")
-
-
-def named_modules(source: str, question: Question) -> list[str]:
-    """Modules that an answer names although they are absent: no reason to fail, but the instructor may want to look."""
-    return [word for word in dict.fromkeys((*question.forbidden, "labkit")) if named(word, source)]
-
-
-def named(word: str, source: str) -> bool:
-    """Whether a word stands in a source.
-
-    >>> named("scipy", "import scipy.ndimage"), named("scipy", "not_scipy = 1")
-    (True, False)
-    """
-    return re.search(rf"(?<![\w.]){re.escape(word)}(?!\w)", source) is not None

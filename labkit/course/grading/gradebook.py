@@ -10,7 +10,7 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -27,9 +27,12 @@ from labkit.course.grading.sandbox import NO_SANDBOX
 from labkit.support.files import write_atomically
 
 
-def write_gradebook(course: Path, lab: Lab, graded: Iterable[tuple[Record, Submission]]) -> dict[str, str]:
+def write_gradebook(
+    course: Path, lab: Lab, graded: Iterable[tuple[Record, Submission]], comments: Mapping[str, str]
+) -> dict[str, str]:
     """Write scores and comments into course/gradebook.db, and the copies; returns by student why that failed.
 
+    comments: an instructor's, by group of wrong answers.
     Manual scores stay, and are marked for another look where the answer was graded again. Raises ValueError if the
     gradebook has a lab of that name with other questions.
     """
@@ -41,9 +44,9 @@ def write_gradebook(course: Path, lab: Lab, graded: Iterable[tuple[Record, Submi
                 if record.reason:
                     write_nothing(gradebook, lab, record)
                 else:
-                    write_scores(gradebook, lab, record, submission)
+                    write_scores(gradebook, lab, record, submission, comments)
                     target = course / "autograded" / record.student / lab.topic / f"{lab.topic}.ipynb"
-                    write_atomically(target, copy_for_formgrader(lab, record, submission))
+                    write_atomically(target, copy_for_formgrader(lab, record, submission, comments))
                 gradebook.db.commit()
             except Exception as error:  # of one student: the others' scores are written all the same
                 gradebook.db.rollback()
@@ -84,7 +87,7 @@ def register(course: Path, lab: Lab) -> None:
         raise ValueError(f"{lab.topic}: the gradebook has it with other cells: {error}") from error
 
 
-def write_scores(gradebook, lab: Lab, record: Record, submission: Submission) -> None:
+def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, comments: Mapping[str, str]) -> None:
     """Write one submission's scores, what is said about each answer, and what a person has to grade."""
     where = (lab.topic, lab.topic, record.student)
     gradebook.update_or_create_student(record.student)
@@ -94,7 +97,7 @@ def write_scores(gradebook, lab: Lab, record: Record, submission: Submission) ->
         grade.auto_score = result.points
         grade.needs_manual_grade = grade.manual_score is not None or bool(result.flag)
         warning = [] if record.sandboxed else [f"Warning: {NO_SANDBOX}."]
-        said = harmless_markdown(" ".join([*lines_of(result), *warning]))
+        said = harmless_markdown(" ".join([*lines_of(result, comments), *warning]))
         gradebook.find_comment(result.question, *where).auto_comment = said
     released = {grade_id(cell): source_of(cell) for cell in lab.notebook["cells"]}
     for name in lab.written:
@@ -124,20 +127,21 @@ def timestamp_of(submission: Submission) -> datetime.datetime | None:
         return None
 
 
-def copy_for_formgrader(lab: Lab, record: Record, submission: Submission) -> bytes:
+def copy_for_formgrader(lab: Lab, record: Record, submission: Submission, comments: Mapping[str, str]) -> bytes:
     """The released lab with a student's answers, and the verdict as the output of each tests cell."""
     notebook = copy.deepcopy(lab.notebook)
+    programs = {result.question: result.program for result in record.results}
     results = {f"check_{result.question}": result for result in record.results}
     for cell in notebook["cells"]:
         name = grade_id(cell)
-        if name in submission.cells:
-            answer = submission.cells[name]
+        answer = programs.get(name) or submission.cells.get(name)
+        if answer is not None and cell["metadata"]["nbgrader"].get("solution"):
             cell["source"] = answer if cell["cell_type"] == "code" else harmless_markdown(answer)
         if cell["cell_type"] == "code":
             cell["outputs"], cell["execution_count"] = [], None
         if name in results:
             result = results[name]
-            text = "\n".join([f"{result.points:g} of {result.max_points:g} points", *lines_of(result)])
+            text = "\n".join([f"{result.points:g} of {result.max_points:g} points", *lines_of(result, comments)])
             if not record.sandboxed:
                 text += f"\nWarning: {NO_SANDBOX}."
             cell["outputs"] = [{"output_type": "stream", "name": "stdout", "text": text + "\n"}]

@@ -21,11 +21,11 @@ def harmless_markdown(text: str) -> str:
     >>> harmless_markdown("**a < b**, $x^2$ <img src=x onerror=alert(1)>")
     '**a < b**, $x^2$ < img src=x onerror=alert(1)>'
     >>> harmless_markdown("[here](javascript:alert(1)) and ![](http://a.b/c.png)")
-    '[here] (javascript :alert(1)) and ! [] (http://a.b/c.png)'
+    '[here] (javascript :alert(1)) and ! [] (http ://a.b/c.png)'
     """
     text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]", "", text)  # controls and directions
     text = re.sub(r"<(?=[A-Za-z/!?])", "< ", text)  # no tag begins with a space
     text = re.sub(r"!(?=\s*\[)", "! ", text)
     text = re.sub(r"\](?=[(\[:])", "] ", text)
-    text = re.sub(r"(?i)\b(javascript|vbscript|data|file)(?=\s*:)", r"\1 ", text)
+    text = re.sub(r"(?i)\b(javascript|vbscript|data|file)(?=\s*:)|(https?|ftp)(?=://)", r"\g<0> ", text)
     return re.sub(rf"\\(?=(?:{REACHING})(?![A-Za-z]))", r"\\ ", text)

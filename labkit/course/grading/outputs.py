@@ -1,4 +1,4 @@
-"""What grading leaves: a table for the instructor, and for each student a page of feedback and Gradescope's results.
+"""What grading leaves: tables for the instructor, and for each student a page of feedback and Gradescope's results.
 
 All of it is written from the records alone, so that the same records give the same bytes. None of it holds an expected
 value, an argument of a random case or the secret seed.
@@ -8,17 +8,20 @@ import csv
 import io
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
 from labkit.course.grading.batch import Record
 from labkit.course.grading.grade import Result
+from labkit.course.grading.overview import Group, Standing, group_of, standings
 from labkit.course.grading.reading import Lab
 from labkit.course.grading.sandbox import NO_SANDBOX
 from labkit.support.files import write_atomically
 
 COLUMNS = ("student", "lab", "question", "points", "max_points", "verdict", "hint", "look_at")
+CLASS_COLUMNS = ("question", "group", "students", "tried", "passed", "named", "says")
+LONGEST_SAMPLE = 4000  # characters
 NOT_GRADED = "not graded"
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:46rem;margin:2rem auto;padding:0 1rem;color:#222}
 h1{font-size:1.5rem}.points{float:right;color:#555}section{border-left:5px solid;padding:.2rem 1rem;margin:1rem 0}
@@ -26,28 +29,42 @@ h1{font-size:1.5rem}.points{float:right;color:#555}section{border-left:5px solid
 h2{font-size:1.1rem;margin:.2rem 0}p{margin:.3rem 0}"""
 
 
-def write_outputs(out: Path, lab: Lab, records: Sequence[Record]) -> None:
-    """Write grades.csv, and feedback/STUDENT.html and results/STUDENT/results.json for each student."""
-    out = Path(out)
-    write_atomically(out / "grades.csv", grades_csv(lab, records).encode())
+def write_outputs(out: Path, lab: Lab, records: Sequence[Record], comments: Mapping[str, str]) -> None:
+    """Write grades.csv, class.csv and class.html, and feedback/STUDENT.html and results/STUDENT/results.json of each.
+
+    comments: an instructor's, by group of wrong answers.
+    """
+    out, found = Path(out), standings(lab, records)
+    files = {
+        "grades.csv": grades_csv(lab, records),
+        "class.csv": class_csv(found, records),
+        "class.html": class_page(lab, found, comments, records),
+    }
     for record in records:
-        name = record.student
-        write_atomically(out / "feedback" / f"{name}.html", feedback_page(lab, record).encode())
-        write_atomically(out / "results" / name / "results.json", gradescope(lab, record).encode())
+        files[f"feedback/{record.student}.html"] = feedback_page(lab, record, comments)
+        files[f"results/{record.student}/results.json"] = gradescope(lab, record, comments)
+    for name, text in files.items():
+        write_atomically(out / name, text.encode())
 
 
 def grades_csv(lab: Lab, records: Sequence[Record]) -> str:
-    """One row a student and question; a submission that could not be graded has one row, and its reason as verdict."""
-    text = io.StringIO(newline="")
-    if not all(record.sandboxed for record in records):
-        text.write(f"# {NO_SANDBOX}\n")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(COLUMNS)
+    """One row per student and question; one row, with the reason, for a submission that could not be graded."""
+    text, table = new_table(records, COLUMNS)
     for record in records:
         total = f"{sum(lab.points.values()):g}"
         rows = [("", "0", total, record.reason, "", NOT_GRADED)] if record.reason else map(row_of, record.results)
         table.writerows([harmless(cell) for cell in (record.student, lab.topic, *row)] for row in rows)
     return text.getvalue()
+
+
+def new_table(records: Sequence[Record], columns: Sequence[str]) -> tuple[io.StringIO, object]:
+    """A text, and a writer of rows into it, with the warning and the head of a table."""
+    text = io.StringIO(newline="")
+    if not all(record.sandboxed for record in records):
+        text.write(f"# {NO_SANDBOX}\n")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    return text, table
 
 
 def row_of(result: Result) -> tuple[str, ...]:
@@ -64,7 +81,7 @@ def harmless(cell: str) -> str:
     return re.sub(r"(^|[;,|\t\r\n])(\s*)(?=[=+@-])", r"\1\2'", cell)
 
 
-def gradescope(lab: Lab, record: Record) -> str:
+def gradescope(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     """The results.json that Gradescope's autograder harness reads."""
     warning = "" if record.sandboxed else f"Warning: {NO_SANDBOX}."
     tests = [
@@ -73,7 +90,7 @@ def gradescope(lab: Lab, record: Record) -> str:
             "score": result.points,
             "max_score": result.max_points,
             "status": "passed" if is_right(result) else "failed",
-            "output": "\n".join(lines_of(result)),
+            "output": "\n".join(lines_of(result, comments)),
             "visibility": "visible",
         }
         for result in record.results
@@ -88,20 +105,22 @@ def is_right(result: Result) -> bool:
     return result.points == result.max_points
 
 
-def lines_of(result: Result) -> list[str]:
+def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
     """What a student is told about a question."""
     said = result.says[:1].upper() + result.says[1:] + "."
-    return [said, f"Hint: {result.hint}"] if result.hint else [said]
+    hint = [f"Hint: {result.hint}"] if result.hint else []
+    comment = comments.get(group_of(result), "")
+    return [said, *hint, *([f"Comment: {comment}"] if comment else [])]
 
 
-def feedback_page(lab: Lab, record: Record) -> str:
+def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     """A student's page."""
     title = escape(f"{lab.topic}: {record.student}")
-    parts = ["" if record.sandboxed else f'<p class="warning">Warning: {escape(NO_SANDBOX)}.</p>']
+    parts = [warning_of([record])]
     if record.reason:
         parts.append(f'<p class="warning">This submission could not be graded: {escape(record.reason)}.</p>')
     for result in record.results:
-        told = "".join(f"<p>{escape(line)}</p>" for line in lines_of(result))
+        told = "".join(f"<p>{escape(line)}</p>" for line in lines_of(result, comments))
         mark, kind = ("✔", "right") if is_right(result) else ("✘", "wrong")
         points = f'<span class="points">{result.points:g} of {result.max_points:g} points</span>'
         parts.append(f'<section class="{kind}"><h2>{points}{mark} {escape(result.question)}</h2>{told}</section>')
@@ -115,8 +134,69 @@ def feedback_page(lab: Lab, record: Record) -> str:
     )
 
 
+def class_csv(found: Sequence[Standing], records: Sequence[Record]) -> str:
+    """One row per question, and one per group of wrong answers."""
+    text, table = new_table(records, CLASS_COLUMNS)
+    for standing in found:
+        counts = (str(standing.tried), str(standing.passed))
+        table.writerow((standing.question, "", "", *counts, "", ""))
+        for group in standing.groups:
+            row = (
+                group.question,
+                group.name,
+                str(len(group.students)),
+                "",
+                "",
+                "yes" if group.named else "no",
+                group.says,
+            )
+            table.writerow([harmless(cell) for cell in row])
+    return text.getvalue()
+
+
+def class_page(lab: Lab, found: Sequence[Standing], comments: Mapping[str, str], records: Sequence[Record]) -> str:
+    """The page for the instructor, with a sample of each group."""
+    parts = [f"<h1>{escape(lab.topic)}: {len(records)} submissions</h1>", warning_of(records)]
+    parts.append("<table><tr><th>question</th><th>tried</th><th>passed</th><th>kinds of mistakes</th></tr>")
+    for s in found:
+        cells = (f'<a href="#{escape(s.question)}">{escape(s.question)}</a>', s.tried, s.passed, len(s.groups))
+        parts.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    parts.append("</table>")
+    for standing in found:
+        parts.append(f'<h2 id="{escape(standing.question)}">{escape(standing.question)}</h2>')
+        parts += [group_section(group, comments.get(group.name, "")) for group in standing.groups]
+        parts += [] if standing.groups else ["<p>No wrong answer.</p>"]
+    title = escape(f"{lab.topic}: the class")
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}'
+        "table{border-collapse:collapse}td,th{padding:.2rem 1rem;text-align:left;border-bottom:1px solid #ddd}"
+        "pre{background:#f6f6f6;padding:.5rem;overflow:auto}</style></head><body>\n"
+        + "\n".join(parts)
+        + "\n</body></html>\n"
+    )
+
+
+def group_section(group: Group, comment: str) -> str:
+    """One group: who is in it, what they were told, and the program of the first."""
+    count = f"{len(group.students)} student{'s' if len(group.students) > 1 else ''}"
+    kind = "" if group.named else " <em>unnamed</em>"
+    said = f"<p><b>Your comment:</b> {escape(comment)}</p>" if comment else ""
+    sample = escape(group.sample[:LONGEST_SAMPLE])
+    return (
+        f'<section class="wrong"><h3>{escape(group.name)}: {count}{kind}</h3><p>{escape(group.says)}</p>{said}'
+        f"<p>{escape(', '.join(group.students))}</p><details><summary>The first of them</summary><pre>{sample}</pre>"
+        "</details></section>"
+    )
+
+
+def warning_of(records: Sequence[Record]) -> str:
+    """What a page says if something on it was graded without a sandbox."""
+    sandboxed = all(record.sandboxed for record in records)
+    return "" if sandboxed else f'<p class="warning">Warning: {escape(NO_SANDBOX)}.</p>'
+
+
 def terminal_table(lab: Lab, records: Sequence[Record]) -> str:
-    """A line a student: points by question, all together, and what an instructor should look at."""
+    """A line per student: points by question, all together, and what an instructor should look at."""
     names = list(lab.points)
     rows = [["student", *names, "points", ""]]
     for record in records:

@@ -6,21 +6,20 @@ lab's grade ids. Its tests, its points, its outputs and the order of its cells a
 once, so that what is graded is what is shown, whatever happens to the file meanwhile.
 """
 
-import ast
 import hashlib
 import json
 import os
 import stat
-import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from labkit.course.questions.program import Cell, cells_of
 from labkit.course.questions.question import Question, of_topic
 
 MOST_BYTES = 20 << 20
 MOST_VALUES = 1_000_000  # of JSON: a second of parsing and 100 MB of memory
 MOST_CELLS = 5_000
-MOST_SOURCE = 200_000  # characters of one cell
+MOST_SOURCE = 1_000_000  # characters of code
 LONGEST_NAME = 100
 ODD_NAME = "odd-name-"
 # What HTML, shells, other file systems or spreadsheets would read as more than a letter of a name.
@@ -31,32 +30,33 @@ UNSAFE_IN_NAMES = frozenset("<>&\"'`/\\:*?|;%")
 class Lab:
     """A released lab. answers: source of each blank by its grade id; points: what each is worth, by the same.
 
-    setup: source of the cell that the answers build on. written: grade ids of the answers that a person grades.
-    notebook: all of it, as JSON has it; digest: of the file.
+    written: grade ids of the answers that a person grades. tasks: what names each task as it was released. notebook:
+    all of it, as JSON has it; digest: of the file.
     """
 
     topic: str
-    setup: str
     answers: dict[str, str]
     points: dict[str, float]
     written: tuple[str, ...]
+    tasks: dict[str, str]
     notebook: dict
     digest: str
 
 
 @dataclass(frozen=True)
 class Submission:
-    """What a student handed in. cells: source by grade id, of the answers and of the written ones.
+    """What a student handed in. code: all code cells; cells: source by grade id, of the answers and the written ones.
 
-    problems: by grade id, why there is no source. reason: why none of it can be graded; "" if it can. timestamp: what
-    nbgrader's timestamp.txt beside the notebook says, as it stands there.
+    reason: why it cannot be graded; "" if it can. outdated: tasks that were other ones in the lab that the student had,
+    with the version of the kit that released it. timestamp: what nbgrader's timestamp.txt beside the notebook says.
     """
 
     student: str
-    cells: dict[str, str]
-    problems: dict[str, str]
-    reason: str
-    digest: str
+    code: tuple[Cell, ...] = ()
+    cells: dict[str, str] = field(default_factory=dict)
+    reason: str = ""
+    digest: str = "unreadable"
+    outdated: dict[str, str] = field(default_factory=dict)
     timestamp: str = ""
 
 
@@ -81,25 +81,28 @@ def read_lab(course: Path, topic: str) -> tuple[Lab, dict[str, Question]]:
     marks = {name: cell["metadata"]["nbgrader"] for name, cell in cells.items()}
     answers = {name: source_of(cells[name]) for name in marks if name in questions and marks[name].get("solution")}
     lacking = [name for name in questions if name not in answers or f"check_{name}" not in cells]
-    if lacking or "setup" not in cells:
-        raise ValueError(f"{path}: expected a cell `setup` and an answer and tests of each question, lacks {lacking}")
+    if lacking:
+        raise ValueError(f"{path}: expected an answer and tests of each question, lacks {', '.join(lacking)}")
     points = {name: float(marks[f"check_{name}"]["points"]) for name in answers}
     written = tuple(name for name, mark in marks.items() if mark.get("grade") and mark.get("solution"))
-    lab = Lab(topic, source_of(cells["setup"]), answers, points, written, notebook, hashlib.sha256(data).hexdigest())
+    digest = hashlib.sha256(data).hexdigest()
+    lab = Lab(topic, answers, points, written, released_by(notebook)[1], notebook, digest)
     return lab, {name: questions[name] for name in answers}
 
 
-def imported_roots(source: str) -> tuple[str, ...]:
-    """The packages beside the standard library that the instructor's own code imports; NumPy always.
+def released_by(notebook: dict) -> tuple[str, dict[str, str]]:
+    """The version of the kit that released a notebook, and what names its tasks; ("", {}) if it does not say.
 
-    >>> imported_roots("import torch.nn as nn")
-    ('numpy', 'torch')
+    >>> released_by({"metadata": {"labkit": {"version": "0.1.0", "tasks": {"iou": "5c0e"}}}})
+    ('0.1.0', {'iou': '5c0e'})
     """
-    nodes = list(ast.walk(ast.parse(source)))
-    names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
-    names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
-    roots = {name.partition(".")[0] for name in names} - sys.stdlib_module_names
-    return tuple(sorted({"numpy", *roots}))
+    try:
+        mark = notebook["metadata"]["labkit"]
+        version, tasks = str(mark["version"])[:20], dict(mark["tasks"])
+    except (TypeError, KeyError, ValueError):
+        return "", {}
+    good = version.isascii() and version.isprintable() and all(isinstance(task, str) for task in tasks.values())
+    return (version, tasks) if good else ("", {})
 
 
 # -------------------------------------------------------------------------------------------------- submissions
@@ -128,12 +131,19 @@ def read_submission(place: Path, lab: Lab) -> Submission | None:
             return None
         data = read_bytes(notebook, MOST_BYTES)
         digest = hashlib.sha256(data).hexdigest()
-        cells, problems = pick_cells(parse(data), lab)
+        content = parse(data)
+        code, cells = pick_cells(content["cells"], lab)
     except Unreadable as reason:
-        return Submission(student, {}, {}, str(reason), digest)
+        return Submission(student, reason=str(reason), digest=digest)
     except OSError as error:
-        return Submission(student, {}, {}, f"it cannot be opened: {error.strerror}", digest)
-    return Submission(student, cells, problems, "", digest, timestamp_beside(notebook))
+        return Submission(student, reason=f"it cannot be opened: {error.strerror}", digest=digest)
+    return Submission(student, code, cells, "", digest, outdated(content, lab), timestamp_beside(notebook))
+
+
+def outdated(notebook: dict, lab: Lab) -> dict[str, str]:
+    """The tasks that were other ones in the notebook that a student got, with the version that released it."""
+    version, tasks = released_by(notebook)
+    return {name: version for name in lab.answers if name in tasks and tasks[name] != lab.tasks.get(name)}
 
 
 def timestamp_beside(notebook: Path) -> str:
@@ -207,8 +217,8 @@ def read_bytes(path: Path, most: int) -> bytes:
     return data
 
 
-def parse(data: bytes) -> list:
-    """The cells of a notebook of format 4."""
+def parse(data: bytes) -> dict:
+    """A notebook of format 4."""
     if sum(map(data.count, (b",", b"[", b"{"))) > MOST_VALUES:
         raise Unreadable(f"it holds more than {MOST_VALUES:,} values: clear its outputs")
     try:
@@ -223,32 +233,22 @@ def parse(data: bytes) -> list:
         raise Unreadable("it is not a notebook of format 4: there is no list of cells")
     if len(notebook["cells"]) > MOST_CELLS:
         raise Unreadable(f"it has more than {MOST_CELLS:,} cells")
-    return notebook["cells"]
+    return notebook
 
 
-def pick_cells(cells: list, lab: Lab) -> tuple[dict[str, str], dict[str, str]]:
-    """The sources of the cells that the lab asks for, and what is wrong with the others, both by grade id."""
-    wanted = (*lab.answers, *lab.written)
-    found = {name: [] for name in wanted}
+def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]:
+    """The code cells, and by grade id the sources that the lab asks for; where several have one, all of them."""
+    code = tuple(Cell(plain_text(cell.source), cell.grade_id) for cell in cells_of(cells))
+    if sum(len(cell.source) for cell in code) > MOST_SOURCE:
+        raise Unreadable(f"its code is longer than {MOST_SOURCE:,} characters")
+    texts = {name: {} for name in (*lab.answers, *lab.written)}
     for cell in cells:
-        if (name := grade_id(cell)) in found:
-            found[name].append(cell)
-    if not any(found.values()):
+        name = grade_id(cell)
+        if name in texts and (text := source_of(cell)) is not None:
+            texts[name][text[:MOST_SOURCE]] = None
+    if not any(texts.values()) and not any(f"def {name}" in cell.source for name in lab.answers for cell in code):
         raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
-    sources, problems = {}, {}
-    for name, same in found.items():
-        texts = {source_of(cell) for cell in same}
-        if not same:
-            problems[name] = "its cell is missing"
-        elif len(texts) > 1:
-            problems[name] = f"{len(same)} different cells have its grade id"
-        elif (text := texts.pop()) is None or (name in lab.answers and same[0].get("cell_type") != "code"):
-            problems[name] = "its cell is not a code cell with source"
-        elif len(text) > MOST_SOURCE:
-            problems[name] = f"its cell is longer than {MOST_SOURCE} characters"
-        else:
-            sources[name] = text
-    return sources, problems
+    return code, {name: "\n\n".join(found) for name, found in texts.items() if found}
 
 
 def grade_id(cell: object) -> str | None:
@@ -265,4 +265,9 @@ def source_of(cell: dict) -> str | None:
     source = cell.get("source")
     if isinstance(source, list) and all(isinstance(line, str) for line in source):
         source = "".join(source)
-    return source.encode("utf-8", "replace").decode() if isinstance(source, str) else None
+    return plain_text(source) if isinstance(source, str) else None
+
+
+def plain_text(text: str) -> str:
+    """A text without halves of characters, which JSON can hold and files cannot."""
+    return text.encode("utf-8", "replace").decode()

@@ -22,8 +22,9 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from labkit.course.grading import bwrap, seccomp, worker
+from labkit.course.grading import bwrap, seccomp, shapes, worker
 from labkit.course.grading.channel import Worker, WorkerLost
+from labkit.course.questions import program
 from labkit.support.packages import requirements
 
 PACKAGES = "/packages"
@@ -39,6 +40,8 @@ ENVIRONMENT = {
 }
 NO_SANDBOX = "graded WITHOUT a sandbox: a submission could read and change anything here, grades and this file included"
 FAREWELL_S = 10.0  # for the server to kill a child
+# What cuts programs out of notebooks: a stranger's text is parsed in the sandbox, too.
+TOOLS = {"program": os.path.abspath(program.__file__), "shapes": os.path.abspath(shapes.__file__)}
 counter = itertools.count(os.getpid())
 
 
@@ -71,6 +74,7 @@ def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
             "file_size": limits.file_mb << 20,
             "threads": None if unsafe else limits.threads,
             "cpu_s": int(limits.question_s) + 5,
+            "tools": TOOLS if unsafe else {name: f"/{name}.py" for name in TOOLS},
             "filter": "" if unsafe else base64.b64encode(seccomp.program()).decode(),
         }
     )
@@ -269,7 +273,8 @@ def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | N
     shown += [(loader, os.path.realpath(loader)) for loader in LOADERS if os.path.exists(loader)]
     shown += [(f"{PACKAGES}/{name}", str(path)) for name, path in sorted(tops.items())]
     shown += [(f"/dev/{name}", f"/dev/{name}") for name in ("null", "urandom", "zero")]
-    return python, [*dict.fromkeys(shown), ("/worker.py", os.path.abspath(worker.__file__))]
+    programs = TOOLS | {"worker": os.path.abspath(worker.__file__)}
+    return python, [*dict.fromkeys(shown), *((f"/{name}.py", path) for name, path in programs.items())]
 
 
 def names_of(library: str) -> list[str]:

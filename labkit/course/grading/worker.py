@@ -5,11 +5,12 @@ everything here is in the student's hands: the other end, `channel`, believes no
 replies go out on stdout, each with its length before it; a request is a pickle (it comes from the grader), a reply is:
 
     V count dtype ndim shape ... data    an output: one value, or a tuple of `count`
-    O                                    a cell that ran
+    O                                    a piece of the program that ran
     U                                    a blank: NotImplementedError raised in the student's own lines
     A                                    there is no function of that name
     C position ...                       an output, as above, of a call that changed its argument at that position
-    E line name message                  an exception
+    E line piece name message            an exception
+    J ...                                the programs of the answers, as JSON
     M name                               a module that is not there
     K name, D kind, L, B                 a value that is no number, of a dtype that is none, too many, too big
 """
@@ -17,11 +18,11 @@ replies go out on stdout, each with its length before it; a request is a pickle 
 import base64
 import ctypes
 import importlib
+import importlib.util
 import io
 import json
 import os
 import pickle
-import re
 import signal
 import socket
 import struct
@@ -76,36 +77,59 @@ def as_array(value: object):
     return array.astype(array.dtype.newbyteorder("<"))
 
 
-def compiled(source: str, name: str):
-    """Compile a cell; if it is no Python, once more with IPython's magics and shell lines taken out."""
-    try:
-        return compile(source, name, "exec", dont_inherit=True)
-    except SyntaxError:
-        return compile(re.sub(r"(?m)^([ \t]*)[%!].*$", r"\1pass", source), name, "exec", dont_inherit=True)
+class Session:
+    """What a worker is asked to do: to cut programs out of a notebook, to run one, and to call its function."""
 
+    def __init__(self, tools: dict[str, str]):
+        self.tools, self.namespace, self.pieces = tools, {"__name__": "__main__"}, []
 
-def answer(namespace: dict, request: tuple) -> bytes:
-    """Do what a request asks for, ("cell", name, source) or ("call", name, pickled arguments), and write the reply."""
-    kind, name, content = request
-    try:
-        if kind == "cell":
-            exec(compiled(content, f"<{name}>"), namespace)
-            return b"O"
-        if not callable(namespace.get(name)):
+    def answer(self, request: tuple) -> bytes:
+        """Do what a request asks for, and write the reply: its first word says which method, the rest its arguments."""
+        try:
+            return getattr(self, request[0])(*request[1:])
+        except Refused as refusal:
+            return refusal.args[0]
+        except ModuleNotFoundError as error:
+            return b"M" + str(error.name).encode()[:60]
+        except BaseException as error:  # SystemExit and KeyboardInterrupt as well
+            line, piece, last = own_line(error.__traceback__, self.pieces)
+            if isinstance(error, NotImplementedError) and last:
+                return b"U"
+            return b"E" + struct.pack("<IB", line, piece) + f"{type(error).__name__}\0{message_of(error)}".encode()
+
+    def cut(self, cells: list[tuple[str, str]], asked: list[tuple]) -> bytes:
+        """Cut programs out of a notebook's cells: (name, blanks, packages, forbidden, given) each. Nothing is run."""
+        program, shapes = (load(name, path) for name, path in sorted(self.tools.items()))
+        cells = [program.Cell(*cell) for cell in cells]
+        found = []
+        for arguments in asked:
+            made = program.program(cells, *arguments)
+            text = "\n".join(text for _, text in made.pieces)
+            found.append((made.pieces, made.calls, made.refused, list(shapes.shapes_in(text))))
+        return b"J" + json.dumps(found).encode()
+
+    def run(self, label: str, source: str) -> bytes:
+        """Run a piece of a program."""
+        self.pieces.append(f"<{label}>")
+        exec(compile(source, self.pieces[-1], "exec", dont_inherit=True), self.namespace)
+        return b"O"
+
+    def call(self, name: str, content: bytes) -> bytes:
+        """Call a function of the program on pickled arguments."""
+        if not callable(self.namespace.get(name)):
             return b"A"
         given = pickle.loads(content)
-        reply = encode(namespace[name](*given))
+        reply = encode(self.namespace[name](*given))
         changed = [i for i, pair in enumerate(zip(given, pickle.loads(content), strict=True)) if not same(*pair)]
         return b"C" + bytes(changed[:1]) + reply if changed and reply[:1] == b"V" else reply
-    except Refused as refusal:
-        return refusal.args[0]
-    except ModuleNotFoundError as error:
-        return b"M" + str(error.name).encode()[:60]
-    except BaseException as error:  # SystemExit and KeyboardInterrupt as well
-        line, last = own_line(error.__traceback__, f"<{name}>")
-        if isinstance(error, NotImplementedError) and last:
-            return b"U"
-        return b"E" + struct.pack("<I", line) + f"{type(error).__name__}\0{message_of(error)}".encode()
+
+
+def load(name: str, path: str):
+    """Import a module of the kit's from its file; it needs the standard library alone."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def same(a: object, b: object) -> bool:
@@ -125,13 +149,14 @@ def message_of(error: BaseException) -> str:
         return ""
 
 
-def own_line(trace, cell: str) -> tuple[int, bool]:
-    """The last line of a cell in a traceback, 0 if there is none, and whether the exception was raised right there."""
-    line, last = 0, False
+def own_line(trace, pieces: list[str]) -> tuple[int, int, bool]:
+    """The last line of the program in a traceback and its piece, 0 if none; and whether it was raised right there."""
+    line, piece, last = 0, 0, False
     while trace is not None:
-        last = trace.tb_frame.f_code.co_filename == cell
-        line, trace = (trace.tb_lineno if last else line), trace.tb_next
-    return line, last
+        file = trace.tb_frame.f_code.co_filename
+        last = file in pieces
+        line, piece, trace = (trace.tb_lineno if last else line), (pieces.index(file) if last else piece), trace.tb_next
+    return line, min(piece, 255), last
 
 
 class Only:
@@ -162,7 +187,7 @@ def main(options: dict) -> None:
         requests, replies = os.dup(0), os.dup(1)
         sys.meta_path.insert(0, Only(options["only"]))
         limit(options)
-        serve(requests, replies)
+        serve(requests, replies, options["tools"])
         return
     control = socket.socket(fileno=os.dup(0))
     control.send(b"r")
@@ -175,7 +200,7 @@ def main(options: dict) -> None:
             control.close()
             limit(options)
             lock_in(options)
-            serve(*pipes)
+            serve(*pipes, options["tools"])
             os._exit(0)
         for pipe in pipes:
             os.close(pipe)
@@ -221,16 +246,16 @@ def lock_in(options: dict) -> None:
         raise OSError(ctypes.get_errno(), "the filter of system calls cannot be set")
 
 
-def serve(requests: int, replies: int) -> None:
+def serve(requests: int, replies: int, tools: dict[str, str]) -> None:
     """Answer requests until there are no more. The first reply, O, says that the packages are loaded."""
     null = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1, 2):
         os.dup2(null, standard)
     with os.fdopen(requests, "rb") as stream, os.fdopen(replies, "wb", buffering=0) as out:
         send(out, b"O")
-        namespace = {"__name__": "__main__"}
+        session = Session(tools)
         while len(head := stream.read(4)) == 4:
-            send(out, answer(namespace, pickle.loads(stream.read(*struct.unpack("<I", head)))))
+            send(out, session.answer(pickle.loads(stream.read(*struct.unpack("<I", head)))))
 
 
 def send(stream: io.RawIOBase, reply: bytes) -> None:

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import socket
+import textwrap
 import time
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from labkit.course.grading.gradebook import opened
 from labkit.course.grading.reading import name_of
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
+from labkit.course.grading.shapes import shapes_in
 from labkit.course.questions.question import of_topic
 
 TOPIC = "04_iou"
@@ -61,7 +63,8 @@ def hostile_class(tmp_path_factory):
             "{secret}": SECRET_VARIABLE,
         }
         for attack in ATTACKS:
-            source = attack.source
+            source = attack.source  # as one statement, so that all of it belongs to the program
+            source = source if source.startswith("!") else "if True:\n" + textwrap.indent(source, "    ")
             for name, value in known.items():
                 source = source.replace(name, value)
             kit.submit(course, attack.name, TOPIC, right | {"iou": source})
@@ -140,7 +143,7 @@ def test_nothing_is_left_outside_the_sandbox(hostile_class):
     known = {"labs", "submitted", "autograded", "grades", "gradebook.db"}
     assert {path.name for path in course.iterdir()} == known
     made = {path.name for path in (course / "grades" / TOPIC).iterdir()}
-    assert made == {"grades.csv", "feedback", "results", "records", "secret_seed"}
+    assert made == {"grades.csv", "class.csv", "class.html", "feedback", "results", "records", "secret_seed"}
     assert not (Path(kit.np.__file__).parent / "evil.py").exists()
 
 
@@ -219,4 +222,4 @@ def test_copies_of_the_kits_code_are_flagged_whatever_their_names_and_layout(tmp
     assert "labkit.metrics.boundary_counts" in flags["boundary_band"] and not flags["iou"]
     for question in of_topic(TOPIC).values():
         for answer in kit.alternatives(question):
-            assert copies.found_in(kit.as_cell(answer, question.function), question) == []
+            assert copies.of_the_kit(shapes_in(kit.as_cell(answer, question.function)), question.reference) == []

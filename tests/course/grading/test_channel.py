@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from labkit.course.grading import worker
-from labkit.course.grading.channel import Changed, decode
+from labkit.course.grading.channel import Changed, Text, decode
 from labkit.course.questions.judge import Problem
 
 NUMBERS = [dtype for code in "bhilqBHILQ" for dtype in (np.dtype(code),)] + [
@@ -61,14 +61,14 @@ def test_numbers_and_tensors_come_back_as_numbers_and_arrays():
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=80))
 def test_no_bytes_do_harm(data):
-    for reply in (data, b"V" + data, b"E" + data, b"K" + data, b"M" + data, b"D" + data, b"C\0V" + data):
+    for reply in (data, b"V" + data, b"E" + data, b"K" + data, b"M" + data, b"D" + data, b"C\0V" + data, b"J" + data):
         try:
             got = decode(reply)
         except ValueError:
             continue
         got = got.value if isinstance(got, Changed) else got
         parts = got if isinstance(got, tuple) else (got,)
-        assert all(part is None or isinstance(part, Problem | np.generic | np.ndarray) for part in parts)
+        assert all(part is None or isinstance(part, Problem | Text | np.generic | np.ndarray) for part in parts)
 
 
 @settings(max_examples=60, deadline=None)
@@ -109,12 +109,12 @@ def test_truth_values_are_true_or_false():
 @pytest.mark.parametrize(
     ("reply", "says"),
     [
-        (b"E" + struct.pack("<I", 3) + b"IndexError\0", "it raises IndexError"),
-        (b"E" + struct.pack("<I", 3) + b"IndexError\0index 3 is out", "it raises IndexError: index 3 is out"),
-        (b"E" + struct.pack("<I", 3) + b"KeyError\0\x1b[31m\n\xff", "it raises KeyError: [31m \ufffd"),
-        (b"E" + struct.pack("<I", 3) + b"KeyError\0" + 999 * b"x", "it raises KeyError: " + 211 * "x"),
-        (b"E" + struct.pack("<I", 3) + b"SecretIs42\0", "it raises an exception"),
-        (b"E" + struct.pack("<I", 3) + b"print\0", "it raises an exception"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"IndexError\0", "it raises IndexError"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"IndexError\0index 3 is out", "it raises IndexError: index 3 is out"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"KeyError\0\x1b[31m\n\xff", "it raises KeyError: [31m \ufffd"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"KeyError\0" + 999 * b"x", "it raises KeyError: " + 211 * "x"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"SecretIs42\0", "it raises an exception"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"print\0", "it raises an exception"),
         (b"Kdict", "expected an array or a number, got dict"),
         (b"KSecretIs42", "expected an array or a number, got something else"),
         (b"KNoneType", "it returns None: is a `return` missing?"),
@@ -130,9 +130,9 @@ def test_only_known_words_and_short_messages_are_repeated(reply, says):
 
 def test_a_call_that_changes_its_argument_says_so():
     cell = "def f(a, b, c):\n    b[0] = 9.0\n    c[1].append(0)\n    return a + b\n"
-    namespace, arguments = {}, (np.ones(2), np.array([1.0, np.nan]), (1, [2]))
-    worker.answer(namespace, ("cell", "f", cell))
-    got = decode(worker.answer(namespace, ("call", "f", pickle.dumps(arguments))))
+    session, arguments = worker.Session({}), (np.ones(2), np.array([1.0, np.nan]), (1, [2]))
+    assert session.answer(("run", "f", cell)) == b"O"
+    got = decode(session.answer(("call", "f", pickle.dumps(arguments))))
     assert isinstance(got, Changed) and got.position == 1 and got.value[0] == 10.0
-    namespace["f"] = lambda a, b, c: a
-    assert same(decode(worker.answer(namespace, ("call", "f", pickle.dumps(arguments)))), arguments[0])
+    session.namespace["f"] = lambda a, b, c: a
+    assert same(decode(session.answer(("call", "f", pickle.dumps(arguments)))), arguments[0])

@@ -5,19 +5,16 @@ import json
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
-import time
-import urllib.error
 import urllib.request
 from pathlib import Path
 
 import pytest
+import serving
 
 ROOT = Path(__file__).parents[3]
 PAGES = [page for page in (ROOT / "README.md", ROOT / "docs/grading.md") if "labkit grade 04_iou\n" in page.read_text()]
-TOKEN = "formgrader-test"
 # What the students of tests/data/submitted have right.
 RIGHT = {
     "ada": {"confusion_matrix", "iou", "precision_recall", "mean_iou", "boundary_band"},
@@ -48,7 +45,7 @@ def test_there_is_such_a_page():
     assert PAGES
 
 
-def test_the_commands_grade_and_formgrader_shows_it(clone):
+def test_the_commands_grade_and_formgrader_shows_it(clone, tmp_path):
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     given = commands(PAGES[0])
     assert given[0].startswith("make ") and given[-1] == "make lab"
@@ -61,33 +58,12 @@ def test_the_commands_grade_and_formgrader_shows_it(clone):
     points = {s: {row["question"]: float(row["points"]) for row in rows if row["student"] == s} for s in RIGHT}
     for student, right in RIGHT.items():
         assert {name for name, earned in points[student].items() if earned} == right
-    shown = formgrader(clone, environment)
+    with serving.jupyterlab(clone, tmp_path) as url:
+        address = f"{url}/formgrader/api/submissions/04_iou?token={serving.TOKEN}"
+        shown = json.loads(urllib.request.urlopen(address).read())
     assert {s["student"]: s["score"] for s in shown} == {s: sum(earned.values()) for s, earned in points.items()}
     assert {s["student"]: s["needs_manual_grade"] for s in shown} == {"ada": True, "ben": True, "eve": True}
     git = ["git", "-C", str(clone)]
     subprocess.run([*git, "init", "--quiet"], check=True)
     status = subprocess.run([*git, "status", "--short"], capture_output=True, text=True, check=True).stdout.split()
     assert {"submitted/", "grades/", "autograded/", "gradebook.db"}.isdisjoint(status)
-
-
-def formgrader(folder: Path, environment: dict) -> list[dict]:
-    """Start JupyterLab, ask formgrader for the submissions of the lab, and stop it."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    command = ["jupyter", "lab", "--no-browser", "--allow-root", f"--port={port}", f"--IdentityProvider.token={TOKEN}"]
-    server = subprocess.Popen(
-        command, cwd=folder, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
-    )
-    try:
-        address = f"http://127.0.0.1:{port}/formgrader/api/submissions/04_iou?token={TOKEN}"
-        deadline = time.monotonic() + 200.0
-        while True:
-            try:
-                with urllib.request.urlopen(address, timeout=60) as page:
-                    return json.loads(page.read())
-            except (urllib.error.URLError, ConnectionError):
-                assert server.poll() is None and time.monotonic() < deadline
-                time.sleep(0.5)
-    finally:
-        server.terminate()
-        server.wait(60)

@@ -34,7 +34,7 @@ def called(worker: Worker, *args, limit_s: float = 20.0):
 def told(worker: Worker, body: str):
     """Run lines inside a function `f` in the sandbox and give what it returns."""
     source = "import os\nimport numpy as np\ndef f():\n" + textwrap.indent(textwrap.dedent(body), "    ")
-    assert worker.ask(("cell", "f", source), 20.0) is None
+    assert worker.ask(("run", "f", source), 20.0) is None
     return called(worker)
 
 
@@ -54,11 +54,12 @@ def test_it_sees_python_and_two_packages_and_no_more(worker):
     seen = told(
         worker,
         """
-        allowed = {"dev", "lib", "lib64", "packages", "tmp", "usr", "worker.py", *PYTHON.split("/")[1:2]}
+        allowed = {"dev", "lib", "lib64", "packages", "tmp", "usr", *PYTHON.split("/")[1:2]}
+        allowed |= {"worker.py", "program.py", "shapes.py"}
         return len(set(os.listdir("/")) - allowed), len(os.listdir("/packages")), len(os.environ)
         """.replace("PYTHON", repr(os.path.realpath(sys.executable))),
     )
-    assert top <= 8 and tuple(seen) == (0, len(sandbox.package_files(("numpy",))), len(sandbox.ENVIRONMENT) + 1)  # PWD
+    assert top <= 10 and tuple(seen) == (0, len(sandbox.package_files(("numpy",))), len(sandbox.ENVIRONMENT) + 1)  # PWD
     hidden = [
         sandbox.__file__,
         __file__,
@@ -172,7 +173,7 @@ def f():
     server = sandbox.Server(("numpy",), LIMITS)
     with server.fork() as started:
         started.greet(20.0)
-        started.ask(("cell", "f", bomb), 20.0)
+        started.ask(("run", "f", bomb), 20.0)
         counts = []
         thread = threading.Thread(target=lambda: counts.append(called(started)))
         thread.start()
@@ -229,7 +230,7 @@ def test_a_worker_dies_with_its_grader():
             time.sleep(1)
     '''.replace("\\n    ", "\\n")
     with sandbox.fresh_worker(("numpy",), sandbox.Limits()) as worker:
-        worker.ask(("cell", "f", cell), 20)
+        worker.ask(("run", "f", cell), 20)
         print("ready", flush=True)
         worker.ask(("call", "f", pickle.dumps(())), 1000)
     """
@@ -303,7 +304,7 @@ def test_a_deadline_holds_for_cell_and_call():
     with sandbox.fresh_worker(("numpy",), LIMITS) as started:
         begin = time.monotonic()
         with pytest.raises(WorkerLost) as lost:
-            started.ask(("cell", "f", "while True: pass"), 0.5)
+            started.ask(("run", "f", "while True: pass"), 0.5)
         assert lost.value.problem.kind == "time" and time.monotonic() - begin < 20.0
 
 

@@ -1,0 +1,89 @@
+"""The class: of each question how many tried and passed, which mistakes how many made, and comments for all of them.
+
+Wrong answers are one group if they earned the same hint, and without a hint if they give the same outputs on the public
+cases: a class of a hundred makes few mistakes, so one comment per group answers many students.
+"""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from labkit.course.grading.batch import Record
+from labkit.course.grading.grade import Result
+from labkit.course.grading.reading import Lab
+from labkit.support.files import write_atomically
+
+COMMENTS_FILE = "comments.json"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Wrong answers to a question that are wrong in the same way. named: whether a hint says what the mistake is.
+
+    says: the hint, or what the first of them was told. sample: the program of the first.
+    """
+
+    name: str
+    question: str
+    named: bool
+    says: str
+    sample: str
+    students: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What became of a question: how many have an answer of their own to it, how many are right, and the groups."""
+
+    question: str
+    tried: int
+    passed: int
+    groups: tuple[Group, ...]
+
+
+def group_of(result: Result) -> str:
+    """The name of the group that a result belongs to, "" for a right answer and for none: iou-3f09c2."""
+    key = result.hint or result.behaviour
+    return f"{result.question}-{hashlib.sha256(key.encode()).hexdigest()[:6]}" if key and not result.points else ""
+
+
+def standings(lab: Lab, records: Sequence[Record]) -> list[Standing]:
+    """What became of each question in a class, in the lab's order; the largest groups first."""
+    found = []
+    for name in lab.answers:
+        results = [
+            (record.student, result) for record in records for result in record.results if result.question == name
+        ]
+        members: dict[str, list[tuple[str, Result]]] = {}
+        for student, result in results:
+            if group := group_of(result):
+                members.setdefault(group, []).append((student, result))
+        groups = [
+            Group(group, name, bool(first.hint), first.hint or first.says, first.program, tuple(s for s, _ in same))
+            for group, same in members.items()
+            for first in [same[0][1]]
+        ]
+        groups.sort(key=lambda group: (-len(group.students), group.name))
+        tried = sum(bool(result.points or group_of(result) or result.flag) for _, result in results)
+        found.append(Standing(name, tried, sum(result.points > 0.0 for _, result in results), tuple(groups)))
+    return found
+
+
+# ------------------------------------------------------------------------------------------------- comments
+
+
+def read_comments(out: Path) -> dict[str, str]:
+    """An instructor's comments, by group; {} if there are none."""
+    path = Path(out) / COMMENTS_FILE
+    return json.loads(path.read_text()) if path.is_file() else {}
+
+
+def add_comment(out: Path, groups: Sequence[str], group: str, text: str) -> dict[str, str]:
+    """Keep a comment for a group, "" to take it back; returns all comments. Raises ValueError for an unknown group."""
+    if group not in groups:
+        raise ValueError(f"comment: expected one of the groups {', '.join(groups) or '(there is none)'}, got {group!r}")
+    comments = {name: said for name, said in (read_comments(out) | {group: text}).items() if said}
+    write_atomically(Path(out) / COMMENTS_FILE, (json.dumps(comments, indent=1, ensure_ascii=False) + "\n").encode())
+    return comments

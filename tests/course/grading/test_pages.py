@@ -1,0 +1,159 @@
+"""What students wrote on the instructor's pages: formgrader and nbgrader's feedback show it, and none of it runs."""
+
+import os
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import grading_course as kit
+import pytest
+import serving
+from nbconvert.filters import markdown2html
+
+from labkit.course.grading import gradebook
+from labkit.course.grading.markdown import harmless_markdown
+from labkit.course.grading.run import grade_course
+
+ROOT = Path(__file__).parents[3]
+TOPIC = "04_iou"
+RUN = "window.attacked=1"
+PAYLOADS = (
+    f"<script>{RUN}</script>",
+    f'<img src="x" onerror="{RUN}">',
+    f'<svg onload="{RUN}"></svg>',
+    f'<details open ontoggle="{RUN}">x</details>',
+    f"<iframe srcdoc='<script>parent.{RUN}</script>'></iframe>",
+    f'<a href="javascript:{RUN}">x</a>',
+    f"[x](javascript:{RUN})",
+    f"[x](java&#115;cript:{RUN})",
+    f"[x](\x01javascript:{RUN})",
+    f"[x]\n\n[x]: javascript:{RUN}",
+    "![x](http://127.0.0.1:9/seen.png)",
+    "![x][y]\n\n[y]: http://127.0.0.1:9/seen.png",
+    f"<javascript:{RUN}>",
+    f'$x$ <img src="x" onerror="{RUN}"> $y$',
+    f'$$<img src="x" onerror="{RUN}">$$',
+    f'\\begin{{x}}<img src="x" onerror="{RUN}">\\end{{x}}',
+    f'```\n</code></pre><img src="x" onerror="{RUN}">\n```',
+    f'`</code><img src="x" onerror="{RUN}">`',
+    f'| a |\n|---|\n| <img src="x" onerror="{RUN}"> |',
+    f'<!--><img src="x" onerror="{RUN}">-->',
+    f'<<img src="x" onerror="{RUN}">',
+    f'\\<img src="x" onerror="{RUN}">',
+    f'<\x00img src="x" onerror="{RUN}">',
+    "<style>body{display:none}</style>",
+    '<meta http-equiv="refresh" content="0;url=http://127.0.0.1:9/">',
+    '<form action="/api/contents"><input name="type"></form>',
+)
+
+
+class Tags(HTMLParser):
+    """The tags of a page with their attributes."""
+
+    def __init__(self, page: str):
+        super().__init__()
+        self.found: list[tuple[str, dict]] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attributes):
+        self.found.append((tag, dict(attributes)))
+
+
+PLAIN = {"p", "em", "strong", "code", "pre", "ul", "ol", "li", "h1", "h2", "h3", "blockquote", "br", "hr", "del"}
+PLAIN |= {"table", "thead", "tbody", "tr", "th", "td", "div", "span"}
+
+
+# What a list of tasks, "- [x]", has.
+BOX = {"class": "task-list-item-checkbox", "type": "checkbox", "disabled": None, "checked": None}
+
+
+@pytest.mark.parametrize("payload", PAYLOADS)
+def test_no_tag_of_a_students_is_left(payload):
+    for text in (payload, f"Because.\n\n{payload}\n", f"- {payload}", f"> {payload}", payload.replace("\n", "\r\n")):
+        for tag, attributes in Tags(markdown2html(harmless_markdown(text))).found:
+            if attributes == BOX:
+                continue
+            assert tag in PLAIN and attributes.keys() <= {"class", "style"}, (tag, attributes)
+            assert "expression" not in attributes.get("style", "") and "url" not in attributes.get("style", "")
+
+
+@pytest.mark.parametrize("payload", [PAYLOADS[1], PAYLOADS[6], PAYLOADS[10]])
+def test_without_that_they_are(payload):
+    found = Tags(markdown2html(payload)).found
+    assert any(tag not in PLAIN or attributes.keys() & {"href", "src", "onerror"} for tag, attributes in found)
+
+
+@pytest.mark.parametrize("command", ["href", "url", "require", "def", "newcommand", "class", "style", "unicode"])
+def test_commands_of_formulas_that_reach_beyond_them_are_taken_apart(command):
+    assert f"\\{command}" not in harmless_markdown(f"$\\{command}{{javascript:{RUN}}}{{x}}$")
+
+
+def test_formulas_and_emphasis_stay():
+    text = "**1.** $e^{-E(y)} = \\prod_p a_p < 1$, $$\\begin{bmatrix} 1 & 2 \\\\ 3 & 4 \\end{bmatrix}$$\n- `a[i] = b`"
+    assert harmless_markdown(text) == text
+    assert harmless_markdown("if a<b, 2<3") == "if a< b, 2<3"
+
+
+# ------------------------------------------------------------------------------------------- in a real browser
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory):
+    """Two students with every payload in words, in a string, in a message and in a comment; one is left as it is."""
+    course = tmp_path_factory.mktemp("course")
+    shutil.copy(ROOT / "nbgrader_config.py", course)
+    kit.write_lab(course, TOPIC)
+    message = "; ".join(PAYLOADS)
+    cells = {
+        "iou": f"def iou(n):\n    raise ValueError({message[:150]!r})\n",
+        "mean_iou": f"def mean_iou(n):\n    x = {message!r}\n    return x.{RUN.split('=', maxsplit=1)[0]}\n",
+    }
+    notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC) | cells)
+    notebook["cells"][-1]["source"] = "\n\n".join(PAYLOADS)
+    for student in ("eve", "raw"):
+        kit.submit(course, student, TOPIC, notebook)
+    graded = grade_course(TOPIC, course, seed="secret", progress=False)
+    assert not graded.failures
+    notebook["cells"][-1]["source"] = "\n\n".join(PAYLOADS[:2])  # as nbgrader's own autograder would have copied it
+    kit.write(course / "autograded/raw" / TOPIC / f"{TOPIC}.ipynb", notebook)
+    run = [sys.executable, "-m", "nbgrader", "generate_feedback", TOPIC]
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    subprocess.run(run, cwd=course, env=environment, check=True, capture_output=True)
+    return course
+
+
+def visit(page, address: str) -> tuple[bool, list[str]]:
+    """Whether a page of ours lets a payload run, and what it asks others for."""
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address)
+    page.wait_for_load_state("load")
+    page.wait_for_timeout(1000)
+    return page.evaluate("window.attacked === 1"), [url for url in asked if "127.0.0.1:9" in url]
+
+
+@pytest.mark.debian("chromium")
+@pytest.mark.timeout(600)
+def test_nothing_that_a_student_wrote_runs_in_formgrader(course, page, tmp_path):
+    with gradebook.opened(course) as book:
+        ids = {s: book.find_submission_notebook(TOPIC, TOPIC, s).id for s in ("eve", "raw")}
+    with serving.jupyterlab(course, tmp_path / "jupyter") as url:
+        token = f"token={serving.TOKEN}"
+        attacked, asked = visit(page, f"{url}/formgrader/submissions/{ids['eve']}/?index=0&{token}")
+        assert page.locator("#check_iou").count() == 1 and page.locator("text=onerror").count() > 0
+        assert not attacked and not asked
+        for table in ("manage_submissions/04_iou", "gradebook/04_iou/04_iou", "manage_students"):
+            assert visit(page, f"{url}/formgrader/{table}?{token}") == (False, [])
+        assert visit(page, f"{url}/formgrader/submissions/{ids['raw']}/?index=0&{token}")[0]  # so this test can fail
+
+
+@pytest.mark.debian("chromium")
+def test_nothing_that_a_student_wrote_runs_in_the_feedback(course, page):
+    page.on("dialog", lambda dialog: dialog.dismiss())
+    feedback = course / "feedback/eve" / TOPIC / f"{TOPIC}.html"
+    assert visit(page, feedback.as_uri()) == (False, []) and page.locator("text=Comments").count() > 0
+    assert visit(page, (course / "feedback/raw" / TOPIC / f"{TOPIC}.html").as_uri())[0]
+    for ours in ((course / "grades" / TOPIC / "feedback/eve.html"), (course / "grades" / TOPIC / "class.html")):
+        assert visit(page, ours.as_uri()) == (False, [])
