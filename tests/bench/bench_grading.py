@@ -18,6 +18,7 @@ import numpy as np
 from labkit.course.grading import grade, reading, sandbox
 from labkit.course.grading.gradebook import opened
 from labkit.course.grading.run import grade_course
+from labkit.course.questions.program import Cell
 from labkit.course.questions.question import TOPICS
 from tests.bench.measure import in_turns, resident_mb, table
 
@@ -102,7 +103,9 @@ def classes(folder: Path) -> str:
             cells, right = students[i % len(students)]
             torch += any("torch" in cell for cell in cells.values())
             start = time.perf_counter()
-            submission = reading.Submission(f"s{i}", cells, {}, "", str(i))
+            submission = reading.Submission(
+                f"s{i}", tuple(Cell(text, name) for name, text in cells.items()), cells, "", str(i)
+            )
             results = grade.grade_submission(lab, submission, f"secret {i // len(students)}")
             seconds.append(time.perf_counter() - start)
             wrong += sum((r.points == r.max_points) != right[r.question] for r in results)

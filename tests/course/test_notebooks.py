@@ -264,6 +264,11 @@ def test_a_solution_is_an_assignment(path):
     written = [c for c in cells if c.cell_type == "markdown" and c.metadata.nbgrader.grade]
     assert len(written) >= 1 and all(c.metadata.nbgrader.points > 0 for c in written)
     assert prose(path).count("<details") >= 3 * len(of_topic(path.stem))
+    for cell in written:
+        answer, head, rubric = cell.source.partition(f"**Rubric ({cell.metadata.nbgrader.points} points).**")
+        assert len(answer) > 500 and head
+        points = re.findall(r"^- (\d+) points?: ", rubric, re.MULTILINE)
+        assert len(points) >= 2 and sum(map(int, points)) == cell.metadata.nbgrader.points
 
 
 @each(SOLUTIONS)
