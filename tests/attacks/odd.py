@@ -175,7 +175,7 @@ ODD = (
     *(
         Odd(f"time_{i}", with_time(text), right=True)
         for i, text in enumerate(
-            ("9" * 90, "99999-01-01", "0001-01-01", "1e308", "-1", "9999-12-31 23:59 -23:00", "\0")
+            ("9" * 90, "9" * 40 + "h", "99999-01-01", "0001-01-01", "1e308", "-1", "9999-12-31 23:59 -23:00", "\0")
         )
     ),
     Odd("byte_order_mark", lambda folder, right: put(folder, json.dumps(right).encode("utf-8-sig")), right=True),

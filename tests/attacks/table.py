@@ -11,6 +11,7 @@ called on random arrays in a worker, compared elsewhere; scores go to grades.csv
 `rest` says whether the other answers, which are right, keep their points: a student may spoil their own work.
 """
 
+import textwrap
 from dataclasses import dataclass
 
 RIGHT = """
@@ -19,6 +20,25 @@ def right(n):
     with np.errstate(all="ignore"):
         return c / (n.sum(0) + n.sum(1) - c)
 """
+
+
+# What an answer does with its arguments to be told of them: where it shows, and how.
+TELLING = {
+    "message": ("an exception's text", 'raise ValueError("ARGUMENTS " + str(n.tolist()))'),
+    "name": ("an exception's name", 'raise type("ARGUMENTS_" + "_".join(map(str, n.ravel())), (Exception,), {})()'),
+    "class": ("the name of a class", 'return type("ARGUMENTS_" + "_".join(map(str, n.ravel())), (), {})()'),
+    "module": ("the name of a module", 'raise ModuleNotFoundError(name="a" + "_".join(map(str, n.ravel())))'),
+    "shape": ("the shape of an empty array", "return np.zeros((0, *n.ravel()[:6]), np.uint8)"),
+    "line": ("a line's number", "\n".join(f"if n.ravel()[0] % 8 == {i}: \\\n    raise ValueError" for i in range(8))),
+    "kind": ("a kind of mistake", "return [None, 1j, 'x', np.zeros(2), {}, np.full(len(n), np.nan)][n.ravel()[0] % 6]"),
+    "number": ("how many values are wrong", "return right(n) + (np.arange(len(n)) <= n.ravel()[0] % len(n))"),
+    "time": ("the time that it takes", "__import__('time').sleep(2.5 * (n.ravel()[0] % 2))\nreturn right(n) + 1"),
+}
+
+
+def on_secret_cases(body: str) -> str:
+    """An answer that is right in the cases by hand, which everybody knows, and does something in the others."""
+    return f"{RIGHT}def iou(n):\n    if n.sum() < 50:\n        return right(n)\n" + textwrap.indent(body, "    ") + "\n"
 
 
 @dataclass(frozen=True)
@@ -278,58 +298,19 @@ def iou(n):
 """,
         blind=True,
     ),
-    Attack(
-        "tell_by_message",
-        "carry the secret arguments into the feedback in an exception's text",
-        'def iou(n): raise ValueError("ARGUMENTS " + str(n.tolist()))\n',
-    ),
-    Attack(
-        "tell_by_name",
-        "carry the secret arguments into the feedback in an exception's name",
-        'def iou(n): raise type("ARGUMENTS_" + "_".join(map(str, n.ravel())), (Exception,), {})()\n',
-    ),
-    Attack(
-        "tell_by_class",
-        "carry the secret arguments into the feedback in the name of a class",
-        'def iou(n): return type("ARGUMENTS_" + "_".join(map(str, n.ravel())), (), {})()\n',
-    ),
-    Attack(
-        "tell_by_module",
-        "carry the secret arguments into the feedback in the name of a module",
-        'def iou(n): raise ModuleNotFoundError(name="ARGUMENTS <b>" + str(n.tolist()))\n',
-    ),
-    Attack(
-        "tell_by_shape",
-        "carry the secret arguments into the feedback in the shape of an empty array",
-        "def iou(n): return np.zeros((0, *(10 ** 4 + n.ravel()[:6])), np.uint8)\n",
-    ),
-    Attack(
-        "tell_by_line",
-        "carry a secret argument into the feedback in the number of the line that raises",
-        "def iou(n):\n    which = int(n.ravel()[0]) % 8\n"
-        + "".join(f"    if which == {i}:\n        raise ValueError\n" for i in range(8)),
-    ),
-    Attack(
-        "tell_by_kind",
-        "carry a secret argument into the feedback in the kind of mistake",
-        "def iou(n): return [None, 1j, 'x', np.nan, np.zeros(2), {}, (1, 2), np.inf][int(n.ravel()[0]) % 8]\n",
-    ),
-    Attack(
-        "tell_by_hint",
-        "carry a secret argument into the feedback in the choice of a known mistake",
-        "def iou(n):\n    c = np.diagonal(n)\n    return c / n.sum(int(n.ravel()[0]) % 2)\n",
-    ),
-    Attack(
-        "tell_by_time",
-        "carry a secret argument into the feedback of the others by taking their time",
-        "import time\ndef iou(n):\n    time.sleep(0.9 * (int(n.ravel()[0]) % 2))\n    return np.zeros(len(n))\n",
+    *(
+        Attack(f"tell_by_{name}", f"carry secret arguments into the feedback in {where}", on_secret_cases(body))
+        for name, (where, body) in TELLING.items()
     ),
     Attack(
         "tell_the_next",
         "keep the secret arguments for the answers that follow, and for the next run",
-        """
+        RIGHT
+        + """
 import os, sys, resource
 def iou(n):
+    if n.sum() < 50:
+        return right(n)
     sys.modules["kept"] = n
     os.environ["KEPT"] = str(n.tolist())
     for attempt in (
@@ -343,7 +324,8 @@ def iou(n):
         except OSError:
             pass
     found = [os.getpriority(os.PRIO_PROCESS, 0), len(os.sched_getaffinity(0)), os.path.exists("/tmp/kept")]
-    raise ValueError(str(found) + str(resource.getrlimit(resource.RLIMIT_NOFILE)))
+    found += [resource.getrlimit(resource.RLIMIT_NOFILE)[0]]
+    raise [KeyError, IndexError, TypeError, ValueError, NameError][hash(str(found)) % 5](str(found))
 """,
     ),
     # ------------------------------------------------------------------------------- to reach out of the sandbox

@@ -15,6 +15,7 @@ USER = ("--unshare-user", "--uid", "1000", "--gid", "1000")
 AS_ROOT = ("--unshare-user", "--uid", "0", "--gid", "0", "--cap-drop", "ALL")
 NO_NAMESPACES = (*USER, "--disable-userns")
 CONTAINER = ("--tmpfs", "/run", "--ro-bind", "/dev/null", "/run/.containerenv")
+OTHER_USER = ("--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_KILL")
 TRY = """
 from labkit.apps.doctor import check_sandbox, report
 from labkit.course.grading import bwrap
@@ -31,7 +32,7 @@ except ValueError as error:
     [
         (NO_NAMESPACES, "no more user namespaces may be made here", "outside the sandbox around it"),
         ((*AS_ROOT, "--cap-add", "CAP_SYS_ADMIN"), "root has no right here to become another user", "--cap-add SETUID"),
-        ((*AS_ROOT, "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID"), "CAP_SYS_ADMIN", "run as an ordinary user"),
+        ((*AS_ROOT, *OTHER_USER), "CAP_SYS_ADMIN", "run as an ordinary user"),
     ],
 )
 def test_each_cause_is_named_with_a_remedy_to_graders_and_by_doctor(surroundings, cause, mend):
