@@ -187,6 +187,7 @@ def exception_text(data: bytes) -> str:
     known = getattr(builtins, name, None)
     name = name if isinstance(known, type) and issubclass(known, BaseException) else "an exception"
     message = "".join(c if c.isprintable() else " " for c in message).strip()
+    message = re.sub(r"0x[0-9a-fA-F]{6,}", "0x...", message)  # an address, another one in each run
     return f"{name}: {message}" if message else name
 
 

@@ -191,7 +191,7 @@ def fresh_worker(packages: Sequence[str], limits: Limits, unsafe: bool = False) 
 def plain_worker(packages: Sequence[str], limits: Limits) -> Worker:
     """Start a worker without any sandbox, a process of its own."""
     process = subprocess.Popen(
-        [sys.executable, "-I", "-B", worker.__file__, options_for(packages, limits, unsafe=True)],
+        [sys.executable, "-P", "-s", "-B", worker.__file__, options_for(packages, limits, unsafe=True)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -234,7 +234,7 @@ def bubblewrap(packages: tuple[str, ...]) -> list[str]:
         else:
             command += ["--dev-bind" if place.startswith("/dev/") else "--ro-bind", source, place]
     command += ["--perms", "0755", "--dir", "/tmp", "--chdir", "/tmp", "--remount-ro", "/"]
-    return [*command, python, "-I", "-S", "-B", "/worker.py"]
+    return [*command, python, "-P", "-s", "-S", "-B", "/worker.py"]  # not -I, which would ignore PYTHONHASHSEED
 
 
 # ------------------------------------------------------------------------------------ what there is to be seen

@@ -113,6 +113,7 @@ def test_truth_values_are_true_or_false():
         (b"E" + struct.pack("<IB", 3, 0) + b"IndexError\0index 3 is out", "it raises IndexError: index 3 is out"),
         (b"E" + struct.pack("<IB", 3, 0) + b"KeyError\0\x1b[31m\n\xff", "it raises KeyError: [31m \ufffd"),
         (b"E" + struct.pack("<IB", 3, 0) + b"KeyError\0" + 999 * b"x", "it raises KeyError: " + 211 * "x"),
+        (b"E" + struct.pack("<IB", 3, 0) + b"KeyError\0<f at 0x7f00aa10>", "it raises KeyError: <f at 0x...>"),
         (b"E" + struct.pack("<IB", 3, 0) + b"SecretIs42\0", "it raises an exception"),
         (b"E" + struct.pack("<IB", 3, 0) + b"print\0", "it raises an exception"),
         (b"Kdict", "expected an array or a number, got dict"),

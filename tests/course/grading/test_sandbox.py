@@ -10,6 +10,7 @@ import threading
 import time
 from pathlib import Path
 
+import grading_course as kit
 import numpy as np
 import pytest
 
@@ -179,28 +180,14 @@ def f():
         thread.start()
         most = 0
         while thread.is_alive():
-            most = max(most, len(descendants(server.process.pid)))
+            most = max(most, len(kit.descendants(server.process.pid)))
             time.sleep(0.05)
         assert counts == [0] and most == 3  # bubblewrap's own, the server and its child
-        family = descendants(server.process.pid)
-    left = descendants(server.process.pid)
+        family = kit.descendants(server.process.pid)
+    left = kit.descendants(server.process.pid)
     assert len(family) == 3 and len(left) == 2 and gone(family - left)
     server.close()
     assert gone(left)
-
-
-def descendants(pid: int) -> set[int]:
-    """Processes below one, by the kernel's lists of children."""
-    found, waiting = set(), [pid]
-    while waiting:
-        try:
-            tasks = list(Path(f"/proc/{waiting.pop()}/task").iterdir())
-            children = [int(child) for task in tasks for child in (task / "children").read_text().split()]
-        except OSError:
-            continue
-        found |= set(children)
-        waiting += children
-    return found
 
 
 def gone(pids: set[int], seconds: float = 20.0) -> bool:
@@ -237,7 +224,7 @@ def test_a_worker_dies_with_its_grader():
     process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(grader)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout.readline() == "ready\n"
-        family = descendants(process.pid)
+        family = kit.descendants(process.pid)
         assert len(family) >= 4  # bubblewrap, its reaper, the server, the child
     finally:
         process.send_signal(signal.SIGKILL)
@@ -278,7 +265,7 @@ def test_a_server_that_ended_is_replaced():
 
 def test_closing_ends_everything():
     server = sandbox.Server(("numpy",), LIMITS)
-    family = descendants(server.process.pid) | {server.process.pid}
+    family = kit.descendants(server.process.pid) | {server.process.pid}
     sandbox.servers.give_back(server)
     sandbox.servers.close()
     assert len(family) == 3 and gone(family)
