@@ -225,6 +225,7 @@ def statements(tree: ast.Module, lines: list[str]) -> Iterator[Statement]:
             statement.star |= isinstance(node, ast.ImportFrom) and node.names[0].name == "*"
             if is_check(node):
                 statement.binds -= {target.id for target in node.targets if isinstance(target, ast.Name)}
+        statement.touches &= statement.needs | statement.binds  # the others are names inside functions
         statement.needs |= statement.touches
         yield statement
 
