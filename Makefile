@@ -3,7 +3,7 @@
 #   make test    set up .venv, then lint and every test
 #   make lab     JupyterLab; alone on a machine, it installs what students need and no more
 #   make release generate labs/ from solutions/
-#   make train   make the data again and train the shipped weights again (over an hour on two cores)
+#   make train   make the data again and train the shipped weights again (over two hours on two cores)
 #   make stacks  build the same in C++, Java and Octave where they are installed, and compare
 #   make ros2    set up .venv-ros2 with wheels of ROS 2, then the node beside a simulated camera, until Ctrl-C
 #   make test-ros2  the tests of ROS 2, there
@@ -62,6 +62,7 @@ clean:
 
 # Training: what the shipped weights were made with. EPOCHS is each model's own number if it is not given.
 TRAIN_SCENES ?= 3000
+WIDE_SCENES ?= 1500
 VAL_SCENES ?= 120
 SIZE ?= 320x240
 WORKERS ?= 2
@@ -72,10 +73,12 @@ DEVICE ?= auto
 train: .venv/installed
 	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/python -m data_gen data/wide --scenes $(WIDE_SCENES) --first-seed 0 --config wide --size $(SIZE) --workers $(WORKERS)
 	for model in smallsegnet unet; do
 	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	done
-	cp data/runs/smallsegnet.pt data/runs/unet.pt labkit/weights/
+	$(BIN)/labkit train data/train data/wide --scenes $(WIDE_SCENES) --val data/val --model unet_rgbd $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
+	cp data/runs/{smallsegnet,unet,unet_rgbd}.pt labkit/weights/
 
 # Environments, and the extras of pyproject.toml that each holds.
 .venv/installed: EXTRAS := course,instructor,stacks,test

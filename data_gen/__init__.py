@@ -4,8 +4,8 @@ sample_scene(seed, config) draws a scene, render(spec, size) takes its picture, 
 dataset, load(path) reads it.
 """
 
-from data_gen.dataset import Dataset, generate, load, render, verify
+from data_gen.dataset import Dataset, Joined, generate, load, render, verify
 from data_gen.scenes import CONFIGS, sample_scene
-from data_gen.sensor import DepthSensor
+from labkit.support.sensor import DepthSensor
 
-__all__ = ["CONFIGS", "Dataset", "DepthSensor", "generate", "load", "render", "sample_scene", "verify"]
+__all__ = ["CONFIGS", "Dataset", "DepthSensor", "Joined", "generate", "load", "render", "sample_scene", "verify"]

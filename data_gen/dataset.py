@@ -23,12 +23,12 @@ from tqdm.auto import tqdm
 
 from data_gen.families import FAMILIES
 from data_gen.scenes import CONFIGS, sample_scene
-from data_gen.sensor import DepthSensor
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
+from labkit.support.sensor import DepthSensor
 
 VERSION = 1
 DEPTH_UNIT_MM = 0.1  # one step of the 16-bit files: finer than any sensor, and 6.5 m still fit
@@ -268,3 +268,23 @@ class Dataset(Sequence):
 def load(path) -> Dataset:
     """Open a dataset: a sequence of RGBDFrame. Raises FileNotFoundError without one, ValueError if it is too new."""
     return Dataset(path)
+
+
+class Joined(Sequence):
+    """Several datasets as one sequence of frames, the first `each` of every one (all of them if None), read when asked.
+
+    >>> Joined([[1, 2, 3], [4, 5]], each=2)[2:]
+    [4, 5]
+    """
+
+    def __init__(self, datasets: Sequence[Sequence], each: int | None = None):
+        self.places = [(dataset, i) for dataset in datasets for i in range(len(dataset))[:each]]
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return [dataset[i] for dataset, i in self.places[index]]
+        dataset, i = self.places[index]
+        return dataset[i]

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from data_gen.families import FAMILIES, quaternion
+from data_gen.wide import WIDE
 from labkit.labels import OBSTACLE, TARGET
 from labkit.sim.shapes import object_mesh
 from labkit.sim.spec import Camera, Light, ObjectSpec, SceneSpec, Table, Texture
@@ -23,14 +24,17 @@ class SceneConfig:
     """What scenes of one kind have in common; `stream` keeps equal seeds of two configs from giving equal scenes.
 
     Ranges are (low, high): distance in metres, elevation in radians above the table (several ranges are drawn from with
-    equal chance). hard: object proportions and models that training never sees.
+    equal chance), roll about the line of sight up to so many radians. hard: object proportions and models that training
+    never sees. wide: every other object is of `data_gen.wide`'s proportions.
     """
 
     stream: int
     hard: bool = False
+    wide: bool = False
     surfaces: tuple[str, ...] = ("plain", "wood", "clouds", "speckle", "stripes")
     elevations: tuple[tuple[float, float], ...] = ((0.38, 0.95),)
     distance: tuple[float, float] = (0.6, 1.15)
+    roll: float = 0.15
     targets: tuple[int, int] = (1, 3)
     obstacles: tuple[int, int] = (3, 8)
 
@@ -44,14 +48,23 @@ CONFIGS = {
         surfaces=("checker", "dots", "bricks"),
         elevations=((0.32, 0.38), (0.95, 1.20)),
     ),
+    "wide": SceneConfig(
+        stream=3,
+        wide=True,
+        elevations=((0.25, 0.32), (0.38, 0.95), (0.38, 0.95)),  # but for the views of hard
+        distance=(0.5, 1.3),
+        roll=0.35,
+        obstacles=(3, 9),
+    ),
 }
 
 
 def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     """Draw a scene; the same seed and config give the same scene.
 
-    config: "train", "test" (the same distribution, other scenes) or "hard" (shapes, textures and viewpoints that are
-    not in train). Raises ValueError for a negative seed or an unknown config.
+    config: "train", "test" (the same distribution, other scenes), "hard" (shapes, textures and viewpoints that are not
+    in train) or "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data).
+    Raises ValueError for a negative seed or an unknown config.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
@@ -130,7 +143,7 @@ def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects
             distance=rng.uniform(*kind.distance),
             azimuth=azimuth,
             elevation=rng.uniform(low, high),
-            roll=rng.uniform(-0.15, 0.15),
+            roll=rng.uniform(-kind.roll, kind.roll),
             fov_y=float(rng.uniform(0.55, 0.85)),
         )
         T_cam_base = np.linalg.inv(np.array(camera.T_base_cam))
@@ -167,7 +180,8 @@ def _family(rng: np.random.Generator, class_id: int) -> str:
 def _place(rng, kind: SceneConfig, table: Table, azimuth: float, family: str, name: str, circles):
     """Make one object and find room for it; (None, None) if there is none. A circle is (x, y, radius, class)."""
     class_id = FAMILIES[family].class_id
-    body = FAMILIES[family].recipe(rng, kind.hard)
+    wide = kind.wide and rng.random() < 0.5
+    body = WIDE[family](rng) if wide else FAMILIES[family].recipe(rng, kind.hard)
     yaw = Rotation.from_euler("z", rng.uniform(-np.pi, np.pi))
     turned = yaw * Rotation.from_quat(quaternion(*body.tilt))
     thing = ObjectSpec(

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from labkit.frame import RGBDFrame
-from labkit.geometry import back_project_to_base
+from labkit.geometry import geometry_channels, mirrored
 from labkit.support.validation import check_rgb
 
 
@@ -24,9 +24,10 @@ class NetworkInput:
 
     arrays: "image", or "image" and "geometry", in the order of the network's arguments. The image is (rgb - mean) / std
     with rgb in 0..255; mean and std are one number, or one for each of R, G and B; the default scales to 0..1. geometry
-    has two channels: a point's height over the table, metres, and 1 where the camera read a depth; both are 0 where it
-    did not. divisor: what height and width must be divisible by; pictures of other sizes are padded by repeating their
-    border, and the logits are cropped. Raises ValueError for an argument that does not fit.
+    is what depth, calibration and the table's height tell (`labkit.geometry.geometry_channels`), seven channels in
+    0..1, all 0.5 where the camera read no depth. divisor: what height and width must be divisible by; pictures of other
+    sizes are padded by repeating their border, and the logits are cropped. Raises ValueError for an argument that does
+    not fit.
 
     >>> NetworkInput(divisor=16).build(np.full((1, 1, 3), 51, np.uint8))[0].tolist()
     [[[0.2, 0.2, 0.2]]]
@@ -55,27 +56,13 @@ class NetworkInput:
         if "geometry" in self.arrays:
             if not is_frame:
                 raise ValueError("picture: expected an RGBDFrame, since the network looks at depth, got an RGB image")
-            arrays.append(geometry(picture))
+            depth, K, T = picture.depth, picture.K, picture.T_base_cam
+            arrays.append(geometry_channels(depth, K, T, picture.table_z or 0.0))
         return arrays
 
     def scaled(self, rgb: UInt8[np.ndarray, "*shape 3"]) -> Float32[np.ndarray, "*shape 3"]:
         """Scale colours as the network expects them."""
         return (rgb - np.float32(self.mean)) / np.float32(self.std)
-
-
-def geometry(frame: RGBDFrame) -> Float32[np.ndarray, "H W 2"]:
-    """Give each pixel's height over the frame's table (0 if unknown), metres, and 1 where there is depth, else 0.
-
-    >>> T_base_cam = np.diag([1.0, -1.0, -1.0, 1.0])
-    >>> T_base_cam[2, 3] = 0.9  # looks down from 0.9 m
-    >>> depth = np.array([[0.5, 0.0]], np.float32)
-    >>> frame = RGBDFrame(np.zeros((1, 2, 3), np.uint8), depth, np.eye(3), T_base_cam, table_z=0.1)
-    >>> geometry(frame).round(3).tolist()
-    [[[0.3, 1.0], [0.0, 0.0]]]
-    """
-    z = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[..., 2]
-    known = np.isfinite(z)
-    return np.stack([np.where(known, z - np.float32(frame.table_z or 0.0), 0.0), known], axis=-1).astype(np.float32)
 
 
 class Engine(ABC):
@@ -102,7 +89,7 @@ class Engine(ABC):
         arrays = [array[None] for array in self.takes.build(picture)]
         p = _softmax(self.padded(arrays)[0])
         if mirror:
-            q = _softmax(self.padded([array[:, :, ::-1] for array in arrays])[0])
+            q = _softmax(self.padded([mirrored(array) for array in arrays])[0])
             p = 0.5 * (p + q[..., ::-1])
         return np.ascontiguousarray(p.transpose(1, 2, 0))
 

@@ -8,10 +8,10 @@ from statistics import NormalDist
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float64, Int64, Integer, Num, UInt8
+from jaxtyping import Bool, Float, Float64, Int64, Integer, Num, UInt8
 
 from labkit.labels import IGNORE
-from labkit.support.validation import check_finite, check_labels
+from labkit.support.validation import check_finite, check_labels, check_shape
 
 
 def confusion_matrix(
@@ -195,6 +195,38 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
     low = 0.0 if successes == 0 else float(centre - half)  # exactly 0, where rounding would miss it
     high = 1.0 if successes == trials else float(centre + half)
     return low, high
+
+
+def reliability_counts(
+    p: Float[np.ndarray, "*shape"], true: Bool[np.ndarray, "*shape"], bins: int = 10
+) -> Float64[np.ndarray, "{bins} 3"]:
+    """Count how often what is called so probable is true: pixels, the sum of their p, and how many are true, by p.
+
+    p: probabilities; bin k holds those from k / bins to (k + 1) / bins, the last one 1 as well. Counts add up over
+    frames, as a confusion matrix does; a point of a reliability diagram is (sum of p, true) / pixels. Raises ValueError
+    for shapes that differ or a p outside 0..1. Topic 07_grasp.
+
+    >>> reliability_counts(np.array([0.1, 0.2, 0.9]), np.array([False, True, True]), bins=2)
+    array([[2. , 0.3, 1. ], [1. , 0.9, 1. ]])
+    """
+    p = check_finite("p", p)
+    true = check_shape("true", true, p.shape)
+    if p.size and not (p.min() >= 0.0 and p.max() <= 1.0):
+        raise ValueError(f"p: expected probabilities in 0..1, got {p.min():.4g} to {p.max():.4g}")
+    place = np.minimum((p.ravel() * bins).astype(np.int64), bins - 1)
+    columns = (np.ones(p.size), p.ravel(), true.ravel())
+    return np.column_stack([np.bincount(place, weights, minlength=bins) for weights in columns]).astype(np.float64)
+
+
+def calibration_error(counts: Num[np.ndarray, "B 3"]) -> float:
+    """Expected calibration error: how far probabilities are from frequencies, on average over what was counted.
+
+    counts: of `reliability_counts`; NaN if nothing was counted.
+
+    >>> round(calibration_error(np.array([[10, 2.0, 4], [10, 9.0, 9]])), 3)
+    0.1
+    """
+    return float(_ratio(np.abs(counts[:, 1] - counts[:, 2]).sum(), counts[:, 0].sum()))
 
 
 def _ratio(part, whole):

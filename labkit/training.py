@@ -12,7 +12,7 @@ import re
 import signal
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +22,13 @@ from torch.nn import functional as F
 from tqdm.auto import tqdm
 
 from labkit.frame import RGBDFrame
-from labkit.labels import CLASSES, IGNORE
+from labkit.geometry import back_project_to_base
+from labkit.labels import CLASSES, IGNORE, SURFACE
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
 from labkit.support.augment import augment
+from labkit.support.augment_depth import augment_frames
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_labels, check_rgb
 
@@ -35,8 +37,8 @@ from labkit.support.validation import check_labels, check_rgb
 class TrainConfig:
     """Everything that a run depends on besides its data.
 
-    model: "unet", "smallsegnet", or the name in the files' names of a network of one's own. epochs: passes over the
-    data; steps: optimiser steps instead, if given. lr: the highest learning rate; weights: scheme of
+    model: a name in labkit.network.ARCHITECTURES, or the name in the files' names of a network of one's own. epochs:
+    passes over the data; steps: optimiser steps instead, if given. lr: the highest learning rate; weights: scheme of
     labkit.losses.class_weights. crop: (h, w) of the random window of each image, or None for whole images. val_every:
     epochs between validations. Raises ValueError for a bad value.
 
@@ -90,24 +92,34 @@ class TrainConfig:
 RECIPES = {
     "unet": TrainConfig(model="unet", epochs=40),
     "smallsegnet": TrainConfig(model="smallsegnet", epochs=4, lr=1e-3),
+    "unet_rgbd": TrainConfig(model="unet_rgbd", epochs=24, crop=(144, 192), val_every=4),
 }
 
 
 class ImagesInMemory:
-    """Images and labels of a dataset, decoded once and kept as bytes: 4,000 of 320x240 take 1.2 GB.
+    """Images and labels of a dataset, decoded once and kept as bytes: 4,000 of 320x240 take 1.2 GB, 2.4 with depth.
 
     dataset: a sequence of (rgb uint8 (H, W, 3), labels (H, W)), arrays or tensors, or of RGBDFrame with labels.
-    rgb: uint8 tensor (N, H, W, 3); y: uint8 tensor (N, H, W). Raises ValueError if the dataset is empty, its images
-    differ in size, or a label is out of range.
+    rgb: uint8 tensor (N, H, W, 3); y: uint8 tensor (N, H, W). depth: keep the frames themselves, too, for a network
+    that looks at geometry; one that does not state its table's height gets that of the pixels labelled surface. Raises
+    ValueError if the dataset is empty or has no frames though depth is asked for, its images differ in size, or a label
+    is out of range.
     """
 
     def __init__(
-        self, dataset: Sequence, num_classes: int = len(CLASSES), name: str = "dataset", progress: bool = True
+        self,
+        dataset: Sequence,
+        num_classes: int = len(CLASSES),
+        name: str = "dataset",
+        progress: bool = True,
+        depth: bool = False,
     ):
         if len(dataset) == 0:
             raise ValueError(f"{name}: expected at least one image, got none")
+        self.frames: list[RGBDFrame] = []
         for i in tqdm(range(len(dataset)), desc=f"reading {name}", unit="image", disable=not progress):
-            rgb, y = image_and_labels(f"{name}[{i}]", dataset[i])
+            item = dataset[i]
+            rgb, y = image_and_labels(f"{name}[{i}]", item)
             if i == 0:
                 self.rgb = torch.empty((len(dataset), *rgb.shape), dtype=torch.uint8)
                 self.y = torch.empty((len(dataset), *y.shape), dtype=torch.uint8)
@@ -117,6 +129,15 @@ class ImagesInMemory:
                 )
             self.rgb[i] = torch.from_numpy(rgb)
             self.y[i] = torch.from_numpy(check_labels(f"{name}[{i}]", y, num_classes).astype(np.uint8))
+            if depth:
+                if not isinstance(item, RGBDFrame):
+                    raise ValueError(f"{name}[{i}]: expected an RGBDFrame, for its depth, got {type(item).__name__}")
+                images = {"rgb": self.rgb[i].numpy(), "labels": self.y[i].numpy(), "instances": None}
+                self.frames.append(replace(item, **images, table_z=table_height(item)))
+
+    def pictures(self, chosen: Sequence[int]) -> list:
+        """The frames of these numbers, or their RGB images if depth was not kept: what an engine takes."""
+        return [self.frames[i] if self.frames else self.rgb[i].numpy() for i in chosen]
 
     def __len__(self) -> int:
         return len(self.y)
@@ -135,6 +156,22 @@ def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
     if y.shape != rgb.shape[:2]:
         raise ValueError(f"{name}: expected labels of the size of the image, {rgb.shape[:2]}, got {y.shape}")
     return rgb, y
+
+
+def table_height(frame: RGBDFrame) -> float:
+    """Height of the table in the base frame, metres: the frame's own, else the median over the pixels labelled surface.
+
+    0 without any such pixel.
+
+    >>> frame = RGBDFrame(np.zeros((2, 2, 3), np.uint8), np.ones((2, 2)), np.eye(3), np.eye(4), np.ones((2, 2), int))
+    >>> table_height(frame)
+    1.0
+    """
+    if frame.table_z is not None:
+        return frame.table_z
+    heights = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[frame.labels == SURFACE, 2]
+    heights = heights[np.isfinite(heights)]
+    return float(np.median(heights)) if heights.size else 0.0
 
 
 def choose_device(device: str = "auto") -> torch.device:
@@ -180,6 +217,16 @@ class DeferredInterrupt:
             signal.signal(signal.SIGINT, self.previous)
 
 
+def fresh_model(config: TrainConfig) -> nn.Module:
+    """Make the untrained network of a configuration; raises ValueError if it is none of the kit's."""
+    if config.model not in ARCHITECTURES:
+        names = ", ".join(ARCHITECTURES)
+        raise ValueError(f"model: expected {names}, or a network of your own, got {config.model!r} alone")
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        return ARCHITECTURES[config.model](config.num_classes)
+
+
 class Trainer:
     """One run: model, optimiser and position; `step` makes one step, `state` and `restore` save and load all of it."""
 
@@ -187,16 +234,8 @@ class Trainer:
         self.data, self.config, self.device = data, config, device
         self.batches = math.ceil(len(data) / config.batch)  # in an epoch
         self.total = config.steps if config.steps is not None else config.epochs * self.batches
-        if model is None:
-            if config.model not in ARCHITECTURES:
-                names = ", ".join(ARCHITECTURES)
-                raise ValueError(f"model: expected {names}, or a network of your own, got {config.model!r} alone")
-            with torch.random.fork_rng():
-                torch.manual_seed(config.seed)
-                model = ARCHITECTURES[config.model](config.num_classes)
+        model = fresh_model(config) if model is None else model
         self.takes = TorchEngine(model).takes
-        if self.takes.arrays != ("image",):
-            raise ValueError(f"model: expected a network that takes images only, got one of {self.takes.arrays}")
         self.model = model.to(device=device, memory_format=torch.channels_last)
         self.optimiser = torch.optim.AdamW(
             self.model.parameters(), lr=config.lr, weight_decay=config.weight_decay, fused=True
@@ -208,31 +247,38 @@ class Trainer:
         self.losses: list[float] = []  # of this epoch
         self.history: list[dict] = []
 
-    def batch_of_step(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
-        """Images (N, 3, h, w), as the network takes them, and labels (N, h, w): a function of the seed and the step."""
+    def batch_of_step(self, step: int) -> tuple[list[torch.Tensor], torch.Tensor]:
+        """The arrays (N, D, h, w) that the network takes, and labels (N, h, w): a function of the seed and the step."""
         config, (H, W) = self.config, self.data.y.shape[1:]
         epoch, place = divmod(step, self.batches)
         order = torch.randperm(len(self.data), generator=generator_for(config.seed, 0, epoch))
         chosen = order[place * config.batch : (place + 1) * config.batch]
-        rgb, y = self.data.rgb[chosen], self.data.y[chosen]
         if config.augment:
             size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
-            x, y = augment(rgb, y, size, generator_for(config.seed, 1, step))
+            generator = generator_for(config.seed, 1, step)
+            if self.data.frames:
+                *arrays, y = augment_frames([self.data.frames[i] for i in chosen.tolist()], size, generator)
+            else:
+                *arrays, y = augment(self.data.rgb[chosen], self.data.y[chosen], size, generator)
+            mean, std = (torch.tensor(value).float().reshape(-1, 1, 1) for value in (self.takes.mean, self.takes.std))
+            arrays[0] = arrays[0] * (255.0 / std) - mean / std
         else:
-            x = rgb.permute(0, 3, 1, 2).float().div_(255.0)
-        mean, std = (torch.tensor(value).float().reshape(-1, 1, 1) for value in (self.takes.mean, self.takes.std))
-        x = x * (255.0 / std) - mean / std
+            built = [self.takes.build(picture) for picture in self.data.pictures(chosen.tolist())]
+            arrays = [torch.from_numpy(np.stack(array)).permute(0, 3, 1, 2) for array in zip(*built, strict=True)]
+            y = self.data.y[chosen]
         edges = (0, -y.shape[2] % self.takes.divisor, 0, -y.shape[1] % self.takes.divisor)
-        return (F.pad(x, edges, mode="replicate"), F.pad(y, edges, value=IGNORE)) if any(edges) else (x, y)
+        if not any(edges):
+            return arrays, y
+        return [F.pad(array, edges, mode="replicate") for array in arrays], F.pad(y, edges, value=IGNORE)
 
     def step(self) -> float:
         """Make one optimiser step and return its loss."""
-        x, y = self.batch_of_step(self.done)
+        arrays, y = self.batch_of_step(self.done)
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.learning_rate(self.done, self.total)
         self.model.train()
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
-            logits = logits_of(self.model(x.to(self.device)))
+            logits = logits_of(self.model(*(array.to(self.device) for array in arrays)))
         loss = segmentation_loss(logits, y.to(self.device), self.weights)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
@@ -276,7 +322,8 @@ def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int, batch: in
     device = engine.weight().device
     with torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
         for first in range(0, len(data), batch):
-            z = engine.padded([engine.takes.scaled(data.rgb[first : first + batch].numpy())])
+            built = [engine.takes.build(p) for p in data.pictures(range(first, min(first + batch, len(data))))]
+            z = engine.padded([np.stack(array) for array in zip(*built, strict=True)])
             n += confusion_matrix(data.y[first : first + batch].numpy(), z.argmax(axis=1), num_classes)
     return n
 
@@ -301,8 +348,10 @@ def train(
     Raises ValueError for data that do not fit, or a checkpoint of another configuration. Topics 03 and 05.
     """
     out, where = Path(out), choose_device(device)
-    train_data = in_memory(train_set, config.num_classes, "train_set", progress)
-    val_data = None if val_set is None else in_memory(val_set, config.num_classes, "val_set", progress)
+    model = fresh_model(config) if model is None else model
+    depth = "geometry" in TorchEngine(model).takes.arrays
+    train_data = in_memory(train_set, config.num_classes, "train_set", progress, depth)
+    val_data = None if val_set is None else in_memory(val_set, config.num_classes, "val_set", progress, depth)
     checkpoint = out / f"{config.model}.checkpoint.pt"
     trainer = Trainer(train_data, config, where, model)
     if resume and checkpoint.is_file():
@@ -368,9 +417,13 @@ def undo_weights(
     return best
 
 
-def in_memory(dataset, num_classes: int, name: str, progress: bool = True) -> ImagesInMemory:
+def in_memory(dataset, num_classes: int, name: str, progress: bool = True, depth: bool = False) -> ImagesInMemory:
     """Read a dataset into memory, unless it is there already."""
-    return dataset if isinstance(dataset, ImagesInMemory) else ImagesInMemory(dataset, num_classes, name, progress)
+    if not isinstance(dataset, ImagesInMemory):
+        return ImagesInMemory(dataset, num_classes, name, progress, depth)
+    if depth and not dataset.frames:
+        raise ValueError(f"{name}: expected images with depth, got some that were read without")
+    return dataset
 
 
 def finish_epoch(trainer: Trainer, val_data: ImagesInMemory | None, out: Path) -> None:

@@ -1,5 +1,7 @@
 """From a picture to probabilities: any network in any engine gives what plain PyTorch gives for the padded picture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -7,8 +9,9 @@ from torch import nn
 from torch.nn import functional as F
 
 from labkit.frame import RGBDFrame
-from labkit.inference import NetworkInput, geometry
-from labkit.network import SmallSegNet, TorchEngine, UNet, evaluating, predict_probabilities
+from labkit.geometry import CHANNELS, geometry_channels
+from labkit.inference import NetworkInput
+from labkit.network import SmallSegNet, TorchEngine, UNet, UNetRGBD, evaluating, predict_probabilities
 from labkit.pipeline import Pipeline
 from labkit.stacks.engines import ENGINES, open_engine
 from labkit.training import ImagesInMemory, evaluate
@@ -54,7 +57,8 @@ class Tall(nn.Module):
         self.scale = nn.Parameter(torch.tensor(1000.0))
 
     def forward(self, image, geometry):
-        z = self.scale * (geometry[:, :1] - 0.03) + 0.0 * image[:, :1]
+        height = 0.05 * (2.0 * geometry[:, 1:2] - 1.0)
+        z = self.scale * (height - 0.03) + 0.0 * image[:, :1]
         return torch.cat([-z, z], dim=1)
 
 
@@ -115,13 +119,6 @@ def frame_of_steps() -> RGBDFrame:
     return RGBDFrame(random_image(10, 14), depth, K, T_base_cam, table_z=0.1)
 
 
-def test_geometry_is_height_over_the_table_and_whether_it_is_known():
-    height, known = geometry(frame_of_steps()).transpose(2, 0, 1)
-    expected = 0.02 * (np.arange(14) // 2)
-    assert np.allclose(height, np.where(np.arange(14) == 5, 0.0, expected), atol=1e-6)
-    assert np.array_equal(known, np.broadcast_to(np.arange(14) != 5, (10, 14)))
-
-
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_network_may_look_at_geometry(name):
     frame = frame_of_steps()
@@ -131,6 +128,33 @@ def test_a_network_may_look_at_geometry(name):
     assert not labels[:, :12].any() and labels[:, 12:].all(), "the pipeline's word for the table's height counts"
     with pytest.raises(ValueError, match="picture: expected an RGBDFrame"):
         open_engine(name, Tall())(frame.rgb)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize("mirror", [False, True])
+def test_the_kits_network_sees_the_frames_depth_in_every_engine(name, mirror):
+    """RGB, then seven channels, padded by repeating the border; in a mirror the normal's sideways part is turned."""
+    torch.manual_seed(0)
+    model, frame = UNetRGBD().eval(), frame_of_steps()
+    engine = open_engine(name, model)
+    more = [(0, engine.padded_side(side) - side) for side in (10, 14)]
+
+    def softmax(rgb, channels):
+        x = np.dstack([rgb.astype(np.float32) / 255.0, channels])
+        x = np.pad(x, (*more, (0, 0)), mode="edge").transpose(2, 0, 1)[None].copy()
+        with torch.inference_mode():
+            z = model(*torch.from_numpy(x).split([3, 7], dim=1))[0, :, :10, :14]
+        return F.softmax(z, dim=0).permute(1, 2, 0).numpy()
+
+    for seen in (frame, replace(frame, depth=np.zeros_like(frame.depth))):
+        channels = geometry_channels(seen.depth, seen.K, seen.T_base_cam, 0.1)
+        assert seen is frame or (channels == 0.5).all()
+        expected = softmax(seen.rgb, channels)
+        if mirror:
+            turned = channels[:, ::-1].copy()
+            turned[..., CHANNELS.index("right")] = 1.0 - turned[..., CHANNELS.index("right")]
+            expected = 0.5 * (expected + softmax(seen.rgb[:, ::-1], turned)[:, ::-1])
+        assert np.abs(engine(seen, mirror) - expected).max() < 1e-5
 
 
 def test_networks_of_ones_own_are_evaluated():

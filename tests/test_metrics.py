@@ -297,3 +297,34 @@ def test_wilson_interval_agrees_with_scipy_and_holds_the_rate(result, confidence
 def test_wilson_interval_names_the_argument_that_is_wrong(name, arguments):
     with pytest.raises(ValueError, match=f"^{name}: expected"):
         metrics.wilson_interval(*arguments)
+
+
+# ---------------------------------------------------------------------------------------------------- calibration
+
+
+@pytest.mark.parametrize("bins", [1, 4, 10])
+def test_reliability_counts_are_those_of_a_loop(bins):
+    rng = np.random.default_rng(5)
+    p = np.concatenate([rng.random((3, 40)), [[0.0, 1.0] * 20]]).astype(np.float32)
+    true = rng.random(p.shape) < p
+    expected = np.zeros((bins, 3))
+    for probability, hit in zip(p.ravel(), true.ravel(), strict=True):
+        expected[min(int(probability * np.float32(bins)), bins - 1)] += (1, probability, hit)
+    counts = metrics.reliability_counts(p, true, bins)
+    np.testing.assert_allclose(counts, expected)
+    gaps = [abs(row[1] / row[0] - row[2] / row[0]) * row[0] for row in expected if row[0]]
+    assert metrics.calibration_error(counts) == pytest.approx(sum(gaps) / p.size)
+    parts = [metrics.reliability_counts(p[rows], true[rows], bins) for rows in (slice(0, 2), slice(2, 4))]
+    np.testing.assert_allclose(sum(parts), counts)
+
+
+def test_calibration_of_nothing_is_no_number():
+    assert np.isnan(metrics.calibration_error(metrics.reliability_counts(np.zeros(0), np.zeros(0, bool))))
+
+
+@pytest.mark.bad_input
+def test_probabilities_that_are_none():
+    with pytest.raises(ValueError, match=r"^p: expected probabilities in 0..1, got 0 to 2"):
+        metrics.reliability_counts(np.array([0.0, 2.0]), np.array([False, True]))
+    with pytest.raises(ValueError, match=r"^true: expected shape"):
+        metrics.reliability_counts(np.array([0.0, 1.0]), np.array([False]))

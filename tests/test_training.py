@@ -12,6 +12,7 @@ import pytest
 import torch
 from torch import nn
 
+import data_gen
 from labkit.frame import RGBDFrame
 from labkit.inference import NetworkInput
 from labkit.losses import class_weights, segmentation_loss
@@ -24,6 +25,7 @@ from labkit.training import (
     bf16_is_native,
     choose_device,
     evaluate,
+    table_height,
     train,
     undo_weights,
 )
@@ -41,6 +43,21 @@ def scenes(count: int, height: int = 16, width: int = 24) -> list[tuple[np.ndarr
         y[:2, :2] = 255
         pairs.append((rgb, y))
     return pairs
+
+
+def frames(count: int, height: int = 32, width: int = 48) -> list[RGBDFrame]:
+    """Frames from 0.5 m above a table at z = 0.1: colours are noise, and each class has its height."""
+    rng = np.random.default_rng(8)
+    K = np.array([[60.0, 0.0, width / 2], [0.0, 60.0, height / 2], [0.0, 0.0, 1.0]])
+    T_base_cam = np.diag([1.0, -1.0, -1.0, 1.0])
+    T_base_cam[2, 3] = 0.6
+    made = []
+    for _ in range(count):
+        y = np.kron(rng.integers(0, 4, (height // 16, width // 16)), np.ones((16, 16))).astype(np.uint8)
+        y[:16, :16] = 1  # some of the table is always seen
+        depth = np.choose(y, [0.9, 0.5, 0.48, 0.44]).astype(np.float32)
+        made.append(RGBDFrame(rng.integers(0, 256, (*y.shape, 3), dtype=np.uint8), depth, K, T_base_cam, labels=y))
+    return made
 
 
 def weights_of(folder, name="smallsegnet") -> dict:
@@ -155,14 +172,14 @@ class OwnNetwork(nn.Module):
         return {"out": self.layers(x)}
 
 
-@pytest.mark.parametrize(("model", "make"), [("smallsegnet", None), ("unet", None), ("mine", OwnNetwork)])
+@pytest.mark.parametrize(
+    ("model", "make"), [("smallsegnet", None), ("unet", None), ("unet_rgbd", None), ("mine", OwnNetwork)]
+)
 def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, make, tmp_path, monkeypatch):
     """Stopped by a real SIGINT in the middle of an epoch, once in each of three steps, and gone on with each time."""
-    config, data, val = (
-        replace(CONFIG, model=model, epochs=2, crop=None, num_classes=6 if make else 4),
-        scenes(7),
-        scenes(2),
-    )
+    config = replace(CONFIG, model=model, epochs=2, crop=None, num_classes=6 if make else 4)
+    data = (frames if model == "unet_rgbd" else scenes)(7)
+    val = data[:2]
 
     def run(folder):
         return train(data, val, config, tmp_path / folder, progress=False, model=make and make())
@@ -224,7 +241,7 @@ def test_a_network_of_ones_own_learns_and_loads(tmp_path):
     model = load_model(tmp_path / "mine.pt", model=OwnNetwork())
     right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in data]
     assert np.concatenate(right).mean() > 0.8
-    with pytest.raises(ValueError, match="model: expected smallsegnet, unet, or a network of your own, got 'mine'"):
+    with pytest.raises(ValueError, match=r"model: expected smallsegnet, .* or a network of your own, got 'mine'"):
         train(data, None, config, tmp_path / "b", progress=False)
 
 
@@ -242,10 +259,34 @@ def test_weights_are_there_before_the_end_without_validation(tmp_path, monkeypat
     assert load_model(tmp_path / "smallsegnet.pt") is not None
 
 
+def test_a_network_that_sees_depth_learns_what_colour_does_not_tell(tmp_path):
+    """Colours are noise here; heights over the table are the classes."""
+    data, val = frames(8), frames(10)[8:]
+    config = replace(CONFIG, model="unet_rgbd", epochs=40, lr=1e-2, val_every=40, augment=False, crop=None)
+    history = train(data, val, config, tmp_path, progress=False)
+    assert min(history[-1]["iou"]) > 0.8
+    model, frame = load_model(tmp_path / "unet_rgbd.pt"), val[0]
+    frame = replace(frame, table_z=0.1)
+    right = predict_probabilities(model, frame).argmax(axis=-1) == frame.labels
+    blind = predict_probabilities(model, replace(frame, depth=0.0 * frame.depth)).argmax(axis=-1) == frame.labels
+    assert right.mean() > 0.9 and blind.mean() < 0.7
+
+
+def test_the_table_is_as_high_as_the_pixels_labelled_surface():
+    frame = frames(1)[0]
+    assert table_height(frame) == pytest.approx(0.1, abs=1e-6)
+    lost = replace(frame, depth=np.where(frame.labels == 1, 0.0, frame.depth).astype(np.float32))
+    assert table_height(lost) == 0.0
+    for config in ("train", "wide"):
+        spec = data_gen.sample_scene(3, config)
+        frame = replace(data_gen.render(spec, (160, 120)), table_z=None)
+        assert table_height(frame) == pytest.approx(spec.table.z, abs=1e-4)
+
+
 def test_the_loss_of_a_step_is_the_weighted_loss_of_its_batch():
     data = ImagesInMemory(scenes(5), progress=False)
     trainer = Trainer(data, replace(CONFIG, weights="inverse", augment=False), torch.device("cpu"))
-    x, y = trainer.batch_of_step(0)
+    (x,), y = trainer.batch_of_step(0)
     model = SmallSegNet()
     model.load_state_dict(trainer.model.state_dict())
     weights = class_weights(data.class_counts(4), "inverse")
@@ -258,7 +299,7 @@ def test_an_epoch_shows_every_image_once():
     assert trainer.batches == 4 and trainer.total == 12
     whole = data.rgb.permute(0, 3, 1, 2).float() / 255.0
     for epoch in range(2):
-        images = torch.cat([trainer.batch_of_step(4 * epoch + place)[0] for place in range(4)])
+        images = torch.cat([trainer.batch_of_step(4 * epoch + place)[0][0] for place in range(4)])
         seen = [(image == whole).all(dim=(1, 2, 3)).nonzero().item() for image in images]
         assert sorted(seen) == list(range(7))
 
@@ -333,6 +374,15 @@ NO_LABELS = RGBDFrame(RGB, np.ones(Y.shape, np.float32), np.diag([9.0, 9.0, 1.0]
 def test_data_that_do_not_fit(train_set, val_set, says, tmp_path):
     with pytest.raises(ValueError, match=says):
         train(train_set, val_set, CONFIG, tmp_path, progress=False)
+
+
+@pytest.mark.bad_input
+def test_a_network_that_sees_depth_needs_it(tmp_path):
+    config, pair = replace(CONFIG, model="unet_rgbd"), scenes(1)
+    with pytest.raises(ValueError, match=r"train_set\[0\]: expected an RGBDFrame, for its depth, got tuple"):
+        train(pair, None, config, tmp_path, progress=False)
+    with pytest.raises(ValueError, match="train_set: expected images with depth"):
+        train(ImagesInMemory(pair, progress=False), None, config, tmp_path, progress=False)
     assert not list(tmp_path.iterdir())
 
 
@@ -385,7 +435,7 @@ def test_sizes_that_the_network_does_not_take_are_padded(crop, augmented, tmp_pa
     data = ImagesInMemory(scenes(3, 20, 24), progress=False)
     data.rgb, data.y = data.rgb[:, :18, :23].contiguous(), data.y[:, :18, :23].contiguous()
     config = replace(CONFIG, crop=crop, augment=augmented, epochs=1)
-    x, y = Trainer(data, config, torch.device("cpu")).batch_of_step(0)
+    (x,), y = Trainer(data, config, torch.device("cpu")).batch_of_step(0)
     assert x.shape[2:] == y.shape[1:] == (20, 24)
     assert (y[:, 18:] == 255).all() and (y[:, :18, 2:20] != 255).all()
     assert torch.equal(x[:, :, 18], x[:, :, 17])

@@ -19,9 +19,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-
 # Options that several commands share.
-Model = Annotated[str, typer.Option(help="unet, smallsegnet, or a file of your own weights.")]
+Model = Annotated[str, typer.Option(help="unet_rgbd, unet, smallsegnet, or a file of your own weights.")]
 Refine = Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")]
 Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 
@@ -43,10 +42,17 @@ def doctor() -> None:
 
 @app.command()
 def train(
-    data: Annotated[Path, typer.Argument(help="Data set to train on, as data_gen writes it.")] = Path("data/train"),
+    data: Annotated[list[Path], typer.Argument(help="Data sets to train on, as data_gen writes them.")] = (
+        Path("data/train"),
+    ),
+    scenes: Annotated[int | None, typer.Option(help="Take only the first so many scenes of each.", min=1)] = None,
     val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
-    model: Annotated[str, typer.Option(help="Which network: unet or smallsegnet.")] = "unet",
+    model: Annotated[str, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet.")] = "unet",
+    init: Annotated[
+        str | None, typer.Option(help="Weights to start from, to train on: a name as in --model, or a file.")
+    ] = None,
     epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
+    lr: Annotated[float | None, typer.Option(help="Highest learning rate; the model's recipe if not given.")] = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
     seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
@@ -57,14 +63,20 @@ def train(
 
     import data_gen
     from labkit import training
+    from labkit.network import architecture_of, load_model, weights_path
 
     if model not in training.RECIPES:
         raise ValueError(f"model: expected {' or '.join(training.RECIPES)}, got {model!r}")
     recipe = training.RECIPES[model]
-    config = replace(recipe, seed=seed, epochs=recipe.epochs if epochs is None else epochs)
+    asked = {name: value for name, value in (("epochs", epochs), ("lr", lr)) if value is not None}
+    config = replace(recipe, seed=seed, **asked)
+    network = None if init is None else load_model(weights_path(init))
+    if network is not None and architecture_of(network) != model:
+        raise ValueError(f"init: expected weights of {model}, got {init} of {architecture_of(network)}")
     val_set = None if val is None else data_gen.load(val)
+    train_set = data_gen.Joined([data_gen.load(path) for path in data], each=scenes)
     try:
-        history = training.train(data_gen.load(data), val_set, config, out, resume=resume, device=device)
+        history = training.train(train_set, val_set, config, out, resume, device, model=network)
     except KeyboardInterrupt as stop:  # it says where the checkpoint is
         typer.echo(f"labkit: {stop}", err=True)
         raise typer.Exit(130) from stop
@@ -81,8 +93,11 @@ def evaluate(
     masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
         "predicted"
     ),
-    model: Model = "unet",
+    model: Model = "unet_rgbd",
     crf: Refine = False,
+    perturb: Annotated[
+        bool, typer.Option("--perturb", help="Depth as a sensor measures it, pose off by 5 mm and 0.5 degree.")
+    ] = False,
     json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
     workers: Workers = 1,
 ) -> None:
@@ -96,7 +111,7 @@ def evaluate(
     if weights is not None:
         load_model(weights)  # so that wrong weights are said before anything is simulated
     specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
-    report = summarise(run_trials(specs, weights, crf=crf, workers=workers))
+    report = summarise(run_trials(specs, weights, crf=crf, perturb=perturb, workers=workers))
     typer.echo(table(report))
     if json is not None:
         write_atomically(json, as_json(report).encode())
@@ -144,7 +159,7 @@ def demo(
     seed: Annotated[
         int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
     ] = None,
-    model: Model = "unet",
+    model: Model = "unet_rgbd",
     crf: Refine = False,
     out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
 ) -> None:
@@ -180,7 +195,7 @@ def perceive(
     depth_scale: Annotated[
         float | None, typer.Option(help="Metres per unit of the depth file; else the camera file's, or 0.001.")
     ] = None,
-    model: Model = "unet",
+    model: Model = "unet_rgbd",
     mask: Annotated[
         Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
     ] = None,

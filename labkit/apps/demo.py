@@ -111,10 +111,11 @@ def nearest(point: np.ndarray, places: dict[str, np.ndarray]) -> tuple[str, floa
 
 
 def picture(story: Story) -> Figure:
-    """Six panels: what the camera saw, labels, overlay, target cloud, grasp from above, and the arm at the end."""
-    figure = Figure(figsize=(13.5, 8.2), layout="constrained", dpi=100)
+    """Seven panels: colour, height, labels, overlay, target cloud, grasp from above, and the arm at the end."""
+    figure = Figure(figsize=(17.0, 8.2), layout="constrained", dpi=100)
     panels = figure.subplot_mosaic(
-        [["rgb", "labels", "overlay"], ["cloud", "grasp", "arm"]], per_subplot_kw={"cloud": {"projection": "3d"}}
+        [["rgb", "height", "labels", "overlay"], ["cloud", "cloud", "grasp", "arm"]],
+        per_subplot_kw={"cloud": {"projection": "3d"}},
     )
     frame, p = story.frame, story.perception
     painted = frame.rgb.copy()
@@ -123,9 +124,9 @@ def picture(story: Story) -> Figure:
     cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
     images = {
         "rgb": (frame.rgb, "1  the camera's image"),
-        "labels": (colorize(p.labels), "2  a class for each pixel"),
-        "overlay": (painted, "3  the target mask"),
-        "arm": (story.film[-1] if story.film else frame.rgb, "6  " + outcome_in_words(story)),
+        "labels": (colorize(p.labels), "3  a class for each pixel"),
+        "overlay": (painted, "4  the target mask"),
+        "arm": (story.film[-1] if story.film else frame.rgb, "7  " + outcome_in_words(story)),
     }
     for name, (image, title) in images.items():
         panels[name].imshow(image)
@@ -133,9 +134,19 @@ def picture(story: Story) -> Figure:
         panels[name].set_axis_off()
     handles = [Patch(color=PALETTE[c] / 255.0, label=name) for c, name in enumerate(CLASSES)]
     panels["labels"].legend(handles=handles, loc="lower center", ncols=4, fontsize=8, handlelength=1.0)
+    draw_height(panels["height"], story)
     draw_cloud(panels["cloud"], story)
     draw_grasp(panels["grasp"], story)
     return figure
+
+
+def draw_height(axes, story: Story) -> None:
+    """How high each pixel lies over the table, in centimetres: what depth and calibration tell, seen from anywhere."""
+    centimetres = 100.0 * (story.perception.points[..., 2] - story.spec.table.z)
+    shown = axes.imshow(centimetres, cmap="viridis", vmin=-2.0, vmax=12.0, interpolation="nearest")
+    axes.figure.colorbar(shown, ax=axes, orientation="horizontal", shrink=0.8, extend="both", label="cm")
+    axes.set_title("2  height over the table, from depth", loc="left")
+    axes.set_axis_off()
 
 
 def outcome_in_words(story: Story) -> str:
@@ -163,14 +174,14 @@ def draw_cloud(axes, story: Story) -> None:
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.tick_params(labelsize=7)
     axes.locator_params(nbins=4)
-    axes.set_title("4  the target cloud in the robot's frame, z up", loc="left")
+    axes.set_title("5  the target cloud in the robot's frame, z up", loc="left")
     axes.legend(fontsize=8, loc="upper right", facecolor="0.75")
 
 
 def draw_grasp(axes, story: Story) -> None:
     """From above: every point by its height, the target in orange, and the two jaws of the best candidates."""
     p, table_z = story.perception, story.spec.table.z
-    axes.set_title("5  the grasp, seen from above", loc="left")
+    axes.set_title("6  the grasp, seen from above", loc="left")
     axes.set(xlabel="y of the base frame (m)", ylabel="x of the base frame (m)")
     axes.set_aspect("equal", adjustable="box")
     middle = p.plan.grasps[0].T_base_grasp[:2, 3] if p.plan.grasps else np.array([0.52, 0.0])

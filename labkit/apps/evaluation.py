@@ -3,7 +3,7 @@
 import json
 import time
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
@@ -12,16 +12,29 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from labkit.apps.trials import in_processes
-from labkit.labels import CLASSES
-from labkit.metrics import boundary_counts, confusion_matrix, iou, mean_iou, pixel_accuracy, wilson_interval
+from labkit.labels import CLASSES, TARGET
+from labkit.metrics import (
+    boundary_counts,
+    confusion_matrix,
+    iou,
+    mean_iou,
+    pixel_accuracy,
+    reliability_counts,
+    wilson_interval,
+)
 from labkit.pipeline import Pipeline
+from labkit.support.sensor import perturbed
 
 BOUNDARY_WIDTH = 2  # pixels
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One scene: counts n[i, j] and boundary counts of its mask, whether a target was lifted, else why not; times."""
+    """One scene: counts n[i, j] and boundary counts of its mask, whether a target was lifted, else why not; times.
+
+    certainty: the pipeline's for the target of its best grasp, 0 without a grasp. reliability: the reliability_counts
+    of the probability of "target" over all pixels, None for labels that come without.
+    """
 
     seed: int
     counts: np.ndarray
@@ -30,14 +43,17 @@ class Trial:
     reason: str
     family: str
     seconds: dict[str, float] = field(default_factory=dict)
+    certainty: float = 0.0
+    reliability: np.ndarray | None = None
 
 
-def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = False) -> Trial:
+def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = False, perturb: bool = False) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
     spec: a SceneSpec. model: as in Pipeline, or the path of weights; None for true masks. crf: refine the model's
-    labels. No reachable candidate is a failure, and so is lifting anything but a target. Only the score reads the
-    simulator's truth. Raises ValueError for a CRF on true masks.
+    labels. perturb: depth as a sensor measures it and a camera pose that is off (labkit.support.sensor.perturbed), the
+    same for every model. No reachable candidate is a failure, and so is lifting anything but a target. Only the score
+    reads the simulator's truth. Raises ValueError for a CRF on true masks.
     """
     from labkit.sim.world import World  # PyBullet stays out of this module's import
 
@@ -50,6 +66,8 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
         start = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
+        if perturb:
+            frame = perturbed(frame, np.random.default_rng([spec.seed, 2]))
         perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)
         before = time.perf_counter()
         result = lift(world, perception)
@@ -63,6 +81,10 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
         reason="" if result.success else result.reason,
         family=families.get(result.name, ""),
         seconds=seconds,
+        certainty=perception.certainty[perception.plan.grasps[0].target] if perception.plan.grasps else 0.0,
+        reliability=None
+        if perception.probabilities is None
+        else reliability_counts(np.clip(perception.probabilities[..., TARGET], 0.0, 1.0), frame.labels == TARGET),
     )
 
 
@@ -89,6 +111,9 @@ class Report:
 
     iou: by class name; mean_iou and boundary_iou are means over the classes present. boundary_iou looks at the pixels
     within 2 of a mask's edge. lift_interval: 95 %. failures: how many trials failed for each reason. seconds: medians.
+    calibration: for each tenth of the target's probability the mean probability, how often it was a target, and the
+    number of pixels. declining: if only trials of at least some certainty were tried: that certainty, the share of the
+    trials that is left, and the share of these that lifted; ten steps.
     """
 
     iou: dict[str, float]
@@ -101,6 +126,8 @@ class Report:
     trials: int
     failures: dict[str, int]
     seconds: dict[str, float]
+    calibration: list[tuple[float, float, int]]
+    declining: list[tuple[float, float, float]]
 
 
 def summarise(trials: Iterable[Trial]) -> Report:
@@ -128,18 +155,40 @@ def summarise(trials: Iterable[Trial]) -> Report:
         trials=len(trials),
         failures=dict(Counter(trial.reason for trial in trials if not trial.lifted).most_common()),
         seconds={stage: float(np.median([trial.seconds[stage] for trial in trials])) for stage in stages},
+        calibration=calibration([trial.reliability for trial in trials if trial.reliability is not None]),
+        declining=declining(trials),
     )
 
 
+def calibration(counts: Sequence[np.ndarray]) -> list[tuple[float, float, int]]:
+    """The points of a reliability diagram, each with its number of pixels, from counts of several trials."""
+    rows = np.sum(counts, axis=0) if counts else np.zeros((0, 3))
+    return [(float(p / pixels), float(true / pixels), int(pixels)) for pixels, p, true in rows if pixels]
+
+
+def declining(trials: Sequence[Trial]) -> list[tuple[float, float, float]]:
+    """What a robot gains that tries its surest scenes only: (least certainty, share tried, share of these lifted)."""
+    surest = sorted(trials, key=lambda trial: -trial.certainty)
+    lifts = np.cumsum([trial.lifted for trial in surest])
+    steps = sorted({max(1, round(share * len(surest))) for share in np.arange(1, 11) / 10})
+    return [(surest[n - 1].certainty, n / len(surest), float(lifts[n - 1] / n)) for n in steps]
+
+
 def run_trials(
-    specs, model=None, size: tuple[int, int] = (320, 240), crf: bool = False, workers: int = 1, progress: bool = True
+    specs,
+    model=None,
+    size: tuple[int, int] = (320, 240),
+    crf: bool = False,
+    perturb: bool = False,
+    workers: int = 1,
+    progress: bool = True,
 ) -> list[Trial]:
-    """Run a trial of each scene, in the order of `specs`, in so many processes.
+    """Run a trial of each scene, in the order of `specs`, in so many processes; the options are those of `run_trial`.
 
     With several workers, give `model` as the path of its weights: each worker loads them once.
     """
     specs, trials, lifts = list(specs), [], 0
-    results = in_processes(partial(run_trial, model=model, size=size, crf=crf), specs, workers)
+    results = in_processes(partial(run_trial, model=model, size=size, crf=crf, perturb=perturb), specs, workers)
     with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
         for trial in bar:
             trials.append(trial)

@@ -1,10 +1,11 @@
 """From pixels with depth to points in the robot's base frame, and what a cloud of points says (topic 06).
 
 `projection` goes from pixels to points and back, and moves points between frames; `clouds` finds centroid, axes, plane,
-outliers and separate objects. Metres throughout. Every function checks what it is given: a ValueError names the
-argument, what was expected and what came.
+outliers and separate objects; `channels` is what a network sees of a depth image. Metres throughout. Every function
+checks what it is given: a ValueError names the argument, what was expected and what came.
 """
 
+from labkit.geometry.channels import CHANNELS, geometry_channels, mirrored
 from labkit.geometry.clouds import (
     Plane,
     PrincipalAxes,
@@ -29,6 +30,7 @@ from labkit.geometry.projection import (
 )
 
 __all__ = [
+    "CHANNELS",
     "Plane",
     "PrincipalAxes",
     "back_project",
@@ -40,8 +42,10 @@ __all__ = [
     "cluster",
     "cluster_indices",
     "fit_plane",
+    "geometry_channels",
     "inliers",
     "invert_transform",
+    "mirrored",
     "pixel_rays",
     "principal_axes",
     "project",

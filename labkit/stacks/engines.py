@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from labkit.geometry import CHANNELS
 from labkit.inference import Engine, NetworkInput
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_rgb, check_shape
@@ -113,7 +114,7 @@ def to_onnx(model) -> bytes:
     height = -(-64 // takes.divisor) * takes.divisor
     example = {"image": np.zeros((1, 3, height, 2 * height), np.float32)}
     if "geometry" in takes.arrays:
-        example["geometry"] = np.zeros((1, 2, height, 2 * height), np.float32)
+        example["geometry"] = np.zeros((1, len(CHANNELS), height, 2 * height), np.float32)
     num_classes = engine.forward(*example.values()).shape[1]
     device = next((weight.device for weight in model.parameters()), "cpu")
     axes = {2: "height", 3: "width"}
@@ -170,6 +171,8 @@ def segment_like_cpp(
     (48, 64)
     """
     bgr = check_rgb("bgr", bgr)
+    if engine.takes.arrays != ("image",):
+        raise ValueError(f"engine: expected a network that takes images alone, got one of {engine.takes.arrays}")
     if any(side < 1 or side % engine.takes.divisor for side in size):
         raise ValueError(f"size: expected width and height divisible by {engine.takes.divisor}, got {size}")
     blob = cv2.dnn.blobFromImage(bgr, 1.0 / 255.0, size, (0.0, 0.0, 0.0), swapRB=True, crop=False)

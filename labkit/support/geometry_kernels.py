@@ -32,6 +32,61 @@ def scale_rays(depth, rays, t):
 
 
 @njit(cache=True)
+def inverse_depth(depth):
+    """Compute 1 / depth, (H, W) float32; a pixel without depth gets the mean over the known of the 5 x 5 round it."""
+    H, W = depth.shape
+    q = np.zeros((H, W), np.float32)
+    for v in range(H):
+        for u in range(W):
+            if depth[v, u] > 0.0:
+                q[v, u] = np.float32(1.0) / depth[v, u]
+    filled = q.copy()
+    for v in range(H):
+        for u in range(W):
+            if q[v, u] == 0.0:
+                total, count = np.float32(0.0), 0
+                for j in range(max(0, v - 2), min(H, v + 3)):
+                    for i in range(max(0, u - 2), min(W, u + 3)):
+                        total += q[j, i]
+                        count += q[j, i] > 0.0
+                if count:
+                    filled[v, u] = total / np.float32(count)
+    return filled
+
+
+@njit(cache=True)
+def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footprint):
+    """Compute the geometry channels of every pixel, (H, W, 7) in 0..1, from 1 / depth and its slopes.
+
+    axes: (3, 3), from the gradient (q_u, q_v, q_1) of 1 / depth to the normal's parts. slant: (3,), the height that a
+    ray gains for each metre of depth is its product with (u, v, 1). reach: the metres of the two height channels.
+    footprint: metres at which its channel is 0.5, times the focal length.
+    """
+    H, W = depth.shape
+    out = np.full((H, W, 7), np.float32(0.5))
+    half, one = np.float32(0.5), np.float32(1.0)
+    for v in range(H):
+        for u in range(W):
+            d = depth[v, u]
+            if d > 0.0:
+                height = d * (slant[0] * u + slant[1] * v + slant[2]) + camera_height
+                a, b = q_u[v, u], q_v[v, u]
+                c = q[v, u] - a * u - b * v
+                x = axes[0, 0] * a + axes[0, 1] * b + axes[0, 2] * c
+                y = axes[1, 0] * a + axes[1, 1] * b + axes[1, 2] * c
+                z = axes[2, 0] * a + axes[2, 1] * b + axes[2, 2] * c
+                scale = half / (np.sqrt(x * x + y * y + z * z) + np.float32(1e-12))
+                out[v, u, 0] += half * min(one, max(-one, height / reach[0]))
+                out[v, u, 1] += half * min(one, max(-one, height / reach[1]))
+                out[v, u, 2] = one
+                out[v, u, 3] += scale * x
+                out[v, u, 4] += scale * y
+                out[v, u, 5] += scale * z
+                out[v, u, 6] += half * min(one, max(-one, np.log2(d / footprint) / np.float32(3.0)))
+    return out
+
+
+@njit(cache=True)
 def points_in_box(points, low, high):
     """Keep the points (N, 3) that lie inside a box with sides along the axes; NaN lies nowhere."""
     kept = np.empty_like(points)

@@ -7,10 +7,11 @@ import subprocess
 import sys
 
 import pytest
+import torch
 
 import data_gen
 from labkit.apps import cli, doctor
-from labkit.network import load_model
+from labkit.network import UNetRGBD, load_model, save_model
 
 HEAVY = ("torch", "numpy", "cv2", "pybullet", "numba", "matplotlib")
 
@@ -128,6 +129,21 @@ def test_train_writes_weights_and_a_second_run_finds_it_done(monkeypatch, capsys
     assert "seed" in capsys.readouterr().err
     assert run(monkeypatch, *command, "--seed", 1, "--no-resume") == 0
     assert (tmp_path / "unet.pt").read_bytes() != weights
+
+
+def test_training_goes_on_from_given_weights_on_part_of_two_data_sets(monkeypatch, capsys, data, tmp_path):
+    """A learning rate of next to nothing leaves the weights as they were; four frames are one batch of eight."""
+    start, out = tmp_path / "start.pt", tmp_path / "out"
+    save_model(UNetRGBD(), start)
+    settings = "--scenes 2 --model unet_rgbd --epochs 1 --device cpu --lr 1e-9"
+    command = ["train", data, data, *settings.split()]
+    assert run(monkeypatch, *command, "--init", start, "--out", out) == 0
+    assert json.loads((out / "unet_rgbd.history.json").read_text())[0]["steps"] == 1
+    trained = dict(load_model(out / "unet_rgbd.pt").named_parameters())
+    for name, weight in load_model(start).named_parameters():
+        assert torch.allclose(weight, trained[name], atol=1e-6), name
+    assert run(monkeypatch, *command, "--init", "unet", "--out", tmp_path) == 2
+    assert "init: expected weights of unet_rgbd, got unet of unet" in capsys.readouterr().err
 
 
 def test_ctrl_c_ends_training_with_status_130_and_says_where_the_checkpoint_is(data, tmp_path):

@@ -1,16 +1,20 @@
 """Scores and lifts over scenes: pooled, honest, and as the command prints them."""
 
+import dataclasses
 import json
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+import torch
 from scenes import box, scene
 
 from data_gen import sample_scene
 from labkit.apps.evaluation import Trial, lift, run_trial, summarise, table
+from labkit.geometry import CHANNELS
 from labkit.grasp import GraspPlan
+from labkit.inference import NetworkInput
 from labkit.labels import CLASSES, OBSTACLE, SURFACE, TARGET
 from labkit.metrics import confusion_matrix, iou
 from labkit.network import SmallSegNet, save_model
@@ -33,6 +37,25 @@ def test_counts_are_added_before_they_are_divided():
     assert report.lift_rate == 0.5 and report.failures == {"slipped": 1} and report.trials == 2
     low, high = report.lift_interval
     assert 0.0 < low < 0.5 < high < 1.0
+
+
+def test_declining_what_is_unsure_is_the_lift_rate_of_the_surest():
+    rng = np.random.default_rng(0)
+    trials = [
+        dataclasses.replace(trial(np.eye(4, dtype=int), bool(rng.random() < c)), certainty=c) for c in rng.random(40)
+    ]
+    rows = summarise(trials).declining
+    assert len(rows) == 10 and rows[-1][1] == 1.0 and rows[-1][2] == np.mean([t.lifted for t in trials])
+    for least, share, rate in rows:
+        tried = [t.lifted for t in trials if t.certainty >= least]
+        assert share == len(tried) / 40 and rate == pytest.approx(np.mean(tried))
+
+
+def test_calibration_pools_pixels_of_all_trials():
+    counts = [np.array([[4, 0.4, 1], [0, 0, 0]]), np.array([[6, 0.6, 1], [2, 1.8, 2]])]
+    trials = [dataclasses.replace(trial(np.eye(4, dtype=int)), reliability=c) for c in (*counts, None)]
+    assert summarise(trials).calibration == [(0.1, 0.2, 10), (0.9, 1.0, 2)]
+    assert summarise(trials[2:]).calibration == []
 
 
 def test_no_trial_is_an_error():
@@ -115,3 +138,46 @@ def test_predicted_masks_are_scored_against_the_truth():
         labels = world.render((160, 120)).labels
     assert np.array_equal(result.counts, confusion_matrix(labels, np.ones_like(labels), 4))
     assert not result.lifted and iou(result.counts)[TARGET] == 0.0
+
+
+def test_a_perturbed_trial_gives_every_model_the_same_spoilt_frame():
+    """The score still knows the truth; the depth and the pose that the model works with are off."""
+    spec, seen = sample_scene(500_002, "test"), []
+
+    class Spy(torch.nn.Module):
+        """A network that writes down what it sees and calls everything surface."""
+
+        takes = NetworkInput(("image", "geometry"))
+
+        def forward(self, image, geometry):
+            seen.append((image.numpy().copy(), geometry.numpy()[0].copy()))
+            return torch.eye(4)[1][None, :, None, None].expand(1, 4, *image.shape[-2:])
+
+        def __init__(self):
+            super().__init__()
+            self.weight = torch.nn.Parameter(torch.zeros(1))
+
+    for perturb in (False, True, True):
+        trial = run_trial(spec, Spy(), (160, 120), perturb=perturb)
+        assert trial.certainty == 0.0
+    exact, spoilt, again = seen[:: len(seen) // 3]  # the first look of each trial
+    assert np.array_equal(spoilt[1], again[1]) and np.array_equal(exact[0], spoilt[0])
+    known = spoilt[1][CHANNELS.index("known")] == 1.0
+    heights = [geometry[CHANNELS.index("height, fine")] for _, geometry in (exact, spoilt)]
+    on_table = (abs(heights[0] - 0.5) < 1e-3) & known
+    assert on_table.sum() > 1000
+    assert 0.01 < np.abs(heights[1] - heights[0])[on_table].mean() < 0.25  # 1 to 25 mm of 100
+
+
+def test_certainty_is_that_of_the_best_grasps_target():
+    with World(post_scene(TARGET)) as world:
+        labels = world.render().labels
+
+    def sure(rgb):
+        return np.where(np.eye(4, dtype=bool)[labels], 0.7, 0.1)
+
+    trial = run_trial(post_scene(TARGET), sure)
+    assert trial.lifted and trial.certainty == pytest.approx(0.7, abs=1e-3)
+    pixels, p, true = trial.reliability.T
+    assert pixels.sum() == labels.size and true.sum() == (labels == TARGET).sum() == true[7] + true[6]
+    assert p.sum() == pytest.approx(0.1 * labels.size + 0.6 * true.sum())

@@ -63,7 +63,7 @@ def measure_steps() -> list[tuple]:
         trainers["labkit, bfloat16"] = Trainer(data, CONFIG, device)
     plain = PlainLoop(trainers["labkit, float32"].model.state_dict())
     batches = [trainers["labkit, float32"].batch_of_step(step) for step in range(ROUNDS + 1)]
-    ready = iter([(x.contiguous(), y.long()) for x, y in batches])
+    ready = iter([(x.contiguous(), y.long()) for (x,), y in batches])
     steps = {"the text's loop": lambda: plain.step(*next(ready))}
     steps |= {name: trainer.step for name, trainer in trainers.items()}
     losses = {name: [] for name in steps}

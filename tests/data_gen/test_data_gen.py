@@ -17,14 +17,15 @@ import pytest
 import data_gen
 from data_gen import dataset
 from data_gen.families import FAMILIES
-from data_gen.sensor import DepthSensor
+from data_gen.scenes import CONFIGS
 from data_gen.statistics import statistics
-from labkit.frame import RGBDFrame
+from data_gen.wide import WIDE
 from labkit.labels import OBSTACLE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.shapes import object_mesh
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
+from labkit.support.sensor import DepthSensor
 
 SIZE = (80, 60)
 
@@ -94,6 +95,43 @@ def test_hard_has_shapes_textures_and_viewpoints_that_train_lacks():
     # A duck is one model: hard ones have sizes that training ducks never have.
     ducks = {c: [scale for _, scale, _ in shapes(c)["duck"]] for c in scenes}
     assert all(not min(ducks["train"]) <= s <= max(ducks["train"]) for s in ducks["hard"])
+
+
+def test_wide_has_none_of_hards_textures_viewpoints_and_shapes():
+    """Training may see more than `train` shows, but nothing that `hard` asks about."""
+    scenes = {c: [data_gen.sample_scene(seed, c) for seed in range(60)] for c in ("wide", "hard")}
+    things = {c: [thing for spec in scenes[c] for thing in spec.objects] for c in scenes}
+    assert not {s.table.texture.kind for s in scenes["wide"]} & {s.table.texture.kind for s in scenes["hard"]}
+    (low_from, low_to), (high_from, high_to) = CONFIGS["hard"].elevations
+    for spec in scenes["wide"]:
+        elevation = np.arcsin(-spec.camera.T_base_cam[2][2])
+        assert not low_from < elevation < low_to and not high_from < elevation < high_to and elevation < high_from
+
+    def sizes(config, family):
+        """Edge lengths in the object's frame, sorted; shapes are told apart by these or by their number of parts."""
+        return np.array(
+            [np.sort(np.ptp(object_mesh(t).vertices, axis=0)) for t in things[config] if t.family == family]
+        )
+
+    assert sizes("wide", "block")[:, 0].min() > sizes("hard", "block")[:, 0].max()  # hard: slabs and sticks
+    assert sizes("wide", "ball").max() < sizes("hard", "ball").min()
+    blobs = {c: {t.urdf for t in things[c] if t.family == "blob"} for c in things}
+    assert not blobs["wide"] & blobs["hard"]
+    scales = {c: [t.scale for t in things[c] if t.family == "duck"] for c in things}
+    assert not any(min(scales["wide"]) <= s <= max(scales["wide"]) for s in scales["hard"])
+    studs = {
+        c: {tuple(len({p.position[axis] for p in t.parts[1:]}) for axis in (0, 1)) for t in legos}
+        for c in ("wide", "hard")
+        for legos in [[t for t in things[c] if t.family == "lego" and t.parts]]
+    }
+    assert studs["wide"] and not studs["wide"] & studs["hard"]
+    hulls = {
+        c: {tuple(len(p.size) for p in t.parts) for t in things[c] if t.family in ("ring", "bowl")} for c in things
+    }
+    assert not hulls["wide"] & hulls["hard"]
+    rods = {c: {tuple(p.kind for p in t.parts) for t in things[c] if t.family == "dumbbell"} for c in things}
+    assert not rods["wide"] & rods["hard"]
+    assert {t.family for t in things["wide"]} == set(FAMILIES) == set(WIDE)
 
 
 def test_every_target_can_be_held():
@@ -214,24 +252,6 @@ def test_depth_noise_is_off_unless_asked_for_and_spoils_depth_alone(tmp_path):
     exact = data_gen.render(data_gen.sample_scene(0, "test"), SIZE)
     assert np.array_equal(noisy.rgb, exact.rgb)
     assert (noisy.depth == 0).sum() > (exact.depth == 0).sum()
-
-
-def test_the_sensors_noise_grows_with_the_square_of_depth():
-    sensor = DepthSensor(noise=0.002, step=0.0, loss=0.0, edge_loss=0.0)
-    K, rgb = np.diag([50.0, 50.0, 1.0]), np.zeros((200, 200, 3), np.uint8)
-    spread = []
-    for d in (1.0, 2.0):
-        frame = RGBDFrame(rgb, np.full((200, 200), d, np.float32), K, np.eye(4))
-        spread.append(sensor.apply(frame, np.random.default_rng(0)).depth.std())
-    assert np.isclose(spread[0], 0.002, rtol=0.05) and np.isclose(spread[1] / spread[0], 4.0, rtol=0.05)
-
-
-def test_the_sensor_loses_pixels_at_edges():
-    depth = np.ones((100, 100), np.float32)
-    depth[:, 50:] = 1.5
-    frame = RGBDFrame(np.zeros((100, 100, 3), np.uint8), depth, np.diag([50.0, 50.0, 1.0]), np.eye(4))
-    seen = DepthSensor(noise=0.0, step=0.0, edge_loss=1.0, loss=0.0).apply(frame, np.random.default_rng(0)).depth
-    assert (seen[:, 49:51] == 0).all() and (seen[:, :49] > 0).all() and (seen[:, 51:] > 0).all()
 
 
 # Bad input ----------------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import data_gen
 from labkit.apps.cli import app
-from labkit.network import load_model, predict_logits, weights_path
+from labkit.network import UNetRGBD, load_model, predict_logits, weights_path
 from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.stacks.engines import ENGINES, export, labels_of_scores, open_engine, segment_like_cpp
 
@@ -187,5 +187,7 @@ def test_images_and_sizes_that_do_not_fit(unet):
         segment_like_cpp(engine, np.zeros((4, 4), np.uint8))
     with pytest.raises(ValueError, match=r"size: .*divisible by 16, got \(100, 80\)"):
         segment_like_cpp(engine, np.zeros((4, 4, 3), np.uint8), (100, 80))
+    with pytest.raises(ValueError, match="engine: expected a network that takes images alone"):
+        segment_like_cpp(open_engine("torch", UNetRGBD()), np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(ValueError, match="scores: expected shape"):
         labels_of_scores(np.zeros((4, 2, 3)))

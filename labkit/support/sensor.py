@@ -1,9 +1,11 @@
-"""What a real depth camera does to exact depth: steps, noise that grows with distance, holes at edges."""
+"""What a real depth camera does to exact depth: steps, noise that grows with distance, holes at edges; and its pose."""
 
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 
@@ -31,7 +33,11 @@ class DepthSensor:
         array([[0.9, 0.9],
                [0.9, 0.9]], dtype=float32)
         """
-        depth = frame.depth.astype(np.float64)
+        return replace(frame, depth=self.measure(frame.depth, rng))
+
+    def measure(self, depth: Float[np.ndarray, "H W"], rng: np.random.Generator) -> Float[np.ndarray, "H W"]:
+        """Do the same to a depth image in metres, (H, W); float32, 0 where there is no reading."""
+        depth = depth.astype(np.float64)
         known = np.isfinite(depth) & (depth > 0.0)
         depth = np.where(known, depth, 0.0)
         around = np.ones((3, 3), np.uint8)
@@ -40,5 +46,18 @@ class DepthSensor:
         noisy = depth + self.noise * depth**2 * rng.standard_normal(depth.shape)
         if self.step > 0.0:
             noisy = self.step * np.round(noisy / self.step)
-        measured = np.where(known & ~lost, np.maximum(noisy, 0.0), 0.0)
-        return replace(frame, depth=measured.astype(np.float32))
+        return np.where(known & ~lost, np.maximum(noisy, 0.0), 0.0).astype(np.float32)
+
+
+def perturbed(
+    frame: RGBDFrame, rng: np.random.Generator, metres: float = 0.005, degrees: float = 0.5, sensor=DepthSensor()
+) -> RGBDFrame:
+    """The frame of a real camera: depth through `sensor`, and a pose that is off by so much in a random direction.
+
+    The camera's place is wrong by `metres`, and its attitude by a rotation of `degrees` about a random axis.
+    """
+    axis, way = (direction / np.linalg.norm(direction) for direction in rng.standard_normal((2, 3)))
+    T = frame.T_base_cam.copy()
+    T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(np.radians(degrees) * axis).as_matrix()
+    T[:3, 3] += metres * way
+    return replace(sensor.apply(frame, rng), T_base_cam=T)
