@@ -24,11 +24,11 @@ from tqdm.auto import tqdm
 from data_gen.families import FAMILIES
 from data_gen.scenes import CONFIGS, sample_scene
 from labkit.frame import RGBDFrame
+from labkit.geometry.sensor import DepthSensor
 from labkit.labels import CLASSES
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
-from labkit.support.sensor import DepthSensor
 
 VERSION = 1
 DEPTH_UNIT_MM = 0.1  # one step of the 16-bit files: finer than any sensor, and 6.5 m still fit

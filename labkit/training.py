@@ -23,12 +23,12 @@ from tqdm.auto import tqdm
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base
+from labkit.geometry.augment import augment_frames
 from labkit.labels import CLASSES, IGNORE, SURFACE
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
 from labkit.support.augment import augment
-from labkit.support.augment_depth import augment_frames
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_labels, check_rgb
 

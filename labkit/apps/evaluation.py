@@ -12,6 +12,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from labkit.apps.trials import in_processes
+from labkit.geometry.sensor import perturbed
 from labkit.labels import CLASSES, TARGET
 from labkit.metrics import (
     boundary_counts,
@@ -23,7 +24,6 @@ from labkit.metrics import (
     wilson_interval,
 )
 from labkit.pipeline import Pipeline
-from labkit.support.sensor import perturbed
 
 BOUNDARY_WIDTH = 2  # pixels
 
@@ -51,7 +51,7 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
     spec: a SceneSpec. model: as in Pipeline, or the path of weights; None for true masks. crf: refine the model's
-    labels. perturb: depth as a sensor measures it and a camera pose that is off (labkit.support.sensor.perturbed), the
+    labels. perturb: depth as a sensor measures it and a camera pose that is off (labkit.geometry.sensor.perturbed), the
     same for every model. No reachable candidate is a failure, and so is lifting anything but a target. Only the score
     reads the simulator's truth. Raises ValueError for a CRF on true masks.
     """

@@ -20,12 +20,12 @@ from data_gen.families import FAMILIES
 from data_gen.scenes import CONFIGS
 from data_gen.statistics import statistics
 from data_gen.wide import WIDE
+from labkit.geometry.sensor import DepthSensor
 from labkit.labels import OBSTACLE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.shapes import object_mesh
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
-from labkit.support.sensor import DepthSensor
 
 SIZE = (80, 60)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labkit.frame import RGBDFrame
-from labkit.support.sensor import DepthSensor, perturbed
+from labkit.geometry.sensor import DepthSensor, perturbed
 
 
 def test_the_sensors_noise_grows_with_the_square_of_depth():

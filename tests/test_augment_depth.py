@@ -6,14 +6,14 @@ import torch
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import CHANNELS, back_project_to_base
-from labkit.sim.spec import Camera
-from labkit.support.augment_depth import (
+from labkit.geometry.augment import (
     augment_frames,
     random_calibration,
     random_sensor,
     random_size,
     random_view,
 )
+from labkit.sim.spec import Camera
 
 SIZE = (96, 128)
 K = np.array([[260.0, 0.0, 80.0], [0.0, 260.0, 59.0], [0.0, 0.0, 1.0]])

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import geometry_channels, mirrored
+from labkit.geometry.sensor import DepthSensor
 from labkit.labels import IGNORE, OBSTACLE, TARGET
 from labkit.support.augment import random_colour, random_noise, random_sharpness
-from labkit.support.sensor import DepthSensor
 
 
 def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generator) -> RGBDFrame:
