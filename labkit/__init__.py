@@ -2,7 +2,7 @@
 
     RGBDFrame -> class probabilities -> labels -> target cloud in the base frame -> grasp -> lift
 
-Each arrow is a module; `labkit.pipeline` puts them in a row. Labs need one name more: `from labkit import check`.
+Each arrow is a module; `labkit.pipeline` puts them in a row. Labs need more names: `from labkit import check`.
 """
 
 import sys
@@ -22,3 +22,10 @@ def check(name: str, answer: object) -> Callable:
     from labkit.course.checking import check
 
     return check(name, answer)
+
+
+def check_file(path: str) -> None:
+    """Check a saved lab as the grader will, and print the results (`labkit.course.checking_file`)."""
+    from labkit.course.checking_file import check_file
+
+    check_file(path)

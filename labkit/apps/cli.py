@@ -41,6 +41,14 @@ def doctor() -> None:
 
 
 @app.command()
+def check(lab: Annotated[Path, typer.Argument(help="A saved lab, your own notebook file.")]) -> None:
+    """Check a saved lab as the grader will, on public cases; exit status 1 if an answer is not right."""
+    from labkit.course.checking_file import check_file
+
+    raise typer.Exit(0 if check_file(lab) else 1)
+
+
+@app.command()
 def train(
     data: Annotated[list[Path], typer.Argument(help="Data sets to train on, as data_gen writes them.")] = (
         Path("data/train"),
