@@ -29,7 +29,7 @@ class NetworkInput:
     sizes are padded by repeating their border, and the logits are cropped. Raises ValueError for an argument that does
     not fit.
 
-    >>> NetworkInput(divisor=16).build(np.full((1, 1, 3), 51, np.uint8))[0].tolist()
+    >>> NetworkInput(divisor=16).build(np.full((1, 1, 3), 51, np.uint8))[0].astype(float).round(3).tolist()
     [[[0.2, 0.2, 0.2]]]
     """
 
