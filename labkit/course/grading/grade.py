@@ -29,15 +29,16 @@ LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should lo
 ONLY_HIDDEN = (
     "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
 )
+NAMES_THE_MISTAKE = ("misconception", "exception", "relation", "input", "slip")  # kinds of hints; others say where
 WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a question earned. says: what was right or wrong, from public cases; hint: of a misconception.
+    """What a question earned. says: what was right or wrong, and hint: why it may be so, from public cases.
 
-    flag: what the instructor should look at, "" if nothing. behaviour: the same for answers that give the same wrong
-    outputs, "" for a right one and for none. program: what was run.
+    flag: what the instructor should look at, "" if nothing. behaviour: of wrong answers whose hint does not name the
+    mistake, the same for those that give the same outputs. program: what was run.
     """
 
     question: str
@@ -122,7 +123,8 @@ class Grading:
         if problem.kind in ("unanswered", "missing"):
             return replace(base, says=problem.says, behaviour="")
         says = f"{problem.says} ({public.where})"
-        return replace(base, says=says, hint=public.hint or "", behaviour=behaviour_of(outputs))
+        named = public.sentence is not None and public.sentence.kind in NAMES_THE_MISTAKE
+        return replace(base, says=says, hint=public.hint or "", behaviour="" if named else behaviour_of(outputs))
 
 
 def not_gradable(lab: Lab, name: str, problem: str) -> Result:
@@ -168,8 +170,6 @@ class Run:
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
             return Verdict(problem, 0, "some case", None, ()), values
-        if judged.passed and changed:
-            judged = replace(judged, problem=Problem("altered", judged.notes[0]), case=0, where="some case")
         return judged, values
 
     def outputs(self, cases: Sequence[Case]) -> list[object]:

@@ -1,7 +1,7 @@
 """The class: of each question how many tried and passed, which mistakes how many made, and comments for all of them.
 
-Wrong answers are one group if they earned the same hint, and without a hint if they give the same outputs on the public
-cases: a class of a hundred makes few mistakes, so one comment per group answers many students.
+Wrong answers are one group if the same hint names their mistake, and otherwise if they give the same outputs on the
+public cases: a class of a hundred makes few mistakes, so one comment per group answers many students.
 """
 
 import hashlib
@@ -45,7 +45,7 @@ class Standing:
 
 def group_of(result: Result) -> str:
     """The name of the group that a result belongs to, "" for a right answer and for none: iou-3f09c2."""
-    key = result.hint or result.behaviour
+    key = result.behaviour or result.hint
     return f"{result.question}-{hashlib.sha256(key.encode()).hexdigest()[:6]}" if key and not result.points else ""
 
 
@@ -61,7 +61,7 @@ def standings(lab: Lab, records: Sequence[Record]) -> list[Standing]:
             if group := group_of(result):
                 members.setdefault(group, []).append((student, result))
         groups = [
-            Group(group, name, bool(first.hint), first.hint or first.says, first.program, tuple(s for s, _ in same))
+            Group(group, name, not first.behaviour, first.hint or first.says, first.program, tuple(s for s, _ in same))
             for group, same in members.items()
             for first in [same[0][1]]
         ]

@@ -15,10 +15,8 @@ from labkit.course.questions.question import of_topic
 TOPIC = "04_iou"
 IOU = of_topic(TOPIC)["iou"]
 # Two ways to write one mistake that has no hint, and another mistake.
-ODD = "def iou(n):\n    return np.diagonal(n) * 3.75 + len(n)\n"
-ODD_TOO = (
-    "def iou(counts):\n    d = [counts[i, i] for i in range(len(counts))]\n    return np.array(d) * 3.75 + len(d)\n"
-)
+ODD = "def iou(n):\n    return np.sin(1e3 * np.diagonal(n) + n.sum(axis=1) ** 2) ** 2\n"
+ODD_TOO = "def iou(c):\n    return np.array([np.sin(1e3 * c[i, i] + c[i].sum() ** 2) ** 2 for i in range(len(c))])\n"
 OTHER = "def iou(n):\n    return '</pre><script>alert(1)</script>'\n"
 CLASS = {
     "ada": {},
@@ -64,7 +62,7 @@ def test_wrong_answers_are_grouped_by_hint_and_else_by_what_they_give(course):
 
 def test_the_page_shows_students_and_one_sample_of_each_group_and_nothing_else_of_it_runs(course):
     page = (course / "grades" / TOPIC / "class.html").read_text()
-    assert "dan, eve" in page and "* 3.75 + len(n)" in page and "len(d)" not in page
+    assert "dan, eve" in page and "1e3 * np.diagonal(n)" in page and "c[i, i]" not in page
     assert "<script>" not in page and "&lt;script&gt;" in page
 
 
