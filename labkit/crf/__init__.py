@@ -1,9 +1,11 @@
-"""CRF inference on pixel grids, with a certificate (section 2 of the text). Read the modules in this order:
+"""CRF inference on pixel grids, with a certificate (topic 02). Read the modules in this order:
 
-energy       the Potts energy of the text, and what a solver returns
+energy       the Potts energy, and what a solver returns
+integers     the same energy in integers, so that bounds are proofs
 exact        enumeration: Z, marginals and MAP of tiny grids; no pairwise term; two classes by a minimum cut
-cuts         many classes by a sequence of cuts: expansion and swap moves
 messages     TRW-S, which proves a lower bound, and ICM
+cuts         many classes by a sequence of cuts: expansion and swap moves
+persistency  labels that are provably best, so that little is left to solve
 mean_field   the closest distribution of independent pixels
 dense        a CRF in which all pixels are neighbours
 solvers      one entrance to all of them, and the refinement of a network's probabilities

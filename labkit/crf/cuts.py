@@ -6,100 +6,152 @@ between these (swap). When no move helps any more, the energy is within twice th
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from itertools import combinations, cycle
 
 import numpy as np
-from jaxtyping import Integer
+from jaxtyping import Bool, Integer
 
 from labkit.crf.energy import MapResult, PottsCRF
-from labkit.crf.exact import grid_steps
-from labkit.crf.integers import quantise
-from labkit.crf.messages import trws
+from labkit.crf.exact import NEAR
+from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
+from labkit.crf.messages import _trws
 
 START_SWEEPS = 4
 
 
 def expansion(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> MapResult:
-    """Minimise by expansion moves, from `labels` if they are given, until no class can expand.
+    """Minimise by expansion moves, from `labels` if they are given, until no class can expand (topic 02).
 
     Without them it starts from what a few sweeps of TRW-S find: that takes less time than the moves that it saves, and
-    ends lower than a start from the unary solution. iterations counts the moves tried. Section 2 of the text.
+    ends lower than a start from the unary solution. iterations counts the moves tried.
 
     >>> psi = np.array([[[0.0, 2.0, 2.0], [1.0, 2.0, 0.8], [0.0, 2.0, 2.0]]])
     >>> expansion(PottsCRF(psi, np.array([[[0.5, 0.5, 0.0]], [[0.0, 0.0, 0.0]]]))).labels
     array([[0, 0, 0]], dtype=uint8)
     """
-    moves = MoveGraph(crf, trws(crf, START_SWEEPS).labels if labels is None else labels)
-    return try_in_turn(crf, moves, [partial(moves.expand, alpha) for alpha in range(crf.shape[2])])
+    if labels is not None:
+        labels = crf.check_labelling("labels", labels)
+    integer = quantise(crf)
+    return _expansion(crf, integer, _trws(crf, integer, START_SWEEPS, 0.0).labels if labels is None else labels)
+
+
+def _expansion(crf: PottsCRF, integer: IntegerPotts, labels: Integer[np.ndarray, "H W"]) -> MapResult:
+    moves = Moves(integer, labels)
+    tried = moves.expand_all()
+    return moves.result(crf, tried)
+
+
+def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4) -> MapResult:
+    """Let TRW-S find the bound and a start, and expansion moves the rest of the way down.
+
+    TRW-S stops after `iterations`, or once its own gap is below `tolerance`; the moves then shrink it further.
+    """
+    integer = quantise(crf)
+    start = _trws(crf, integer, iterations, tolerance)
+    finish = _expansion(crf, integer, start.labels)
+    best = min(start, finish, key=lambda result: result.energy)
+    return replace(best, lower_bound=start.lower_bound, iterations=start.iterations + finish.iterations)
 
 
 def swap(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> MapResult:
     """Minimise by swap moves, from the unary solution or from `labels`, until no two classes can improve by swapping.
 
-    iterations counts the moves tried. Section 2 of the text.
+    iterations counts the moves tried (topic 02).
     """
-    moves = MoveGraph(crf, labels)
-    return try_in_turn(crf, moves, [partial(moves.swap, *pair) for pair in combinations(range(crf.shape[2]), 2)])
+    labels = crf.unary.argmin(axis=2) if labels is None else crf.check_labelling("labels", labels)
+    moves = Moves(quantise(crf), labels)
+    tried = try_in_turn([partial(moves.swap, *pair) for pair in combinations(range(crf.shape[2]), 2)])
+    return moves.result(crf, tried)
 
 
-def try_in_turn(crf: PottsCRF, graph: "MoveGraph", moves: list[Callable[[], bool]]) -> MapResult:
-    """Make the moves in turn until a whole round of them changes nothing; each change lowers the integer energy."""
+def try_in_turn(moves: list[Callable[[], bool]]) -> int:
+    """Make the moves in turn until a whole round of them changes nothing; return how many were tried.
+
+    Each change lowers the integer energy, so that this ends.
+    """
     tried = unchanged = 0
     for move in cycle(moves):
         unchanged = 0 if move() else unchanged + 1
         tried += 1
         if unchanged == len(moves):
             break
-    labels = graph.labels[1:-1, 1:-1].copy()
-    return MapResult(labels, crf.energy(labels), iterations=tried)
+    return tried
 
 
-class MoveGraph:
+class Moves:
     """A labelling that moves improve, and the arrays of the graph, which are filled anew for each move.
 
-    All images have a ring of one pixel around them; see `maxflow_kernels`.
+    labels: (N,), flat with a ring as in `integers`. free: whether a pixel's label may change. nodes: the free pixels.
     """
 
-    def __init__(self, crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None):
+    def __init__(self, integer: IntegerPotts, labels: Integer[np.ndarray, "H W"]):
+        from labkit.crf.maxflow_kernels import Graph, new_forest
         from labkit.crf.move_kernels import RING
 
-        H, W, C = crf.shape
-        integer = quantise(crf)
-        self.step = grid_steps(crf.offsets, W)
-        ring = ((1, 1), (1, 1), (0, 0))
-        self.unary = np.pad(integer.unary, ring).reshape(-1, C)
-        self.weights = np.pad(integer.weights.transpose(1, 2, 0), ring).reshape(len(self.unary), -1)
-        self.labels = np.full((H + 2, W + 2), RING, np.uint8)
-        self.labels[1:-1, 1:-1] = crf.unary.argmin(axis=2) if labels is None else crf.check_labelling("labels", labels)
-        self.capacity = np.empty((len(self.unary), len(self.step)), self.weights.dtype)
-        self.excess = np.empty(len(self.unary), self.unary.dtype)
+        N, dtype = len(integer.unary), integer.unary.dtype
+        self.integer = integer
+        self.labels, self.free = np.full(N, RING, np.uint8), np.zeros(N, bool)
+        inside(self.labels, integer.size)[:] = labels
+        self.nodes = pixel_numbers(integer.size)
+        self.free[self.nodes] = True
+        self.graph = Graph(np.zeros((N, len(integer.step)), dtype), np.zeros(N, dtype), integer.step)
+        self.trees = new_forest(N)
+
+    def result(self, crf: PottsCRF, tried: int) -> MapResult:
+        """Return the labels as an image, with their energy."""
+        labels = inside(self.labels, self.integer.size).copy()
+        return MapResult(labels, crf._energy(labels), iterations=tried)
+
+    def leave_free(self, stays: Bool[np.ndarray, "n"]) -> None:
+        """Let only those of the free pixels take part in further moves for which `stays` is true."""
+        self.trees[0].tree[self.nodes] = 0
+        self.free[self.nodes[~stays]] = False
+        self.nodes = self.nodes[stays]
+
+    def integer_energy(self) -> int:
+        """Return the integer energy of the labels."""
+        from labkit.crf.move_kernels import energy_of
+
+        integer = self.integer
+        return energy_of(integer.unary, integer.weights, integer.step, self.labels, pixel_numbers(integer.size))
+
+    def expand_all(self) -> int:
+        """Let each class expand in turn until none can; return how many moves were tried."""
+        return try_in_turn([partial(self.expand, alpha) for alpha in range(self.integer.unary.shape[1])])
 
     def expand(self, alpha: int) -> bool:
-        """Let every pixel keep its label or take alpha, as is best; return whether any took it.
+        """Let every free pixel keep its label or take alpha, as is best; return whether any took it.
 
         The cut with the fewest changes is taken, so that any change at all lowers the energy.
         """
-        from labkit.crf.maxflow_kernels import SINK, max_flow
-        from labkit.crf.move_kernels import expansion_move
+        from labkit.crf.move_kernels import SINK, expansion_move
 
-        expansion_move(self.unary, self.weights, self.labels.ravel(), self.step, alpha, self.capacity, self.excess)
-        _, tree = max_flow(self.capacity, self.excess, self.step)
-        takes = tree.reshape(self.labels.shape) == SINK
+        _, _, tree = self.cut(expansion_move, alpha)
+        takes = self.nodes[tree == SINK]
         self.labels[takes] = alpha
-        return bool(takes.any())
+        return len(takes) > 0
 
     def swap(self, alpha: int, beta: int) -> bool:
         """Label the pixels of alpha and beta anew with these two, as is best; return whether the energy fell."""
-        from labkit.crf.maxflow_kernels import SINK, max_flow
-        from labkit.crf.move_kernels import swap_move
+        from labkit.crf.move_kernels import SINK, swap_move
 
-        before = swap_move(
-            self.unary, self.weights, self.labels.ravel(), self.step, alpha, beta, self.capacity, self.excess
-        )
-        flow, tree = max_flow(self.capacity, self.excess, self.step)
-        if flow == before:
+        present, flow, tree = self.cut(swap_move, alpha, beta)
+        if flow == present:
             return False
-        takes_part = (self.labels == alpha) | (self.labels == beta)
-        self.labels[takes_part] = np.where(tree.reshape(self.labels.shape)[takes_part] == SINK, beta, alpha)
+        before = self.labels[self.nodes]
+        part = (before == alpha) | (before == beta)
+        self.labels[self.nodes[part]] = np.where(tree[part] == SINK, beta, alpha)
         return True
+
+    def cut(self, question: Callable, *classes: int, near: int = NEAR):
+        """Put a question of `move_kernels` to the free pixels: what it returns, the flow, and each pixel's tree."""
+        from labkit.crf.maxflow_kernels import max_flow
+
+        integer = self.integer
+        answer = question(
+            integer.unary, integer.weights, integer.step, self.labels, self.free, self.nodes, *classes, self.graph
+        )
+        flow = max_flow(self.graph, *self.trees, self.nodes, near)
+        return answer, flow, self.trees[0].tree[self.nodes]

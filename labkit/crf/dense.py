@@ -3,14 +3,14 @@
     w_pq = w_appearance exp(-|p - q|^2 / (2 theta_alpha^2) - |I_p - I_q|^2 / (2 theta_beta^2))
          + w_smoothness exp(-|p - q|^2 / (2 theta_gamma^2))
 
-Section 2's model with all pairs as neighbours. N^2 pairs are too many for a cut, but in mean field the message to a
-pixel is a weighted mean of all q's, which is one Gaussian filter in the space of positions and colours.
+The Potts model of topic 02 with all pairs as neighbours. N^2 pairs are too many for a cut, but in mean field the
+message to a pixel is a weighted mean of all q's, which is one Gaussian filter in the space of positions and colours.
 """
 
 import numpy as np
 from jaxtyping import Float, Num
 
-from labkit.crf.energy import as_channels
+from labkit.crf.energy import check_channels
 from labkit.support.validation import check_finite, check_shape
 
 
@@ -49,7 +49,7 @@ def dense_crf(
     if iterations < 0:
         raise ValueError(f"iterations: expected at least 0, got {iterations}")
     H, W, C = unary.shape
-    colours = as_channels("image", check_finite("image", image), unary).astype(np.float32)
+    colours = check_channels("image", check_finite("image", image), unary).astype(np.float32)
     v, u = np.indices((H, W), np.float32)
     appearance = np.dstack([u / theta_alpha, v / theta_alpha, colours / theta_beta])
     smoothness = np.dstack([u / theta_gamma, v / theta_gamma])

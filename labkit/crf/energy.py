@@ -1,4 +1,4 @@
-"""The energy: a Potts model over the pixel grid, whose lowest labelling is the answer (section 2 of the text).
+"""The energy: a Potts model over the pixel grid, whose lowest labelling is the answer (topic 02).
 
     E(y) = sum over pixels p of psi_p(y_p)  +  sum over neighbours {p, q} of w_pq [y_p != y_q]
     w_pq = lam exp(-|I_p - I_q|^2 / (2 sigma_I^2) - |p - q|^2 / (2 sigma_p^2))
@@ -21,12 +21,11 @@ MAX_CLASSES = 255
 
 @dataclass(frozen=True, eq=False)
 class PottsCRF:
-    """A Potts model: what each class costs at each pixel, and what it costs neighbours to disagree.
+    """A Potts model: what each class costs at each pixel, and what it costs neighbours to disagree (topic 02).
 
     unary: psi, (H, W, C), any unit; +inf forbids a class at a pixel. weights: w >= 0, (D, H, W) with D = 2 for 4
     neighbours and D = 4 for 8; weights[d, v, u] belongs to the pair of pixel (v, u) and the one OFFSETS[...][d] from
     it, and is 0 where that one is outside the image. Raises ValueError naming the argument that does not fit.
-    Section 2 of the text.
 
     >>> crf = PottsCRF(np.array([[[0.0, 1.0], [1.0, 0.0]]]), np.array([[[0.5, 0.0]], [[0.0, 0.0]]]))
     >>> crf.energy(np.array([[0, 1]])), crf.energy(np.array([[0, 0]]))
@@ -37,30 +36,23 @@ class PottsCRF:
     weights: Float[np.ndarray, "D H W"]
 
     def __post_init__(self):
-        unary = check_shape("unary", self.unary, (None, None, None))
-        if unary.dtype.kind not in "fiu":
-            raise ValueError(f"unary: expected real costs, got dtype {unary.dtype}")
-        if 0 in unary.shape or not 2 <= unary.shape[2] <= MAX_CLASSES:
-            raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
-        unary = unary.astype(np.float64, copy=False)
-        if np.isnan(unary).any() or np.isneginf(unary).any():
-            raise ValueError("unary: expected costs that are finite or +inf (forbidden), got NaN or -inf")
-        if np.isinf(unary.min(axis=2)).any():
-            raise ValueError("unary: expected at least one allowed class a pixel, got a pixel with only +inf")
+        unary = check_unary(self.unary)
         weights = check_finite("weights", check_shape("weights", self.weights, (None, *unary.shape[:2])))
         if len(weights) not in (2, 4):
-            raise ValueError(f"weights: expected 2 or 4 pairs a pixel (4 or 8 neighbours), got {len(weights)}")
+            raise ValueError(f"weights: expected 2 or 4 pairs per pixel (4 or 8 neighbours), got {len(weights)}")
         if weights.min() < 0.0:
             raise ValueError(
                 f"weights: expected costs >= 0, got {weights.min():.6g}; a negative one rewards disagreement, "
                 "which is not submodular, so that no cut can represent it"
             )
-        weights = weights.astype(np.float64, copy=False)
         for d, offset in enumerate(OFFSETS[2 * len(weights)]):
             outside = np.ones(unary.shape[:2], bool)
             outside[pair_slices(offset)[0]] = False
             if weights[d][outside].any():
                 raise ValueError(f"weights: expected 0 where a pair leaves the image, got others in weights[{d}]")
+        self._put(unary, weights.astype(np.float64, copy=False))
+
+    def _put(self, unary: Float[np.ndarray, "H W C"], weights: Float[np.ndarray, "D H W"]) -> None:
         object.__setattr__(self, "unary", unary)
         object.__setattr__(self, "weights", weights)
 
@@ -90,12 +82,12 @@ class PottsCRF:
         connectivity: int = 4,
         extra: tuple = (),
     ) -> "PottsCRF":
-        """Build the contrast-sensitive Potts model of section 2 over an image.
+        """Build the contrast-sensitive Potts model over an image (topic 02).
 
         image: (H, W) or (H, W, channels), any real dtype; sigma_I is in its own units (0 to 255 for uint8). lam >= 0,
         sigma_p in pixels (with 4 neighbours it only rescales lam, all pairs being one pixel apart). extra: pairs
         (channels, sigma) such as a depth image and its scale in metres; each adds its own -|d|^2 / (2 sigma^2) to the
-        exponent, and NaN there (no reading) adds nothing. Raises ValueError.
+        exponent, and NaN there (no reading) adds nothing. Raises ValueError naming the argument that does not fit.
 
         >>> unary, image = np.zeros((2, 3, 2)), np.zeros((2, 3, 3), np.uint8)
         >>> crf = PottsCRF.from_image(unary, image, lam=2.0, sigma_I=10.0, sigma_p=1.0)
@@ -109,18 +101,12 @@ class PottsCRF:
             raise ValueError(f"lam: expected a weight >= 0, got {lam}")
         if connectivity not in OFFSETS:
             raise ValueError(f"connectivity: expected 4 or 8 neighbours, got {connectivity}")
-        unary = check_shape("unary", unary, (None, None, None))
-        features = [(as_channels("image", check_finite("image", image), unary) / sigma_I)]
-        features += [as_channels("extra", channels, unary) / sigma for channels, sigma in extra]
-        weights = np.zeros((connectivity // 2, *unary.shape[:2]))
-        for d, offset in enumerate(OFFSETS[connectivity]):
-            p, q = pair_slices(offset)
-            exponent = np.full(weights[d][p].shape, -sum(step**2 for step in offset) / (2.0 * sigma_p**2))
-            for feature in features:
-                difference = np.nan_to_num(feature[p] - feature[q], posinf=np.inf, neginf=-np.inf)
-                exponent -= 0.5 * np.einsum("ijk,ijk->ij", difference, difference)
-            weights[d][p] = lam * np.exp(exponent)
-        return cls(unary, weights)
+        unary = check_unary(unary)
+        image = check_channels("image", check_finite("image", image), unary)
+        scaled = [check_channels("extra", channels, unary).astype(np.float64) / sigma for channels, sigma in extra]
+        model = object.__new__(cls)  # what is built here needs no second check
+        model._put(unary, contrast_weights(image, scaled, lam, sigma_I, sigma_p, connectivity))
+        return model
 
     def check_labelling(self, name: str, y: Integer[np.ndarray, "H W"]) -> Integer[np.ndarray, "H W"]:
         """Return `y` if it labels every pixel of this model; raise a ValueError that calls it `name` if not."""
@@ -131,12 +117,12 @@ class PottsCRF:
 
         Raises ValueError if y has another size than the image or a label outside 0 .. C - 1.
         """
-        y = self.check_labelling("y", y)
-        total = np.take_along_axis(self.unary, y[..., None].astype(np.intp), axis=2).sum()
-        for w, offset in zip(self.weights, self.offsets, strict=True):
-            p, q = pair_slices(offset)
-            total += w[p][y[p] != y[q]].sum()
-        return float(total)
+        return self._energy(self.check_labelling("y", y))
+
+    def _energy(self, y: Integer[np.ndarray, "H W"]) -> float:
+        from labkit.crf.energy_kernels import energy_by_row
+
+        return float(energy_by_row(self.unary, self.weights, np.array(self.offsets), y).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +149,9 @@ class MapResult:
 def unary_from_probabilities(
     probabilities: Float[np.ndarray, "H W C"], floor: float = 1e-6
 ) -> Float[np.ndarray, "H W C"]:
-    """Turn class probabilities into costs, -log p, with p clipped at `floor` so that no class is ruled out.
+    """Turn class probabilities into costs, -log p, with p clipped at `floor` so that no class is ruled out (topic 02).
 
-    Raises ValueError unless each pixel's probabilities lie in 0..1 and sum to 1 (within 1e-3). Section 2 of the text.
+    Raises ValueError unless each pixel's probabilities lie in 0..1 and sum to 1 (within 1e-3).
 
     >>> unary_from_probabilities(np.array([[[1.0, 0.0]]]), floor=1e-2).round(3) + 0.0
     array([[[0.   , 4.605]]])
@@ -173,12 +159,53 @@ def unary_from_probabilities(
     p = check_finite("probabilities", check_shape("probabilities", probabilities, (None, None, None)))
     if not 0.0 < floor < 1.0:
         raise ValueError(f"floor: expected a probability between 0 and 1, got {floor}")
-    if p.size and (p.min() < 0.0 or p.max() > 1.0 + 1e-3 or np.abs(p.sum(axis=2, dtype=np.float64) - 1.0).max() > 1e-3):
+    sums = np.einsum("vuc->vu", p) if p.size else np.ones(1)
+    if p.size and (p.min() < 0.0 or p.max() > 1.0 + 1e-3 or np.abs(sums - 1.0).max() > 1e-3):
         raise ValueError(
             f"probabilities: expected 0..1 summing to 1 at each pixel, got {p.min():.4g} to {p.max():.4g} "
-            f"with sums from {p.sum(axis=2).min():.4g}; are they logits?"
+            f"with sums from {sums.min():.4g}; are they logits?"
         )
-    return -np.log(np.clip(p.astype(np.float64, copy=False), floor, 1.0))
+    psi = np.clip(p, floor, 1.0, dtype=np.float64)
+    return np.negative(np.log(psi, out=psi), out=psi)
+
+
+def check_unary(unary: Num[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
+    """Return a unary term as float64; raise a ValueError unless each pixel has at least one class of finite cost."""
+    unary = check_shape("unary", unary, (None, None, None))
+    if unary.dtype.kind not in "fiu":
+        raise ValueError(f"unary: expected real costs, got dtype {unary.dtype}")
+    if 0 in unary.shape or not 2 <= unary.shape[2] <= MAX_CLASSES:
+        raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
+    if not unary.min() > -np.inf:  # NaN is not, either
+        raise ValueError("unary: expected costs that are finite or +inf (forbidden), got NaN or -inf")
+    if unary.max() == np.inf and np.isinf(unary.min(axis=2)).any():
+        raise ValueError("unary: expected at least one allowed class per pixel, got a pixel with only +inf")
+    return unary.astype(np.float64, copy=False)
+
+
+def check_channels(name: str, image: Num[np.ndarray, "H W *channels"], unary: np.ndarray) -> Num[np.ndarray, "H W k"]:
+    """Return an image or a single channel as (H, W, k); raise a ValueError unless it has the unary term's size."""
+    image = np.asarray(image)
+    if image.ndim not in (2, 3) or image.dtype.kind not in "fiub":
+        raise ValueError(f"{name}: expected real numbers (H, W) or (H, W, k), got {image.dtype} {image.shape}")
+    check_same_size("unary", unary, name, image)
+    return image.reshape(*image.shape[:2], -1)
+
+
+def contrast_weights(
+    image: Num[np.ndarray, "H W k"], scaled: list, lam: float, sigma_I: float, sigma_p: float, connectivity: int
+) -> Float[np.ndarray, "D H W"]:
+    """Return w of the module's formula for all pairs; `scaled` holds further channels, each divided by its sigma."""
+    from labkit.crf.energy_kernels import pair_exponents
+
+    H, W = image.shape[:2]
+    image = image if image.dtype == np.uint8 else image.astype(np.float64, copy=False)
+    extra = np.concatenate(scaled, axis=2) if scaled else np.empty((H, W, 0))
+    offsets = np.array(OFFSETS[connectivity])
+    weights = np.empty((len(offsets), H, W))
+    pair_exponents(image, 1.0 / sigma_I, extra, offsets, -0.5 * (offsets**2).sum(axis=1) / sigma_p**2, weights)
+    np.exp(weights, out=weights)
+    return np.multiply(weights, lam, out=weights)
 
 
 def pair_slices(offset: tuple[int, int]) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
@@ -190,12 +217,3 @@ def pair_slices(offset: tuple[int, int]) -> tuple[tuple[slice, slice], tuple[sli
     """
     ahead = {-1: slice(None, -1), 0: slice(None), 1: slice(1, None)}
     return tuple(ahead[-step] for step in offset), tuple(ahead[step] for step in offset)
-
-
-def as_channels(name: str, image: Num[np.ndarray, "H W *channels"], unary: np.ndarray) -> Float[np.ndarray, "H W k"]:
-    """Return an image or a single channel as float64 (H, W, k), of the unary term's size."""
-    image = np.asarray(image)
-    if image.ndim not in (2, 3) or image.dtype.kind not in "fiub":
-        raise ValueError(f"{name}: expected real numbers (H, W) or (H, W, k), got {image.dtype} {image.shape}")
-    check_same_size("unary", unary, name, image)
-    return image.reshape(*image.shape[:2], -1).astype(np.float64)

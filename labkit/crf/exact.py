@@ -1,6 +1,6 @@
 """What can be solved exactly: tiny grids by enumeration, no pairwise term, and two classes by a minimum cut.
 
-Section 2 and problem 3 of the text. These are the oracles that the approximate solvers are tested against.
+These are the oracles that the approximate solvers are tested against.
 """
 
 from collections.abc import Iterator
@@ -9,16 +9,18 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
-from labkit.crf.integers import quantise
+from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
 
 MAX_LABELLINGS = 2**22
 CHUNK = 2**14
+# How far flow is pushed on without search trees, in pixels: what takes the least time (`push_nearby`).
+NEAR = 4
 
 
 def log_partition(crf: PottsCRF) -> float:
-    """Return log Z, with Z the sum of exp(-E(y)) over all C^(H W) labellings: tiny grids only.
+    """Return log Z, with Z the sum of exp(-E(y)) over all C^(H W) labellings: tiny grids only (topic 02).
 
-    Raises ValueError beyond 2^22 labellings. Section 2 of the text.
+    Raises ValueError beyond 2^22 labellings.
 
     >>> crf = PottsCRF(np.zeros((1, 2, 2)), np.zeros((2, 1, 2)))  # four labellings of energy 0
     >>> round(log_partition(crf) / float(np.log(4.0)), 6)
@@ -26,14 +28,14 @@ def log_partition(crf: PottsCRF) -> float:
     """
     log_Z = -np.inf
     for _, energies in enumerate_labellings(crf):
-        log_Z = np.logaddexp(log_Z, log_sum_exp(-energies))
+        log_Z = np.logaddexp(log_Z, np.logaddexp.reduce(-energies))
     return float(log_Z)
 
 
 def marginals(crf: PottsCRF) -> Float[np.ndarray, "H W C"]:
-    """Return the probability of each class at each pixel under exp(-E(y)) / Z, by enumeration: tiny grids only.
+    """Return the probability of each class at each pixel under exp(-E(y)) / Z: tiny grids only (topic 02).
 
-    Raises ValueError beyond 2^22 labellings. Section 2 of the text.
+    Raises ValueError beyond 2^22 labellings.
     """
     log_Z = log_partition(crf)
     p = np.zeros(crf.shape)
@@ -55,7 +57,7 @@ def brute_force(crf: PottsCRF) -> MapResult:
 
 
 def unary(crf: PottsCRF) -> MapResult:
-    """Return each pixel's cheapest class: exact if the pairwise terms vanish (problem 3), else where solvers start.
+    """Return each pixel's cheapest class: exact if the pairwise terms vanish (topic 02), else where solvers start.
 
     The bound ignores the pairwise terms, which are never negative.
     """
@@ -68,15 +70,14 @@ def unary(crf: PottsCRF) -> MapResult:
 
 
 def min_cut(crf: PottsCRF) -> MapResult:
-    """Return the labelling of least energy for two classes: the cheapest cut between a source and a sink.
+    """Return the labelling of least energy for two classes: the cheapest cut between a source and a sink (topic 02).
 
     A pixel on the source's side gets class 0, so the arc to the sink costs psi(0) and the arc from the source psi(1):
     the one is cut that the label pays. Neighbours on different sides cut the arc between them, which costs w. Then
-    the cut's cost is the energy, and the maximum flow equals the minimum cut. It takes a submodular pairwise term,
-    theta(0,0) + theta(1,1) <= theta(0,1) + theta(1,0): otherwise that arc's capacity would be negative.
+    the cut's cost is the energy, and the maximum flow equals the minimum cut.
 
-    Exact up to the rounding of `quantise`, about 1e-7 of the largest weight a pixel; the bound accounts for it.
-    Raises ValueError for more than two classes. Section 2 of the text.
+    Exact up to the rounding of `quantise`, about 1e-7 of the largest weight per pixel; the bound accounts for it.
+    Raises ValueError for more than two classes.
 
     >>> psi = np.array([[[0.0, 2.0], [1.0, 0.8], [0.0, 2.0]]])  # the pixel in the middle is noise
     >>> w = np.array([[[0.5, 0.5, 0.0]], [[0.0, 0.0, 0.0]]])
@@ -85,26 +86,11 @@ def min_cut(crf: PottsCRF) -> MapResult:
     """
     if crf.shape[2] != 2:
         raise ValueError(f"crf: expected two classes for a minimum cut, got {crf.shape[2]}; use expansion or trws")
-    w = crf.weights.min()
-    if not is_submodular(np.array([[0.0, w], [w, 0.0]])):
-        raise ValueError("weights: expected a submodular pairwise term; one with w < 0 has no cut")
     integer = quantise(crf)
-    source_to_pixel, pixel_to_sink = integer.unary[..., 1], integer.unary[..., 0]
-    # What flows straight through a pixel needs no search: only the difference of its two arcs matters.
-    straight = np.minimum(source_to_pixel, pixel_to_sink).sum(dtype=np.int64)
-    flow, source_side = grid_max_flow(source_to_pixel - pixel_to_sink, integer.weights, crf.offsets)
-    labels = np.where(source_side, 0, 1).astype(np.uint8)
-    energy = crf.energy(labels)
-    return MapResult(labels, energy, integer.lower_bound(int(straight) + flow, energy), iterations=1)
-
-
-def is_submodular(theta: Float[np.ndarray, "2 2"]) -> bool:
-    """Say whether a pairwise term of two binary labels fits into a cut: agreeing must not cost more than disagreeing.
-
-    >>> is_submodular(np.array([[0.0, 1.0], [1.0, 0.0]])), is_submodular(np.array([[1.0, 0.0], [0.0, 1.0]]))
-    (True, False)
-    """
-    return bool(theta[0, 0] + theta[1, 1] <= theta[0, 1] + theta[1, 0])
+    # Each pixel's cheaper class costs 0, so that only one of its arcs to the terminals has a capacity.
+    flow, labels = cut_grid(integer.unary[:, 1] - integer.unary[:, 0], integer.weights, integer.step, integer.size)
+    energy = crf._energy(labels)
+    return MapResult(labels, energy, integer.lower_bound(flow, energy), iterations=1)
 
 
 def grid_max_flow(
@@ -115,32 +101,24 @@ def grid_max_flow(
     excess: capacity from the source where positive, to the sink where negative. weights: capacity of the arcs, both
     ways, between a pixel and the one `offsets[d]` from it.
     """
-    from labkit.crf.maxflow_kernels import SINK, max_flow
-
     H, W = excess.shape
-    steps = grid_steps(offsets, W)
-    capacity = np.zeros((H + 2, W + 2, len(steps)), excess.dtype)
-    padded_excess = np.zeros((H + 2, W + 2), excess.dtype)
-    padded_excess[1:-1, 1:-1] = excess
-    inner = capacity[1:-1, 1:-1]
-    for d, offset in enumerate(offsets):
-        p, q = pair_slices(offset)
-        inner[..., d] = weights[d]
-        inner[..., len(steps) - 1 - d][q] = weights[d][p]
-    flow, tree = max_flow(capacity.reshape(-1, len(steps)), padded_excess.ravel(), steps)
-    return int(flow), (tree.reshape(H + 2, W + 2)[1:-1, 1:-1] != SINK).astype(np.uint8)
+    ring = ((1, 1), (1, 1), (0, 0))
+    padded = np.pad(np.moveaxis(weights, 0, 2), ring).reshape(-1, len(weights))
+    excess = np.pad(excess, 1).ravel()
+    flow, sink_side = cut_grid(excess, padded.astype(excess.dtype), grid_steps(offsets, W), (H, W))
+    return flow, 1 - sink_side
 
 
-def grid_steps(offsets: tuple[tuple[int, int], ...], W: int) -> Int[np.ndarray, "K"]:
-    """Return what to add to a pixel's index for each of its arcs, in an image W wide with a ring of one pixel around.
+def cut_grid(
+    excess: Int[np.ndarray, "N"], weights: Int[np.ndarray, "N D"], step: Int[np.ndarray, "K"], size: tuple[int, int]
+) -> tuple[int, UInt8[np.ndarray, "H W"]]:
+    """Return the maximum flow through a flat grid with a ring (`integers`), and 1 on the sink's side of a cut."""
+    from labkit.crf.maxflow_kernels import SINK, Graph, both_ways, max_flow, new_forest
 
-    Arcs come in the order of `offsets` and then back through their reverses, so that arc k returns as arc K - 1 - k.
-
-    >>> grid_steps(((0, 1), (1, 0)), W=3)
-    array([ 1,  5, -5, -1], dtype=int32)
-    """
-    forward = [down * (W + 2) + right for down, right in offsets]
-    return np.array(forward + [-step for step in reversed(forward)], np.int32)
+    nodes = pixel_numbers(size)
+    trees = new_forest(len(excess))
+    flow = max_flow(Graph(both_ways(weights, step), excess, step), *trees, nodes, NEAR)
+    return int(flow), (inside(trees[0].tree, size) == SINK).astype(np.uint8)
 
 
 def enumerate_labellings(crf: PottsCRF) -> Iterator[tuple[UInt8[np.ndarray, "n H W"], Float[np.ndarray, "n"]]]:
@@ -159,13 +137,3 @@ def enumerate_labellings(crf: PottsCRF) -> Iterator[tuple[UInt8[np.ndarray, "n H
             p, q = pair_slices(offset)
             energies += ((y[:, *p] != y[:, *q]) * w[p]).sum(axis=(1, 2))
         yield y, energies
-
-
-def log_sum_exp(x: Float[np.ndarray, "n"]) -> float:
-    """Return log(sum(exp(x))) without overflow; -inf entries add nothing.
-
-    >>> round(log_sum_exp(np.array([1000.0, 1000.0])) - 1000.0, 6)
-    0.693147
-    """
-    top = x.max()
-    return float(top + np.log(np.exp(x - top).sum())) if np.isfinite(top) else float(top)

@@ -2,34 +2,40 @@
 
 Every cost is multiplied by one scale and rounded *down*. So the integer energy of a labelling never exceeds `scale`
 times its real one, and whatever is proven from below about the first holds for the second.
+
+All arrays have a ring of one pixel without costs around the image, so that no loop asks where the border is, and are
+flat: pixel (v, u) is number n = (v + 1) (W + 2) + u + 1, and its k-th neighbour is number n + step[k].
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
-from labkit.crf.energy import PottsCRF, pair_slices
+from labkit.crf.energy import PottsCRF
 
 # A pixel's costs and messages together stay below 16 times the largest weight: 2^26 keeps that within 31 bits, and
 # 2^36 keeps the sum over 8 million pixels within 63.
 WEIGHT_BITS = {np.int32: 26, np.int64: 36}
 # The mean unary cost is worth at least 2^12 integer steps, or else the integers are made wider.
 ENOUGH_BITS = 12
-# Rounding errors of float64 sums relative to their terms: 2^-53 for each of some 50 additions in a row, with room.
-ROUNDING = 2.0**-44
+# Rounding errors of float64 sums relative to their terms: 2^-53 for each of the additions in a row, here up to 2^13.
+ROUNDING = 2.0**-40
 
 
 @dataclass(frozen=True, eq=False)
 class IntegerPotts:
     """A Potts model whose costs are integers >= 0: energy ~ offset + integer energy / scale, from below.
 
-    unary: (H, W, C) with a 0 at each pixel. weights: (D, H, W). offset: what the pixels cost at the least, in float64.
-    magnitude: the sum of the sizes of the terms of `offset`.
+    size: (H, W). unary: (N, C) with a 0 at each pixel. weights: (N, D), of the pairs with the first half of the
+    neighbours. step: (2 D,), neighbour k is the reverse of 2 D - 1 - k. offset: what the pixels cost at the least, in
+    float64. magnitude: the sum of the sizes of the terms of `offset`.
     """
 
-    unary: Int[np.ndarray, "H W C"]
-    weights: Int[np.ndarray, "D H W"]
+    size: tuple[int, int]
+    unary: Int[np.ndarray, "N C"]
+    weights: Int[np.ndarray, "N D"]
+    step: Int[np.ndarray, "K"]
     scale: float
     offset: float
     magnitude: float
@@ -50,28 +56,30 @@ def quantise(crf: PottsCRF) -> IntegerPotts:
     by all that the neighbours can charge together is never worth its cost, so its cost is cut off just above that
     sum, and +inf becomes a number. A weight above the whole energy of a constant labelling is cut off likewise.
     """
-    lowest = crf.unary.min(axis=2)
-    excess = crf.unary - lowest[..., None]
-    weights = crf.weights
-    constant = float(excess.sum(axis=(0, 1)).min())
-    if 0.0 < 1.01 * constant < weights.max():
-        weights = np.minimum(weights, 1.01 * constant)
-    dtype, scale = integer_scale(excess, weights, crf.offsets)
-    integer_weights = np.floor(weights * scale).astype(dtype)
-    with np.errstate(over="ignore"):
-        excess *= scale
-    np.minimum(excess, incident_sum(integer_weights, crf.offsets)[..., None] + 1.0, out=excess)
-    np.floor(excess, out=excess)
-    magnitude = float(np.abs(lowest).sum())
-    return IntegerPotts(excess.astype(dtype), integer_weights, scale, float(lowest.sum()), magnitude)
+    from labkit.crf.integer_kernels import measure, round_unary, round_weights
+
+    H, W, C = crf.shape
+    offsets = np.array(crf.offsets)
+    size, largest = measure(crf.unary, crf.weights, offsets, np.inf), crf.weights.max()
+    highest = 1.01 * size.constant if 0.0 < 1.01 * size.constant < largest else np.inf
+    if highest < largest:
+        size = measure(crf.unary, crf.weights, offsets, highest)
+    dtype, scale = integer_scale(min(largest, highest), size.typical / crf.unary.size, size.smallest)
+    step = grid_steps(crf.offsets, W)
+    weights = np.zeros(((H + 2) * (W + 2), len(offsets)), dtype)
+    round_weights(crf.weights, highest, scale, weights.reshape(H + 2, W + 2, -1))
+    unary = np.zeros((len(weights), C), dtype)
+    round_unary(crf.unary, weights, step, scale, unary)
+    return IntegerPotts((H, W), unary, weights, step, scale, size.offset, size.magnitude)
 
 
-def integer_scale(excess: Float[np.ndarray, "H W C"], weights: Float[np.ndarray, "D H W"], offsets: tuple):
-    """Choose the dtype of the integers and what a cost of 1 becomes: a power of two, as large as the dtype allows."""
-    largest = weights.max()
+def integer_scale(largest: float, typical: float, smallest: float) -> tuple[type, float]:
+    """Choose the dtype of the integers and what a cost of 1 becomes: a power of two, as large as the dtype allows.
+
+    largest: weight. typical: unary cost, in the mean. smallest: unary cost above 0, which counts where no weight does.
+    """
     if largest == 0.0:  # the pixels are independent: a class is the cheapest, or it costs at least one step
-        return np.int32, float(2.0 / np.min(excess, where=excess > 1e-300, initial=1.0))
-    typical = np.minimum(excess, incident_sum(weights, offsets)[..., None]).mean()
+        return np.int32, 2.0 / smallest
     for dtype, bits in WEIGHT_BITS.items():  # noqa: B007 (the one it stops at is returned)
         scale = float(2.0 ** min(np.floor(bits - np.log2(largest)), 1000.0))
         if typical == 0.0 or typical * scale >= 2.0**ENOUGH_BITS:
@@ -79,11 +87,23 @@ def integer_scale(excess: Float[np.ndarray, "H W C"], weights: Float[np.ndarray,
     return dtype, scale
 
 
-def incident_sum(weights: np.ndarray, offsets: tuple[tuple[int, int], ...]) -> np.ndarray:
-    """Sum the weights of all pairs of each pixel, (D, H, W) -> (H, W)."""
-    total = np.zeros(weights.shape[1:], weights.dtype)
-    for w, offset in zip(weights, offsets, strict=True):
-        p, q = pair_slices(offset)
-        total[p] += w[p]
-        total[q] += w[p]
-    return total
+def grid_steps(offsets: tuple[tuple[int, int], ...], W: int) -> Int[np.ndarray, "K"]:
+    """Return what to add to a pixel's number for each neighbour, in an image W wide with a ring of one pixel around.
+
+    Neighbours come in the order of `offsets` and then back through their reverses, so that k comes back as K - 1 - k.
+
+    >>> grid_steps(((0, 1), (1, 0)), W=3)
+    array([ 1,  5, -5, -1], dtype=int32)
+    """
+    forward = [down * (W + 2) + right for down, right in offsets]
+    return np.array(forward + [-step for step in reversed(forward)], np.int32)
+
+
+def inside(flat: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """View a flat array with a ring as the image that it holds, (H, W) or (H, W, k)."""
+    return flat.reshape(size[0] + 2, size[1] + 2, *flat.shape[1:])[1:-1, 1:-1]
+
+
+def pixel_numbers(size: tuple[int, int]) -> Int[np.ndarray, "n"]:
+    """Return the numbers of all pixels, row by row."""
+    return inside(np.arange((size[0] + 2) * (size[1] + 2), dtype=np.int32), size).ravel()

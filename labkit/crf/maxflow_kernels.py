@@ -3,7 +3,7 @@
 The graph is implicit. A pixel n has an arc to each neighbour n + step[k], and arc k of n returns as arc K - 1 - k of
 that neighbour. A ring of pixels without arcs surrounds the image, so that no loop asks where the border is. The two
 terminals are not nodes: excess[n] > 0 is what the source can still give to n, -excess[n] > 0 what n can still give
-to the sink.
+to the sink. Pixels that do not take part have no arcs either, and are in no tree.
 
 Two trees of unsaturated arcs grow from the source and from the sink. Where they touch, flow goes through, some arcs
 fill up, and the nodes that hung on them look for another parent in their tree or leave it.
@@ -26,27 +26,51 @@ Forest = namedtuple("Forest", "tree parent dist stamp")
 Queue = namedtuple("Queue", "nodes waiting ends")
 
 
-@njit(cache=True)
-def max_flow(capacity, excess, step):
-    """Send all the flow that fits; return its value and the side of a minimum cut of each node (FREE: either).
+def new_forest(size):
+    """Make room for the trees of a graph, its queue of active nodes and its orphans; all nodes are in no tree."""
+    forest = Forest(
+        np.zeros(size, np.int8), np.empty(size, np.int8), np.empty(size, np.int32), np.empty(size, np.int32)
+    )
+    return (
+        forest,
+        Queue(np.empty(size, np.int32), np.zeros(size, np.bool_), np.zeros(2, np.int64)),
+        np.empty(size, np.int32),
+    )
 
-    capacity: (nodes, K), excess: (nodes,), integers; both are left holding what remains.
+
+@njit(cache=True, nogil=True)
+def both_ways(weights, step):
+    """Give each pair of neighbours an arc of its weight in either direction: capacities (N, K) from weights (N, D)."""
+    capacity = np.zeros((len(weights), len(step)), weights.dtype)
+    for n in range(step.max(), len(weights) - step.max()):
+        for k in range(len(step)):
+            capacity[n, k] = weights[n, k] if 2 * k < len(step) else weights[n + step[k], len(step) - 1 - k]
+    return capacity
+
+
+@njit(cache=True, nogil=True)
+def max_flow(graph, forest, active, orphans, nodes, near):
+    """Send all the flow that fits and return its value; forest.tree then holds the side of a minimum cut of each node.
+
+    nodes: those that take part. capacity (N, K) and excess (N,), integers, are left holding what remains. A node in no
+    tree may go to either side. near: how far flow goes without trees, see `push_nearby`.
     """
-    size = len(excess)
-    graph = Graph(capacity, excess, step)
-    flow = send_to_neighbours(graph)
-    forest = Forest(np.zeros(size, np.int8), np.zeros(size, np.int8), np.ones(size, np.int32), np.zeros(size, np.int32))
-    active = Queue(np.empty(size, np.int32), np.zeros(size, np.bool_), np.zeros(2, np.int64))
-    orphans = np.empty(size, np.int32)
-    for n in range(size):
-        if excess[n] != 0:
-            forest.tree[n] = SOURCE if excess[n] > 0 else SINK
-            forest.parent[n] = ROOT
+    tree, parent, dist, stamp = forest
+    flow = 0
+    for n in nodes:
+        flow += max(graph.excess[n], 0)
+    push_nearby(graph, dist, active, nodes, near)
+    for n in nodes:
+        flow -= max(graph.excess[n], 0)
+        tree[n] = SOURCE if graph.excess[n] > 0 else SINK if graph.excess[n] < 0 else FREE
+        parent[n], dist[n], stamp[n] = ROOT, 1, 0
+    for n in nodes:
+        if tree[n] != FREE and meets_others(graph, tree, n):
             push(active, n)
     time = 0
     while active.ends[0] != active.ends[1]:
         n = pop(active)
-        while forest.tree[n] != FREE:
+        while tree[n] != FREE:
             bridge = grow(graph, forest, active, n)
             if bridge < 0:
                 break
@@ -54,32 +78,70 @@ def max_flow(capacity, excess, step):
             flow += sent
             time += 1
             adopt(graph, forest, active, orphans, lost, time)
-    return flow, forest.tree
+    return flow
 
 
-@njit(cache=True)
-def send_to_neighbours(graph):
-    """Send what goes from the source over one arc to the sink: most of the flow, and without any tree."""
+@njit(cache=True, nogil=True)
+def push_nearby(graph, height, queue, nodes, near):
+    """Let all nodes push their excess towards the sink at once (Goldberg and Tarjan 1988): short ways need no trees.
+
+    height: a lower bound on the arcs from a node to the sink. Excess goes to neighbours one lower, and a node that has
+    none is lifted. It gives up at the height `near`: the trees find long ways sooner. The queue is left empty.
+    """
     capacity, excess, step = graph
-    K = len(step)
-    flow = 0
-    for n in range(len(excess)):
+    waiting_nodes, waiting, _ = queue
+    K, size = len(step), len(waiting_nodes)
+    first = last = count = 0
+    for n in nodes:
+        height[n] = 1 if excess[n] < 0 else 2
         if excess[n] > 0:
-            for k in range(K):
+            waiting_nodes[last], waiting[n] = n, True
+            last += 1
+    count = last
+    while count > 0:
+        n = waiting_nodes[first]
+        waiting[n] = False
+        first = first + 1 if first + 1 < size else 0
+        count -= 1
+        below, lowest = height[n] - 1, near
+        for k in range(K):
+            if capacity[n, k] > 0:
                 m = n + step[k]
-                if capacity[n, k] > 0 and excess[m] < 0:
-                    sent = min(excess[n], capacity[n, k], -excess[m])
+                if height[m] == below:
+                    sent = min(excess[n], capacity[n, k])
                     capacity[n, k] -= sent
                     capacity[m, K - 1 - k] += sent
                     excess[n] -= sent
                     excess[m] += sent
-                    flow += sent
+                    if excess[m] > 0 and not waiting[m]:
+                        waiting_nodes[last], waiting[m] = m, True
+                        last = last + 1 if last + 1 < size else 0
+                        count += 1
                     if excess[n] == 0:
                         break
-    return flow
+                if capacity[n, k] > 0:
+                    lowest = min(lowest, height[m])
+        if excess[n] > 0:
+            height[n] = lowest + 1
+            if height[n] < near:
+                waiting_nodes[last], waiting[n] = n, True
+                last = last + 1 if last + 1 < size else 0
+                count += 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def meets_others(graph, tree, n):
+    """Say whether a node of a tree can grow at all: amid its own tree it waits until a neighbour gets lost."""
+    capacity, _, step = graph
+    K = len(step)
+    for k in range(K):
+        m = n + step[k]
+        if tree[m] != tree[n] and (capacity[n, k] if tree[n] == SOURCE else capacity[m, K - 1 - k]) > 0:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def push(queue, n):
     """Append a node unless it waits already."""
     if not queue.waiting[n]:
@@ -90,7 +152,7 @@ def push(queue, n):
             queue.ends[1] = 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def pop(queue):
     """Take the node that has waited longest."""
     n = queue.nodes[queue.ends[0]]
@@ -101,7 +163,7 @@ def pop(queue):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def grow(graph, forest, active, n):
     """Let node n take free neighbours into its tree; return its arc to the other tree once there is one, or -1."""
     capacity, _, step = graph
@@ -123,7 +185,7 @@ def grow(graph, forest, active, n):
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def augment(graph, forest, orphans, n, bridge):
     """Send what fits through the path over arc `bridge` of n; return how many orphans that makes and the flow sent."""
     capacity, excess, step = graph
@@ -182,7 +244,7 @@ def augment(graph, forest, orphans, n, bridge):
     return lost, room
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def adopt(graph, forest, active, orphans, lost, time):
     """Find each orphan the parent nearest to its terminal; one without any leaves the tree and orphans its children."""
     capacity, _, step = graph
@@ -216,7 +278,7 @@ def adopt(graph, forest, active, orphans, lost, time):
         tree[n] = FREE
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def distance_to_terminal(forest, step, n, time):
     """Count the steps from n up to its terminal, FAR if an orphan is in the way; the nodes passed remember theirs."""
     _, parent, dist, stamp = forest

@@ -1,4 +1,4 @@
-"""Mean field: the distribution of independent pixels that is closest to the CRF (section 2 of the text).
+"""Mean field: the distribution of independent pixels that is closest to the CRF (topic 02).
 
 Among all q(y) = product of q_p(y_p), it looks for the least Kullback-Leibler divergence from p(y) = exp(-E(y)) / Z,
 which is the least free energy F(q) = <E>_q - entropy(q) >= -log Z. With all but one pixel fixed, the best q_p is a
@@ -21,7 +21,7 @@ def mean_field(crf: PottsCRF, iterations: int = 10, temperatures: tuple[float, f
 def mean_field_marginals(
     crf: PottsCRF, iterations: int = 10, temperatures: tuple[float, float] | None = None
 ) -> Float[np.ndarray, "H W C"]:
-    """Return q (H, W, C) after `iterations` sweeps from the softmax of the unary term. Section 2 of the text.
+    """Return q (H, W, C) after `iterations` sweeps from the softmax of the unary term (topic 02).
 
     temperatures: first and last value of T in exp(-E / T), falling geometrically; (2.0, 0.2) anneals, which finds lower
     energies but no longer the marginals. Default: T = 1. Raises ValueError for T <= 0 or no iteration.

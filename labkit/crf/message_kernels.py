@@ -5,7 +5,7 @@ one diagonal of the image do not touch each other. So the image is stored in ske
 diagonal k = u + slant * v and place v on it, with slant 1 for 4 neighbours and 2 for 8. Then every neighbour is on
 an earlier or a later diagonal, a diagonal is a contiguous row, and the processor works on many pixels of it at once.
 
-Arrays: unary[k, c, v], weights[d, k, v], messages[d, k, c, v] where (d, k, v) names the pair of a pixel and the one
+Arrays: unary[k, c, v], weights[k, d, v], messages[d, k, c, v] where (d, k, v) names the pair of a pixel and the one
 hop[d] = (diagonals, places) further. There are MARGIN empty diagonals and one empty place on either side.
 """
 
@@ -15,7 +15,7 @@ from numba import njit
 MARGIN = 3  # the longest hop: right and down among 8 neighbours
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def skewed(image, slant):
     """Store an image (H, W, C) by diagonals: (diagonals, C, places)."""
     H, W, C = image.shape
@@ -27,7 +27,7 @@ def skewed(image, slant):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def straightened(rows, slant, W):
     """Bring one channel (diagonals, places) back to an image (H, W)."""
     H = rows.shape[1] - 2
@@ -38,28 +38,28 @@ def straightened(rows, slant, W):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def places(k, slant, H, W):
     """Range of places on diagonal k that hold pixels."""
     k -= MARGIN
     return 1 + max(0, -((W - 1 - k) // slant)), 1 + min(H - 1, k // slant) + 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add(total, terms):
     """Add element by element; as all loops below, over pixels that are neighbours in memory."""
     for i in range(len(total)):
         total[i] += terms[i]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def smaller(least, values):
     """Keep the smaller of each pair of elements."""
     for i in range(len(least)):
         least[i] = min(least[i], values[i])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forward):
     """Send new messages along all pairs, forward or backward; return the lower bound that this proves.
 
@@ -95,7 +95,7 @@ def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forw
             bound += kept[j]
         for d in range(D):
             row, shifted = (k, 0) if forward else (k - hop[d, 0], hop[d, 1])
-            w = weights[d, row, a - shifted : b - shifted]
+            w = weights[row, d, a - shifted : b - shifted]
             for c in range(C):
                 subtract(rest[c, :n], h[c, :n], messages[d, row, c, a - shifted : b - shifted])
                 if c == 0:
@@ -109,7 +109,7 @@ def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forw
     return bound
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def divide(belief, shift, ahead, rest):
     """Replace a belief by the share of one pair; `rest` is what remains after all pairs ahead took theirs."""
     for i in range(len(belief)):
@@ -118,21 +118,21 @@ def divide(belief, shift, ahead, rest):
         belief[i] = share
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def subtract(out, x, y):
     """out = x - y."""
     for i in range(len(out)):
         out[i] = x[i] - y[i]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cut_off(message, values, low, w):
     """message = min(values - low, w): the distance transform of a Potts term."""
     for i in range(len(message)):
         message[i] = min(values[i] - low[i], w[i])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def trws_labels(unary, weights, messages, hop, slant, W):
     """Read labels off the messages of a backward sweep: each pixel in turn, given the labels already chosen."""
     D, C, H = len(hop), unary.shape[1], unary.shape[2] - 2
@@ -148,19 +148,19 @@ def trws_labels(unary, weights, messages, hop, slant, W):
             for d in range(D):
                 add(cost[:n], messages[d, k, c, a:b])
                 back, first, last = k - hop[d, 0], a - hop[d, 1], b - hop[d, 1]
-                add_where_differs(cost[:n], weights[d, back, first:last], labels[back, first:last], c)
+                add_where_differs(cost[:n], weights[back, d, first:last], labels[back, first:last], c)
             choose(labels[k, a:b], least[:n], cost[:n], c)
     return straightened(labels, slant, W)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add_where_differs(cost, w, labels, c):
     """Charge class c for each pair whose other pixel has another label."""
     for i in range(len(cost)):
         cost[i] += w[i] if labels[i] != c else 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def choose(labels, least, cost, c):
     """Take class c where it is the first or the cheapest so far."""
     for i in range(len(labels)):
@@ -169,7 +169,64 @@ def choose(labels, least, cost, c):
             labels[i] = c
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def trws_bound(unary, weights, step, nodes, place, iterations, enough):
+    """Run the same algorithm on few scattered pixels, one at a time; return the bound on their energy and iterations.
+
+    Arrays are flat with a ring (`integers`); place[n] is where pixel n is in `nodes`, or -1. It ends when the bound
+    is `enough`.
+    """
+    messages = np.zeros((len(nodes), len(step), unary.shape[1]), unary.dtype)
+    bound = 0
+    for iteration in range(1, iterations + 1):
+        for forward in (True, False):
+            bound = max(bound, sweep_nodes(unary, weights, step, nodes, place, messages, forward))
+        if bound >= enough:
+            return bound, iteration
+    return bound, iterations
+
+
+@njit(cache=True, nogil=True)
+def sweep_nodes(unary, weights, step, nodes, place, messages, forward):
+    """Do what `trws_sweep` does; messages[i, k] comes to pixel nodes[i] from its neighbour k."""
+    K, C = len(step), unary.shape[1]
+    h = np.empty(C, unary.dtype)
+    bound = 0
+    for turn in range(len(nodes)):
+        i = turn if forward else len(nodes) - 1 - turn
+        n = nodes[i]
+        for c in range(C):
+            h[c] = unary[n, c]
+        ahead = behind = 0
+        for k in range(K):
+            if place[n + step[k]] >= 0:
+                ahead += (2 * k < K) == forward
+                behind += (2 * k < K) != forward
+                for c in range(C):
+                    h[c] += messages[i, k, c]
+        shift = 0
+        while 1 << shift < max(ahead, behind):
+            shift += 1
+        kept = h[0] - (h[0] >> shift) * ahead
+        for c in range(C):
+            share = h[c] >> shift
+            kept = min(kept, h[c] - share * ahead)
+            h[c] = share
+        bound += kept
+        for k in range(0 if forward else K // 2, K // 2 if forward else K):
+            m = n + step[k]
+            if place[m] >= 0:
+                w = weights[n, k] if forward else weights[m, K - 1 - k]
+                low = h[0] - messages[i, k, 0]
+                for c in range(1, C):
+                    low = min(low, h[c] - messages[i, k, c])
+                for c in range(C):
+                    messages[place[m], K - 1 - k, c] = min(h[c] - messages[i, k, c] - low, w)
+                bound += low
+    return bound
+
+
+@njit(cache=True, nogil=True)
 def icm_sweep(unary, weights, offsets, labels):
     """Give each pixel in turn the class that is best given its neighbours; return how many changed."""
     H, W, C = unary.shape

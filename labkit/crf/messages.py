@@ -5,21 +5,23 @@ until the chains agree as far as they can. The sum of the chains' minima is a lo
 labelling. For two classes it reaches the optimum; for more it usually comes within a fraction of a percent.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
-from jaxtyping import Int, Integer
+from jaxtyping import Int, Integer, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
-from labkit.crf.integers import quantise
+from labkit.crf.integers import IntegerPotts, inside, quantise
 
 # How often labels are read off the messages, in iterations.
 LABEL_EVERY = 5
 
 
 def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapResult:
-    """Minimise by sequential tree-reweighted message passing, with a proven lower bound.
+    """Minimise by sequential tree-reweighted message passing, with a proven lower bound (topic 02).
 
     One iteration is a sweep forward and one backward. It stops early once the gap is below `tolerance`. Exact integer
-    arithmetic makes the bound a proof. Section 2 of the text.
+    arithmetic makes the bound a proof.
 
     >>> psi = np.array([[[0.0, 2.0, 2.0], [1.0, 2.0, 0.8], [0.0, 2.0, 2.0]]])
     >>> result = trws(PottsCRF(psi, np.array([[[0.5, 0.5, 0.0]], [[0.0, 0.0, 0.0]]])))
@@ -28,32 +30,42 @@ def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapRes
     """
     if iterations < 1:
         raise ValueError(f"iterations: expected at least 1, got {iterations}")
+    return _trws(crf, quantise(crf), iterations, tolerance)
+
+
+def _trws(crf: PottsCRF, integer: IntegerPotts, iterations: int, tolerance: float) -> MapResult:
+    best = MapResult(crf.unary.argmin(axis=2).astype(np.uint8), np.inf)
+    unary, weights = inside(integer.unary, integer.size), inside(integer.weights, integer.size)
+    for iteration, labels, proven in message_passing(unary, weights, crf.offsets, iterations):
+        energy = crf._energy(labels)
+        if energy > best.energy:
+            labels, energy = best.labels, best.energy
+        best = MapResult(labels, energy, integer.lower_bound(proven, energy), iteration)
+        if best.gap <= tolerance:
+            break
+    return best
+
+
+def message_passing(
+    unary: Int[np.ndarray, "H W C"], weights: Int[np.ndarray, "H W D"], offsets: tuple, iterations: int
+) -> Iterator[tuple[int, UInt8[np.ndarray, "H W"], int]]:
+    """Run TRW-S on integer costs >= 0; yield, now and then, the number of iterations, labels and the proven bound."""
     from labkit.crf.message_kernels import skewed, trws_labels, trws_sweep
 
-    W = crf.shape[1]
-    slant = 1 if crf.connectivity == 4 else 2
-    hop = np.array([(right + slant * down, down) for down, right in crf.offsets])
-    integer = quantise(crf)
-    unary = skewed(integer.unary, slant)
-    ahead, behind = (skewed(count[..., None], slant)[:, 0] for count in pair_counts(integer.weights, crf.offsets))
+    W = unary.shape[1]
+    slant = 1 if len(offsets) == 2 else 2
+    hop = np.array([(right + slant * down, down) for down, right in offsets])
+    ahead, behind = (skewed(count[..., None], slant)[:, 0] for count in pair_counts(weights, offsets))
     # A belief is shared among 1, 2 or 4 pairs, at least as many as there are: powers of two divide by a shift.
     shift = np.ceil(np.log2(np.maximum(np.maximum(ahead, behind), 1))).astype(unary.dtype)
-    weights = np.stack([skewed(w[..., None], slant)[:, 0] for w in integer.weights])
+    unary, weights = skewed(unary, slant), skewed(weights, slant)
     messages = np.zeros((len(hop), *unary.shape), unary.dtype)
-    best = MapResult(crf.unary.argmin(axis=2).astype(np.uint8), np.inf)
     proven = 0  # no integer cost is negative
     for iteration in range(1, iterations + 1):
         proven = max(proven, trws_sweep(unary, weights, messages, hop, shift, ahead, slant, W, True))
         proven = max(proven, trws_sweep(unary, weights, messages, hop, shift, behind, slant, W, False))
         if iteration % LABEL_EVERY == 0 or iteration == iterations:
-            labels = trws_labels(unary, weights, messages, hop, slant, W)
-            energy = crf.energy(labels)
-            if energy > best.energy:
-                labels, energy = best.labels, best.energy
-            best = MapResult(labels, energy, integer.lower_bound(proven, energy), iteration)
-            if best.gap <= tolerance:
-                break
-    return best
+            yield iteration, trws_labels(unary, weights, messages, hop, slant, W), proven
 
 
 def icm(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None, iterations: int = 100) -> MapResult:
@@ -73,12 +85,12 @@ def icm(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None, iterati
 
 
 def pair_counts(
-    weights: Int[np.ndarray, "D H W"], offsets: tuple
+    weights: Int[np.ndarray, "H W D"], offsets: tuple
 ) -> tuple[Int[np.ndarray, "H W"], Int[np.ndarray, "H W"]]:
     """Count each pixel's pairs of weight above 0: those it owns (ahead), and those that pixels behind it own."""
-    ahead = (weights > 0).sum(axis=0, dtype=weights.dtype)
+    ahead = np.count_nonzero(weights, axis=2).astype(weights.dtype)
     behind = np.zeros_like(ahead)
-    for w, offset in zip(weights, offsets, strict=True):
+    for d, offset in enumerate(offsets):
         p, q = pair_slices(offset)
-        behind[q] += w[p] > 0
+        behind[q] += weights[..., d][p] > 0
     return ahead, behind

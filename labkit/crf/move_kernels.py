@@ -1,65 +1,139 @@
-"""The two-class problems inside expansion and swap moves, written into the arcs of a grid, compiled by numba.
+"""The two-class problems inside moves and inside the proof of persistency, written into a grid's arcs by numba.
 
-In both, staying on the source's side means to keep the label. Arrays have the ring of one pixel that the maximum flow
-asks for; weights[n, d] belongs to pixel n and pixel n + step[d]; pixels of the ring have label RING and weight 0.
+Only the pixels `nodes`, those with free[n], take part; the labels of the others stay. Each function fills excess[n]
+and all arcs of `nodes`. Arrays are flat with a ring (`integers`); ring pixels have no weights.
 """
 
 import numpy as np
 from numba import njit
 
+from labkit.crf.maxflow_kernels import SINK, SOURCE  # noqa: F401
+
 RING = 255
 
 
-@njit(cache=True)
-def expansion_move(unary, weights, labels, step, alpha, capacity, excess):
-    """Ask of each pixel: keep your label, or take `alpha`? Fill capacity and excess.
+@njit(cache=True, nogil=True)
+def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
+    """Ask of each pixel: keep your label (the source's side), or take `alpha`?
 
     With x = 1 for taking alpha, two pixels of one label disagree if x_p != x_q: an arc both ways. Two pixels of
     different labels disagree unless both take alpha: w (1 - x_p x_q) = w (1 - x_p) + w x_p (1 - x_q), which is a cost
-    of keeping p and an arc from q to p. Beside a pixel of label alpha, keeping costs w.
+    of keeping p and an arc from q to p. Beside a pixel of label alpha keeping costs w, and beside a pixel that stays
+    with the same label taking alpha does.
     """
     K = len(step)
-    capacity[:] = 0
-    for n in range(len(labels)):
-        excess[n] = 0 if labels[n] == alpha or labels[n] == RING else unary[n, alpha] - unary[n, labels[n]]
-    for n in range(len(labels)):
-        for d in range(K // 2):
-            w = weights[n, d]
+    capacity, excess = graph.capacity, graph.excess
+    for n in nodes:
+        if labels[n] == alpha:
+            excess[n] = 0
+            capacity[n] = 0
+            continue
+        taking = unary[n, alpha] - unary[n, labels[n]]
+        for k in range(K):
+            m = n + step[k]
+            w = weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+            capacity[n, k] = 0
             if w == 0:
                 continue
-            m = n + step[d]
-            if labels[n] == labels[m]:
-                if labels[n] != alpha:
-                    capacity[n, d] = w
-                    capacity[m, K - 1 - d] = w
-            elif labels[n] == alpha:
-                excess[m] -= w
-            elif labels[m] == alpha:
-                excess[n] -= w
+            if not free[m]:
+                capacity[m, K - 1 - k] = 0
+            if labels[m] == alpha:
+                taking -= w
+            elif not free[m]:
+                taking += w if labels[m] == labels[n] else 0
+            elif labels[m] == labels[n] or 2 * k >= K:
+                capacity[n, k] = w
             else:
-                excess[n] -= w
-                capacity[m, K - 1 - d] = w
+                taking -= w
+        excess[n] = taking
 
 
-@njit(cache=True)
-def swap_move(unary, weights, labels, step, alpha, beta, capacity, excess):
-    """Ask each pixel labelled alpha (the source's side) or beta which of the two it takes. Fill capacity and excess.
+@njit(cache=True, nogil=True)
+def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
+    """Ask each pixel labelled alpha (the source's side) or beta which of the two it takes; all pixels are free.
 
     A plain minimum cut between these pixels; the others are left out, as whatever they disagree about stays. Returns
     the value of the cut that stands for the present labels.
     """
     K = len(step)
-    capacity[:] = 0
-    present = np.int64(0)
-    for n in range(len(labels)):
+    capacity, excess = graph.capacity, graph.excess
+    present = 0
+    for n in nodes:
+        capacity[n] = 0
         takes_part = labels[n] in (alpha, beta)
         excess[n] = unary[n, beta] - unary[n, alpha] if takes_part else 0
         present += max(excess[n], 0) if labels[n] == beta else max(-excess[n], 0)
-        for d in range(K // 2):
-            other = labels[n + step[d]] if weights[n, d] > 0 else RING
-            if takes_part and other in (alpha, beta):
-                capacity[n, d] = weights[n, d]
-                capacity[n + step[d], K - 1 - d] = weights[n, d]
-                if other != labels[n]:
-                    present += weights[n, d]
+        if takes_part:
+            for k in range(K):
+                m = n + step[k]
+                if labels[m] in (alpha, beta):
+                    capacity[n, k] = weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+                    if 2 * k < K and labels[m] != labels[n]:
+                        present += capacity[n, k]
     return present
+
+
+@njit(cache=True, nogil=True)
+def persistency_test(unary, weights, step, labels, free, nodes, graph):
+    """Ask which pixels keep their label in some best labelling: those beyond the source's side of the cut.
+
+    Let S be any set of pixels that leave their labels. Each pixel of S pays at least its margin, the cost of the
+    second-best class above that of its label. Pairs inside S and pairs with free pixels of another label could save w.
+    Pairs of S with pixels of the same label that stay cost w. Nothing is saved if no S can pay with less than
+    it saves: if all that could be saved flows to pixels with a margin to spare, through pairs of the same label.
+    """
+    K, C = len(step), unary.shape[1]
+    capacity, excess = graph.capacity, graph.excess
+    cost = np.empty(C, unary.dtype)
+    for n in nodes:
+        own = labels[n]
+        for c in range(C):
+            cost[c] = unary[n, c]
+        saved = 0
+        for k in range(K):
+            m = n + step[k]
+            w = weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+            capacity[n, k] = 0
+            if w == 0:
+                continue
+            if not free[m]:
+                capacity[m, K - 1 - k] = 0
+                cost[labels[m]] -= w
+            elif labels[m] == own:
+                capacity[n, k] = w
+            else:
+                saved += w
+        second = cost[0] if own > 0 else cost[1]
+        for c in range(C):
+            if c != own:
+                second = min(second, cost[c])
+        excess[n] = saved - (second - cost[own])
+
+
+@njit(cache=True, nogil=True)
+def fold_fixed(unary, weights, step, labels, free, nodes):
+    """Turn what fixed neighbours charge free pixels into unary costs, in place, and cut the pairs with them.
+
+    The least cost of each pixel becomes 0 again: energies fall by a constant.
+    """
+    K = len(step)
+    for n in nodes:
+        for k in range(K):
+            m = n + step[k]
+            row, d = (n, k) if 2 * k < K else (m, K - 1 - k)
+            if weights[row, d] > 0 and not free[m]:
+                unary[n, labels[m]] -= weights[row, d]
+                weights[row, d] = 0
+        unary[n] -= unary[n].min()
+
+
+@njit(cache=True, nogil=True)
+def energy_of(unary, weights, step, labels, nodes):
+    """Sum the integer costs of `nodes` and of the pairs that these own."""
+    total = 0
+    for n in nodes:
+        total += unary[n, labels[n]]
+        for d in range(weights.shape[1]):
+            if labels[n + step[d]] != labels[n]:
+                total += weights[n, d]
+    return total

@@ -6,24 +6,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Num
 
-from labkit.crf.cuts import expansion, swap
+from labkit.crf.cuts import expansion, swap, trws_expansion
 from labkit.crf.energy import MapResult, PottsCRF, unary_from_probabilities
 from labkit.crf.exact import brute_force, min_cut, unary
 from labkit.crf.mean_field import mean_field
 from labkit.crf.messages import icm, trws
+from labkit.crf.persistency import persistency
 from labkit.support.validation import check_depth
-
-
-def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4) -> MapResult:
-    """Let TRW-S find the bound and a start, and expansion moves the rest of the way down: the default.
-
-    TRW-S stops after `iterations`, or once its own gap is below `tolerance`; the moves then shrink it further.
-    """
-    start = trws(crf, iterations, tolerance)
-    finish = expansion(crf, start.labels)
-    best = min(start, finish, key=lambda result: result.energy)
-    return replace(best, lower_bound=start.lower_bound, iterations=start.iterations + finish.iterations)
-
 
 METHODS = {
     "brute_force": brute_force,
@@ -35,14 +24,15 @@ METHODS = {
     "swap": swap,
     "trws": trws,
     "trws+expansion": trws_expansion,
+    "persistency": persistency,
 }
 
 
 def solve(crf: PottsCRF, method: str = "trws+expansion", **options) -> MapResult:
-    """Look for the labelling of least energy; `options` go to the method's function. Section 2 of the text.
+    """Look for the labelling of least energy; `options` go to the method's function (topic 02).
 
-    method: a name of METHODS. "brute_force" (tiny grids) and "min_cut" (two classes) are exact; "trws" and
-    "trws+expansion" prove how far they can be from the optimum. Raises ValueError for any other name.
+    method: a name of METHODS. "brute_force" (tiny grids) and "min_cut" (two classes) are exact; "trws",
+    "trws+expansion" and "persistency" prove how far they can be from the optimum. Raises ValueError for another name.
 
     >>> psi = np.array([[[0.0, 2.0, 2.0], [1.0, 2.0, 0.8], [0.0, 2.0, 2.0]]])
     >>> crf = PottsCRF.from_image(psi, np.zeros((1, 3, 3), np.uint8), lam=0.5, sigma_I=10.0)
@@ -67,14 +57,14 @@ def refine(
     sigma_depth: float = 0.03,
     connectivity: int = 8,
     floor: float = 1e-4,
-    method: str = "trws+expansion",
+    method: str = "persistency",
 ) -> MapResult:
-    """Refine a network's class probabilities with the image: labels that are smooth except across edges.
+    """Refine a network's class probabilities with the image: labels that are smooth except across edges (topic 02).
 
     image: RGB, uint8; sigma_I in its units. depth: metres, 0 or NaN where there is no reading; with it the labels may
     also break at jumps of about sigma_depth metres, where objects end. Probabilities are clipped at `floor`. The
     defaults are the best for the shipped UNet on scenes that no evaluation uses (BENCHMARKS.md). Raises
-    ValueError naming the argument that does not fit. Section 2 of the text.
+    ValueError naming the argument that does not fit.
 
     >>> p = np.full((3, 3, 2), (0.9, 0.1))
     >>> p[1, 1] = (0.4, 0.6)

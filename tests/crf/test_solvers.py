@@ -11,11 +11,11 @@ from scipy.sparse.csgraph import maximum_flow
 
 from labkit.crf import METHODS, MapResult, PottsCRF, solve
 from labkit.crf.energy import pair_slices
-from labkit.crf.exact import grid_max_flow, is_submodular
-from labkit.crf.integers import quantise
+from labkit.crf.exact import grid_max_flow
+from labkit.crf.integers import inside, quantise
 
-APPROXIMATE = ("icm", "mean_field", "expansion", "swap", "trws", "trws+expansion")
-BOUNDED = ("unary", "trws", "trws+expansion")
+APPROXIMATE = ("icm", "mean_field", "expansion", "swap", "trws", "trws+expansion", "persistency")
+BOUNDED = ("unary", "trws", "trws+expansion", "persistency")
 
 # Shapes with at most 3^9 or 2^12 labellings, degenerate ones included.
 tiny = st.one_of(
@@ -73,7 +73,7 @@ def test_without_pairwise_term_all_methods_give_the_cheapest_class(method, C):
     result = solve(crf, method)
     assert np.array_equal(result.labels, crf.unary.argmin(axis=2))
     if method in BOUNDED:
-        assert result.gap < 1e-12
+        assert result.gap < 1e-11
 
 
 def test_min_cut_without_pairwise_term_gives_the_cheapest_class():
@@ -141,8 +141,8 @@ def test_icm_never_raises_the_energy_of_its_start():
 def test_flow_through_a_whole_image_equals_scipys(connectivity):
     crf = noisy_image(5, 240, 320, 2, 0.3, 2.0, connectivity)
     integer = quantise(crf)
-    excess = (integer.unary[..., 1] - integer.unary[..., 0]) >> 6  # scipy takes int32 sums only
-    weights = integer.weights >> 6
+    unary, weights = (inside(flat, integer.size) >> 6 for flat in (integer.unary, integer.weights))
+    excess, weights = unary[..., 1] - unary[..., 0], weights.transpose(2, 0, 1)  # scipy takes int32 sums only
     flow, source_side = grid_max_flow(excess, weights, crf.offsets)
     assert flow == scipy_flow(excess, weights, crf.offsets)
     # The cut that the labels describe costs what flows: duality, and so both are optimal.
@@ -167,11 +167,6 @@ def test_flow_through_small_grids_with_many_ties_equals_scipys(shape, seed, top)
         p, _ = pair_slices(offset)
         weights[d][p] = rng.integers(0, top + 1, weights[d][p].shape)
     assert grid_max_flow(excess, weights, offsets)[0] == scipy_flow(excess, weights, offsets)
-
-
-def test_a_reward_for_disagreeing_is_not_submodular():
-    assert is_submodular(np.array([[0.0, 2.0], [2.0, 0.0]]))
-    assert not is_submodular(np.array([[0.0, -1.0], [-1.0, 0.0]]))
 
 
 def test_gap_is_relative_and_infinite_without_proof():

@@ -1,0 +1,68 @@
+"""From an image to the weights of neighbours, and from labels to their energy, in one pass each, compiled by numba."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def pair_exponents(image, scale, extra, offsets, nearness, exponents):
+    """Fill exponents[d, v, u] = nearness[d] - |f_p - f_q|^2 / 2 for the pair of pixel (v, u) and the one offsets[d] on.
+
+    The features f of a pixel are scale * image and the channels of `extra`, in which NaN differs from nothing. A pair
+    that leaves the image gets -inf, and so the weight 0.
+    """
+    H, W, channels = image.shape
+    here, below = np.empty((2, channels + extra.shape[2], W))
+    load_row(image, scale, extra, 0, below)
+    for v in range(H):
+        here, below = below, here
+        if v + 1 < H:
+            load_row(image, scale, extra, v + 1, below)
+        for d in range(len(offsets)):
+            down, right = offsets[d]
+            exponents[d, v] = -np.inf
+            if v + down < H:
+                other = below if down else here
+                first, last = max(0, -right), W - max(0, right)
+                pairs = exponents[d, v, first:last]
+                pairs[:] = nearness[d]
+                for c in range(len(here)):
+                    add_contrast(here[c, first:last], other[c, first + right : last + right], pairs)
+
+
+@njit(cache=True, nogil=True)
+def load_row(image, scale, extra, v, row):
+    """Copy the features of one row of pixels, channel by channel."""
+    channels = image.shape[2]
+    for c in range(channels):
+        for u in range(image.shape[1]):
+            row[c, u] = image[v, u, c] * scale
+    for c in range(extra.shape[2]):
+        for u in range(image.shape[1]):
+            row[channels + c, u] = extra[v, u, c]
+
+
+@njit(cache=True, nogil=True)
+def add_contrast(a, b, pairs):
+    """Subtract |a - b|^2 / 2 pair by pair, except where the difference is NaN."""
+    for i in range(len(pairs)):
+        difference = a[i] - b[i]
+        pairs[i] -= 0.5 * difference * difference if difference == difference else 0.0
+
+
+@njit(cache=True, nogil=True)
+def energy_by_row(unary, weights, offsets, y):
+    """Sum the energy of the labels `y` (H, W) row by row, so that no sum has more terms than a row: (H,)."""
+    H, W = y.shape
+    rows = np.zeros(H)
+    for v in range(H):
+        total = 0.0
+        for u in range(W):
+            total += unary[v, u, y[v, u]]
+        for d in range(len(offsets)):
+            down, right = offsets[d]
+            if v + down < H:
+                for u in range(max(0, -right), W - max(0, right)):
+                    total += weights[d, v, u] if y[v, u] != y[v + down, u + right] else 0.0
+        rows[v] = total
+    return rows

@@ -1,0 +1,79 @@
+"""Labels that are certain: prove for most pixels that a best labelling keeps their label, and solve only the rest.
+
+A network's doubts are local. Where it is sure, one cut proves that no set of pixels can change away from the network's
+labels and gain (persistency, also called partial optimality: Kovtun 2003, Shekhovtsov 2014). These pixels are then
+fixed, and what they charge their neighbours is a unary cost of those. As some best labelling agrees with all fixed
+pixels, a bound for the rest is a bound for the whole image.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from labkit.crf.cuts import Moves, trws_expansion
+from labkit.crf.energy import MapResult, PottsCRF
+from labkit.crf.integers import quantise
+
+# If more of the pixels than these shares are left after the first test, or after all, "trws+expansion" solves the image
+# as a whole: it takes less time then.
+MANY_UNCERTAIN, MANY_LEFT = 0.3, 0.05
+# How far flow is pushed on without search trees here: there are few sources, and all else is a sink.
+NEAR = 10
+
+
+def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -> MapResult:
+    """Fix what is certain, label the rest by expansion moves, and let TRW-S prove how good that is (topic 02).
+
+    First each pixel's label of least unary cost is tested; then, for the pixels that fail, one class after the other.
+    TRW-S on the pixels that fail all tests stops after `iterations`, or once the gap of the whole image is below
+    `tolerance`. An image of which much is uncertain is solved by "trws+expansion". iterations counts cuts and TRW-S's.
+    """
+    integer = quantise(crf)
+    moves = Moves(integer, crf.unary.argmin(axis=2))
+    pixels = len(moves.nodes)
+    fix_certain(moves)
+    first, tried = moves.labels.copy(), 1
+    if len(moves.nodes) > MANY_UNCERTAIN * pixels:
+        return trws_expansion(crf, tolerance=tolerance)
+    for alpha in np.argsort(-np.bincount(first[moves.nodes], minlength=crf.shape[2])):
+        if len(moves.nodes):
+            moves.labels[moves.nodes] = alpha
+            fix_certain(moves)
+            tried += 1
+    if len(moves.nodes) > MANY_LEFT * pixels:
+        return trws_expansion(crf, tolerance=tolerance)
+    above = 0
+    if len(moves.nodes):
+        moves.labels[moves.nodes] = first[moves.nodes]
+        tried += moves.expand_all()
+    bound, result = moves.integer_energy(), moves.result(crf, tried)
+    if len(moves.nodes):
+        above, more = distance_to_bound(moves, iterations, tolerance * abs(result.energy) * integer.scale)
+        result = replace(result, iterations=tried + more)
+    return replace(result, lower_bound=integer.lower_bound(bound - above, result.energy))
+
+
+def fix_certain(moves: Moves) -> None:
+    """Take the free pixels that keep their label in some best labelling out of the moves."""
+    from labkit.crf.move_kernels import SOURCE, persistency_test
+
+    _, _, tree = moves.cut(persistency_test, near=NEAR)
+    moves.leave_free(tree == SOURCE)
+
+
+def distance_to_bound(moves: Moves, iterations: int, enough: float) -> tuple[int, int]:
+    """Return how far the integer energy of the free pixels' labels may be above its minimum, by TRW-S, and iterations.
+
+    It stops once the distance is `enough`. Folds the fixed pixels' costs into the model of `moves`, as the last step.
+    """
+    from labkit.crf.message_kernels import trws_bound
+    from labkit.crf.move_kernels import energy_of, fold_fixed
+
+    integer = moves.integer
+    problem = integer.unary, integer.weights, integer.step
+    fold_fixed(*problem, moves.labels, moves.free, moves.nodes)
+    energy = energy_of(*problem, moves.labels, moves.nodes)
+    place = np.full(len(moves.free), -1, np.int32)
+    place[moves.nodes] = np.arange(len(moves.nodes))
+    bound, tried = trws_bound(*problem, moves.nodes, place, iterations, energy - enough)
+    return energy - bound, tried
