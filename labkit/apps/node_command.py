@@ -52,6 +52,7 @@ class Settings:
     def node(self, topics: Topics = DEFAULT_TOPICS) -> dict:
         """The options of SegmentationNode; topics: their names where they are not renamed."""
         given = {"base_frame": self.base_frame, "slop": self.slop, "depth_scale": self.depth_scale}
+        given["queue"] = self.qos_depth
         return given | {"T_base_cam": self.T_base_cam(), "topics": self.topics(topics)}
 
     def T_base_cam(self):

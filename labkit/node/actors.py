@@ -1,4 +1,4 @@
-"""The node's neighbours in section 5 of the text: a camera that publishes frames, and an arm that executes grasps."""
+"""The node's neighbours (topic 08): a camera that publishes frames, and an arm that executes grasps."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""The whole diagram of section 5 in one process: camera topics, node, grasp, and the arm that lifts."""
+"""The whole diagram of topic 08 in one process: camera topics, node, grasp, and the arm that lifts."""
 
 from labkit.node.actors import Arm, Camera
 from labkit.node.bus import Bus

@@ -67,13 +67,14 @@ class SegmentationNode:
     pipeline: what perceives. transport: a Bus, or an edge to ROS or to a bag. T_base_cam: where the camera stands; None
     takes it from the transforms on /tf and /tf_static at the image's stamp, waiting up to `patience` seconds for them.
     base_frame: the base's name in messages. slop: how far the stamps of one frame may lie apart, seconds. depth_scale:
-    metres per unit of 16UC1. Raises ValueError for an argument that does not fit.
+    metres per unit of 16UC1. queue: messages of each topic that wait for the others of their frame. Raises ValueError
+    for an argument that does not fit.
 
     Messages may come from any thread, which only checks them; frames are perceived by the thread that calls `spin` or
     `spin_once`. One frame waits: a newer one takes its place, and the old one is counted as dropped. Whatever is
     malformed or does not fit together is logged with the reason and skipped; a transport delivers a ValueError in place
-    of a message that it cannot read. Every result carries the colour image's stamp. Probabilities, an
-    overlay for people to look at, the planner's scene and the gripper's opening are published if anybody wants them.
+    of a message that it cannot read. Every result carries the colour image's stamp. Probabilities, an overlay for
+    people to look at, the planner's scene and the gripper's opening are published if anybody wants them.
 
     >>> from labkit.node.bus import Bus
     >>> node = SegmentationNode(Pipeline(lambda rgb: rgb / 255.0), Bus(), T_base_cam=np.eye(4))
@@ -91,6 +92,7 @@ class SegmentationNode:
         topics: Topics = DEFAULT_TOPICS,
         slop: float = 0.02,
         depth_scale: float = 0.001,
+        queue: int = 10,
         patience: float = 0.2,
         tree: TransformTree | None = None,
     ):
@@ -103,7 +105,7 @@ class SegmentationNode:
         self.base_frame, self.depth_scale, self.patience = base_frame, depth_scale, patience
         self.counts = Counts()
         self.tree = tree or TransformTree()
-        self._sync = Synchronizer(("rgb", "depth", "info"), round(slop * NANOSECONDS))
+        self._sync = Synchronizer(("rgb", "depth", "info"), round(slop * NANOSECONDS), queue)
         self._pending: tuple[dict, float] | None = None
         self._news = threading.Condition()
         transport.on_restart(self.restart)
