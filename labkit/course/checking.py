@@ -83,9 +83,10 @@ def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:
 
 
 def program_here(question: Question) -> Program | None:
-    """The program of an answer among the cells that were run in this notebook; None outside of one.
+    """The program of an answer among the cells that were run in this notebook.
 
-    Other blanks that it calls are the student's, or the kit's where a check has put that in their place.
+    None outside of a notebook, and where the kernel's history does not have the answer: nbval keeps none. Other blanks
+    that it calls are the student's, or the kit's where a check has put that in their place.
     """
     shell = jupyter()
     if shell is None:
@@ -93,7 +94,8 @@ def program_here(question: Question) -> Program | None:
     cells = [Cell(source) for source in shell.history_manager.input_hist_raw]
     blanks = of_topic(question.topic)
     given = {name: other.source for name, other in blanks.items() if shell.user_ns.get(name) is other.reference}
-    return program(cells, question.function, blanks, PACKAGES, question.forbidden, given, latest=True)
+    cut = program(cells, question.function, blanks, PACKAGES, question.forbidden, given, latest=True)
+    return None if cut.refused.startswith("no cell defines") else cut
 
 
 def jupyter() -> object | None:
