@@ -1,12 +1,11 @@
-"""What the MATLAB listing does, step by step: labels with scores, a montage, the cloud of a mask (topic 09)."""
+"""What the MATLAB listing does before it makes a cloud: labels with scores, and a montage (topic 09)."""
 
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Bool, Float, Real, UInt8
+from jaxtyping import Bool, Float, UInt8
 
-from labkit.geometry import back_project, transform_points
-from labkit.support.validation import check_K, check_rgb, check_same_size, check_shape, check_T
+from labkit.support.validation import check_rgb, check_same_size, check_shape
 
 
 def semanticseg(
@@ -33,21 +32,3 @@ def montage(rgb: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> U
     check_same_size("rgb", check_rgb("rgb", rgb), "mask", check_shape("mask", mask, (None, None)))
     white = np.where(mask[..., None], 255, 0).astype(np.uint8)
     return np.hstack([rgb, np.repeat(white, 3, axis=2)])
-
-
-def cloud_of_mask(
-    mask: Bool[np.ndarray, "H W"],
-    depth: Float[np.ndarray, "H W"],
-    K: Real[np.ndarray, "3 3"],
-    T_base_cam: Real[np.ndarray, "4 4"],
-) -> Float[np.ndarray, "N 3"]:
-    """Back-project a mask to the base frame, metres, in the order of MATLAB's find: column by column.
-
-    Pixels without depth are left out, which the listing forgets: they would all lie in the camera. Otherwise the points
-    are those of labkit.geometry.backproject_to_base. Raises ValueError for arguments that do not fit.
-    """
-    mask = check_shape("mask", mask, (None, None))
-    points = back_project(depth, check_K("K", K))
-    check_same_size("depth", points, "mask", mask)
-    u, v = np.nonzero(mask.T & (points[..., 2] > 0.0).T)
-    return transform_points(check_T("T_base_cam", T_base_cam), points[v, u])

@@ -9,13 +9,12 @@ from scipy import ndimage
 from sklearn.cluster import KMeans
 
 import data_gen
-from labkit.geometry import backproject_to_base
 from labkit.labels import OBSTACLE, SURFACE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.stacks import regions
 from labkit.stacks.blocks import Block, Diagram, perception_diagram
 from labkit.stacks.engines import open_engine
-from labkit.stacks.matlab import cloud_of_mask, montage, semanticseg
+from labkit.stacks.matlab import montage, semanticseg
 from labkit.stacks.small_fcn import SmallFCN, train_small_fcn
 from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, things_on_table
 
@@ -200,18 +199,6 @@ def test_a_montage_is_the_image_beside_its_mask(frames):
     assert np.array_equal(both[:, 160:], 255 * np.repeat(mask[..., None], 3, axis=2).astype(np.uint8))
 
 
-def test_the_cloud_of_a_mask_is_the_kits_column_by_column(frames):
-    frame = frames[0]
-    depth = frame.depth.copy()
-    depth[::3, ::2] = 0.0
-    depth[1::5] = np.nan
-    cloud = cloud_of_mask(frame.labels == TARGET, depth, frame.K, frame.T_base_cam)
-    expected = backproject_to_base(frame.labels, depth, frame.K, frame.T_base_cam, TARGET)
-    v, u = np.nonzero((frame.labels == TARGET) & (depth > 0.0))  # row by row
-    assert len(cloud) == len(u) > 50
-    assert np.allclose(cloud, expected[np.lexsort([v, u])], atol=1e-6)
-
-
 def test_errata_a_png_holds_no_single_precision_metres(frames, tmp_path):
     """The listing reads "depth in meters stored as single" from a PNG: what comes back has lost the metres."""
     depth = np.full((4, 5), 0.734, np.float32)
@@ -299,7 +286,6 @@ def test_what_does_not_fit_is_named():
         (lambda: regions.learn_typical([mask]), "masks: expected at least five"),
         (lambda: montage(rgb, mask[:, :3]), "mask: expected the size of rgb"),
         (lambda: semanticseg(rgb, lambda rgb: rgb[0]), "net: expected shape"),
-        (lambda: cloud_of_mask(mask, np.ones((4, 5)), np.eye(3).T, np.ones((4, 4))), "T_base_cam"),
         (lambda: train_small_fcn([], []), "labels: expected one for each"),
         (lambda: train_small_fcn([rgb], [np.full((4, 5), 7)]), "labels: expected labels 0 to 3"),
         (lambda: diagram.run(b=1), "signals: expected a, got b"),

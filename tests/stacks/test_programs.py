@@ -13,7 +13,7 @@ from labkit.geometry import backproject_to_base
 from labkit.labels import SURFACE, TARGET
 from labkit.network import load_model, weights_path
 from labkit.stacks.engines import export, open_engine, segment_like_cpp
-from labkit.stacks.matlab import cloud_of_mask, montage, semanticseg
+from labkit.stacks.matlab import montage, semanticseg
 from labkit.stacks.threshold import fit_hsv, hsv_mask
 
 HERE = Path(__file__).parent
@@ -84,8 +84,9 @@ def test_octave_gives_the_labels_scores_montage_and_cloud_of_the_kit(network, fr
     both = read_image("montage", tmp_path / "montage.png", np.uint8, colour=True)
     assert np.array_equal(both, montage(frame.rgb, found == TARGET))
     cloud = np.fromfile(tmp_path / "cloud.bin").reshape(-1, 3)
-    expected = cloud_of_mask(found == TARGET, frame.depth, frame.K, frame.T_base_cam)
-    assert len(expected) > 100 and np.allclose(cloud, expected, atol=1e-5)
+    expected = backproject_to_base(found, frame.depth, frame.K, frame.T_base_cam, TARGET)
+    v, u = np.nonzero((found == TARGET) & (frame.depth > 0.0))  # row by row; MATLAB's find goes column by column
+    assert len(expected) > 100 and np.allclose(cloud, expected[np.lexsort([v, u])], atol=1e-5)
 
 
 @pytest.mark.debian("octave")
