@@ -51,7 +51,7 @@ def generate(
     sensor: DepthSensor | None = None,
     progress: bool = True,
 ) -> "Dataset":
-    """Write one frame a seed to the folder `out` and return the dataset.
+    """Write one frame per seed to the folder `out` and return the dataset.
 
     executor: any concurrent.futures.Executor, None for this process. sensor: how depth is spoilt, None for exact depth.
     Frames that an interrupted run left are kept, and the result is the same bytes. Raises ValueError if `out` holds

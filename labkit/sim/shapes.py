@@ -1,7 +1,7 @@
 """Triangle meshes of the things in a scene: parts built here, URDFs of pybullet_data read from their files.
 
 A mesh serves three readers: PyBullet (as an OBJ file whose groups become convex pieces), the scene sampler (how low and
-how wide does the object reach?), and whoever asks where a surface is. Metres.
+how wide does the object reach?), and tests (does a rendered point lie on the surface?). Metres.
 """
 
 import hashlib
@@ -144,7 +144,7 @@ _one_at_a_time = threading.Lock()
 
 @cache
 def _private_folder() -> tempfile.TemporaryDirectory:
-    """A folder that nobody else may enter, removed when the process ends."""
+    """A folder that no other user may enter, removed when the process ends."""
     return tempfile.TemporaryDirectory(prefix="labkit-")
 
 

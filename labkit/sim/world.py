@@ -17,7 +17,6 @@ from labkit.sim.kinematics import HOME, PANDA_URDF
 from labkit.sim.shapes import as_file, data_path, object_mesh, part_mesh, parts_as_obj, urdf_path
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
 from labkit.sim.textures import paint
-from labkit.support.validation import check_T
 
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7
@@ -253,7 +252,7 @@ class World:
             )
 
     def _settle(self, seconds: float) -> None:
-        """Step until everything rests, at most `seconds`; nobody observes this."""
+        """Step until everything rests, at most `seconds`; observers are not called."""
         for step in range(round(seconds / TIME_STEP)):
             self.client.stepSimulation()
             if step % 24 == 23 and all(self._rests(body) for body in self.bodies.values()):
@@ -281,7 +280,7 @@ def intrinsics(fov_y: float, width: int, height: int) -> Float[np.ndarray, "3 3"
 def view_matrix(T_base_cam: Float[np.ndarray, "4 4"]) -> list[float]:
     """OpenGL's view matrix, column by column: it maps base coordinates to a camera that looks along -z with y up."""
     T_gl_cam = np.diag([1.0, -1.0, -1.0, 1.0])
-    return (T_gl_cam @ np.linalg.inv(check_T("T_base_cam", T_base_cam))).T.ravel().tolist()
+    return (T_gl_cam @ np.linalg.inv(T_base_cam)).T.ravel().tolist()
 
 
 def metres(buffer: Float[np.ndarray, "H W"], near: float, far: float) -> Float[np.ndarray, "H W"]:
@@ -294,6 +293,7 @@ def metres(buffer: Float[np.ndarray, "H W"], near: float, far: float) -> Float[n
 
 
 def _pose_matrix(position, quaternion) -> Float[np.ndarray, "4 4"]:
+    """A pose as a matrix; SciPy's RigidTransform differs in the last bit, and scenes would settle to other bytes."""
     T = np.eye(4)
     T[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
     T[:3, 3] = position
@@ -309,7 +309,7 @@ def _bounds(thing: ObjectSpec) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray
 def _volume_and_centroid(mesh) -> tuple[float, Float[np.ndarray, "3"]]:
     """Volume and centroid of a closed mesh: the sum over tetrahedra from the origin to each triangle.
 
-    trimesh's own differ in the last bit, which is enough for a scene to settle to other bytes.
+    Not trimesh's, which differ in the last bit: scenes would settle to other bytes.
     """
     a, b, c = np.asarray(mesh.vertices)[mesh.faces].transpose(1, 0, 2)
     volumes = np.einsum("fi,fi->f", a, np.cross(b, c)) / 6.0
