@@ -239,6 +239,10 @@ class Dataset(Sequence):
         self.description = read_description(path)
         self._cameras = json.loads((self.path / "scene_camera.json").read_text())
 
+    def __repr__(self) -> str:
+        width, height = self.description["size"]
+        return f"Dataset({self.path}, {len(self)} frames of {self.description['config']}, {width} x {height})"
+
     def __len__(self) -> int:
         return len(self.description["seeds"])
 

@@ -180,14 +180,13 @@ class Pipeline:
         self, labels: UInt8[np.ndarray, "H W"], points: Float[np.ndarray, "H W 3"], table_z: float
     ) -> tuple[list[Integer[np.ndarray, "_"]], list[Float[np.ndarray, "_ 3"]], Float[np.ndarray, "M 3"]]:
         """Find each target's pixels (indices v * W + u) and points, and all points of the workspace."""
-        from labkit.support.geometry_kernels import points_in_box  # numba takes its time to import
-
-        low, high = self.workspace.T + np.outer([1.0, 1.0], [0.0, 0.0, table_z])
-        points = np.ascontiguousarray(points).reshape(-1, 3)
-        pixels = np.flatnonzero(labels == self.target_class)
-        pixels = pixels[((points[pixels] > low) & (points[pixels] < high)).all(axis=1)]  # NaN lies nowhere
+        points = points.reshape(-1, 3)
+        low, high = (self.workspace.T + np.outer([1.0, 1.0], [0.0, 0.0, table_z])).astype(points.dtype)
+        inside = [(x > a) & (x < b) for x, a, b in zip(points.T, low, high, strict=True)]
+        inside = np.logical_and.reduce(inside)  # NaN lies nowhere
+        pixels = np.flatnonzero(inside & (labels.ravel() == self.target_class))
         each = [pixels[group] for group in self.split(points[pixels])]
-        return each, [points[chosen] for chosen in each], points_in_box(points, low, high)
+        return each, [points[chosen] for chosen in each], points.compress(inside, axis=0)
 
     def plan(
         self,

@@ -41,6 +41,10 @@ class MotionPlan:
     descent: Float[np.ndarray, "_ 7"]
     lift: Float[np.ndarray, "_ 7"]
 
+    def __repr__(self) -> str:
+        x, y, z = self.T_base_grasp[:3, 3]
+        return f"MotionPlan(to ({x:.3f}, {y:.3f}, {z:.3f}) in {len(self.transit)} leg(s), down, and up)"
+
 
 def plan_grasp(
     T_base_grasp: Float[np.ndarray, "4 4"],

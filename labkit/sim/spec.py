@@ -171,6 +171,9 @@ class SceneSpec:
                     f"{self.table.centre}, got position {thing.position}"
                 )
 
+    def __repr__(self) -> str:
+        return f"SceneSpec({self.config}, seed {self.seed}: {', '.join(thing.name for thing in self.objects)})"
+
     def class_counts(self) -> dict[str, int]:
         """How many objects there are of each class name."""
         return {CLASSES[c]: sum(thing.class_id == c for thing in self.objects) for c in (TARGET, OBSTACLE)}

@@ -86,18 +86,6 @@ def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footpri
     return out
 
 
-@njit(cache=True)
-def points_in_box(points, low, high):
-    """Keep the points (N, 3) that lie inside a box with sides along the axes; NaN lies nowhere."""
-    kept = np.empty_like(points)
-    n = 0
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        kept[n, 0], kept[n, 1], kept[n, 2] = x, y, z
-        n += (low[0] < x < high[0]) & (low[1] < y < high[1]) & (low[2] < z < high[2])
-    return kept[:n]
-
-
 def sort_into_cells(P, reach):
     """Sort the points of a cloud (N, 3) into cubes, so that points within `reach` are in the same or in nearby cubes.
 

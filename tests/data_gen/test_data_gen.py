@@ -161,6 +161,7 @@ def test_statistics_of_test_are_as_promised():
 def test_a_dataset_reads_back_as_the_frames_that_were_rendered(undisturbed):
     frames = data_gen.load(undisturbed)
     assert len(frames) == 6 and len(frames[1:3]) == 2
+    assert repr(frames) == f"Dataset({undisturbed}, 6 frames of test, 80 x 60)"
     for index in (0, -1):
         spec = data_gen.sample_scene(range(6)[index], "test")
         with World(spec) as world:

@@ -274,6 +274,7 @@ def test_no_plan_is_a_reason_in_words(T, width, reason):
 def test_plan_ends_on_the_grasp_and_moves_straight_down_and_up():
     T = top_down(0.52, -0.11, 0.03, 0.7)
     plan = planning.plan_grasp(T, 0.06, Q_HOME, NOTHING, 0.0)
+    assert repr(plan) == "MotionPlan(to (0.520, -0.110, 0.030) in 1 leg(s), down, and up)"
     assert np.array_equal(plan.transit[0][0], Q_HOME)
     assert np.array_equal(plan.transit[-1][-1], plan.descent[0]) and np.array_equal(plan.descent[-1], plan.lift[0])
     for path, low, high in ((plan.descent, 0.03, 0.13), (plan.lift, 0.03, 0.03 + planning.LIFT)):

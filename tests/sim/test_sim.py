@@ -153,6 +153,7 @@ def test_objects_come_to_rest_on_the_table():
 def test_a_scene_survives_json():
     spec = sample_scene(5, "hard")
     assert SceneSpec.from_json(spec.to_json()) == spec
+    assert repr(spec) == f"SceneSpec(hard, seed 5: {', '.join(thing.name for thing in spec.objects)})"
 
 
 def test_importing_labkit_needs_no_pybullet():
