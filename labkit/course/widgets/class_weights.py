@@ -25,7 +25,7 @@ def gaussian_scores(
     """Where two unit Gaussians at 0 and `distance` are decided alike, and what the rare class then scores.
 
     share: of the rare class, the one at `distance`; weights: of it, the other's is 1. Returns the boundaries, and
-    precision, recall and IoU of the rare class, one for each weight. Problem 5 of the text, continued.
+    precision, recall and IoU of the rare class, one for each weight. Topic 05.
 
     >>> x, precision, recall, overlap = gaussian_scores(2.0, 0.5, np.ones(1))
     >>> [round(float(value[0]), 3) for value in (x, precision, recall, overlap)]
@@ -113,8 +113,7 @@ def trained_masks(frames: Mapping[str, tuple[RGBDFrame, Float[np.ndarray, "H W C
 
     frames: title -> (frame with labels, the network's class probabilities). A weight w_c moves the optimum of training
     from p_c to one in proportion to w_c p_c, so that multiplying the probabilities of a network trained without weights
-    shows what one trained with them tends to. Raises ValueError without frames, or for one without labels. Problem 5
-    of the text.
+    shows what one trained with them tends to. Raises ValueError without frames, or for one without labels. Topic 05.
     """
     if not frames:
         raise ValueError("frames: expected at least one frame with its probabilities, got none")

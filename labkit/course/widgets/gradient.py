@@ -43,8 +43,7 @@ def draw_logits(figure: Figure, z0: float, z1: float, z2: float, y: int, h: floa
 def logits(z: tuple[float, float, float] = (2.0, 1.0, -1.0), y: int = 1) -> Explorer:
     """Move three logits and see probabilities, the gradient p - y, and the gradient as differences measure it.
 
-    z: where the sliders start; y: the true class, 0 to 2. The step h of the differences has a slider too. Problem 1
-    of the text.
+    z: where the sliders start; y: the true class, 0 to 2. The step h of the differences has a slider too. Topic 03.
 
     >>> explorer = logits()
     >>> explorer.controls["z1"].value = 5.0
@@ -67,7 +66,7 @@ def keyhole(
     """Look at an image as a network does that sees `width` pixels round each pixel, and ask for the pixel's class.
 
     rgb, y: the image and its true labels. at: (u, v), column and row, where it starts. widths: receptive fields, in
-    pixels, to choose from. Raises ValueError if rgb and y differ in size or `at` is outside. Section 3 of the text.
+    pixels, to choose from. Raises ValueError if rgb and y differ in size or `at` is outside. Topic 03.
     """
     rgb, y = check_rgb("rgb", rgb), check_labels("y", y, len(CLASSES))
     check_same_size("rgb", rgb, "y", y)

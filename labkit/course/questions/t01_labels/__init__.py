@@ -1,7 +1,4 @@
-"""Questions of topic 01: labels from a renderer's mask, one-hot tensors, shares of the classes, resizing.
-
-Section 1 of the text.
-"""
+"""Questions of topic 01: labels from a renderer's mask, one-hot tensors, shares of the classes, resizing."""
 
 import numpy as np
 

@@ -1,7 +1,4 @@
-"""Questions of topic 03: softmax, cross-entropy, its gradient, the check by differences, and the receptive field.
-
-Sections 3 and 6 and problem 1 of the text.
-"""
+"""Questions of topic 03: softmax, cross-entropy, its gradient, the check by differences, and the receptive field."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Questions of topic 04: the confusion matrix and the scores that follow from it (section 3, problem 2 of the text)."""
+"""Questions of topic 04: the confusion matrix and the scores that follow from it."""
 
 import numpy as np
 

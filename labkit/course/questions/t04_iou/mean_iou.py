@@ -78,7 +78,7 @@ def accuracy(n_frames):
     return np.trace(n) / n.sum()
 
 
-@wrong(QUESTION, "The text's mean gives each class the same weight, not the weight of its pixels.")
+@wrong(QUESTION, "The mean IoU gives each class the same weight, not the weight of its pixels.")
 def weighted_by_frequency(n_frames):
     n = n_frames.sum(axis=0)
     return np.nansum(iou_of(n) * n.sum(axis=1)) / n.sum()

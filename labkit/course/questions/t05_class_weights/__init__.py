@@ -1,7 +1,4 @@
-"""Questions of topic 05: weights and their gradient, the two means, where training ends, and how to undo it.
-
-Sections 3 and 6 and problem 5 of the text.
-"""
+"""Questions of topic 05: weights and their gradient, the two means, where training ends, and how to undo it."""
 
 import numpy as np
 

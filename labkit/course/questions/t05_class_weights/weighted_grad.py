@@ -66,7 +66,7 @@ def grad_weights_in_the_softmax(z, y, w):
     return (q / q.sum(axis=-1, keepdims=True) - Y) * counted
 
 
-@wrong(QUESTION, "That is what PyTorch's mean does; here the loss is the text's sum.")
+@wrong(QUESTION, "That is what PyTorch's mean does; here the loss is the plain weighted sum.")
 def grad_over_sum_of_weights(z, y, w):
     return weighted_grad(z, y, w) / max(pixel_weights(y, w).sum(), 1e-9)
 

@@ -1,7 +1,4 @@
-"""Questions of topic 06: K, points from pixels, rigid transforms, the Jacobian, and what depth noise does to a height.
-
-Section 4 and problem 4 of the text.
-"""
+"""Questions of topic 06: K, points from pixels, rigid transforms, the Jacobian, and depth noise of a height."""
 
 import numpy as np
 

@@ -66,7 +66,7 @@ def spreads_alone(P):
     return P.mean(axis=0), np.diag(P.var(axis=0))
 
 
-@wrong(QUESTION, "The text's centroid is the mean; yours is the median, which another cloud of the same mean moves.")
+@wrong(QUESTION, "The centroid is the mean; yours is the median, which another cloud of the same mean moves.")
 def median_for_mean(P):
     centred = P - np.median(P, axis=0)
     return np.median(P, axis=0), centred.T @ centred / len(P)

@@ -41,7 +41,7 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "The text's C++ listing does this: how far apart in memory are two classes of one pixel?")
+@wrong(QUESTION, "Many C++ listings do this: how far apart in memory are two classes of one pixel?")
 def labels_as_nhwc(scores):
     _, C, H, W = scores.shape
     return scores.reshape(H, W, C).argmax(axis=-1)
