@@ -1,8 +1,9 @@
-"""The program in the sandbox: it runs the cells of one submission, calls its functions and sends numbers back.
+"""The program in the sandbox: it runs a student's program, calls its function and sends numbers back.
 
-It has the standard library and the packages that an answer may use, nothing of labkit. From the first cell on
-everything here is in the student's hands: the other end, `channel`, believes none of it. Requests come on stdin and
-replies go out on stdout, each with its length before it; a request is a pickle (it comes from the grader), a reply is:
+It has the standard library, the packages that an answer may use and the kit's tools that cut programs out of notebooks.
+It serves as a server that forks a child for each answer. From the first line of a student's on, everything in the child
+is in the student's hands: the other end, `channel`, believes none of it. Requests come through one pipe and replies go
+through another, each with its length before it; a request is a pickle (it comes from the grader), a reply is:
 
     V count dtype ndim shape ... data    an output: one value, or a tuple of `count`
     O                                    a piece of the program that ran
@@ -80,7 +81,7 @@ def as_array(value: object):
 class Session:
     """What a worker is asked to do: to cut programs out of a notebook, to run one, and to call its function."""
 
-    def __init__(self, tools: dict[str, str]):
+    def __init__(self, tools: dict):
         self.tools, self.namespace, self.pieces = tools, {"__name__": "__main__"}, []
 
     def answer(self, request: tuple) -> bytes:
@@ -99,7 +100,7 @@ class Session:
 
     def cut(self, cells: list[tuple[str, str]], asked: list[tuple]) -> bytes:
         """Cut programs out of a notebook's cells: (name, blanks, packages, forbidden, given) each. Nothing is run."""
-        program, shapes = (load(name, path) for name, path in sorted(self.tools.items()))
+        program, shapes = self.tools["program"], self.tools["shapes"]
         cells = [program.Cell(*cell) for cell in cells]
         found = []
         for arguments in asked:
@@ -126,6 +127,7 @@ class Session:
 
 def load(name: str, path: str):
     """Import a module of the kit's from its file; it needs the standard library alone."""
+    name = f"_{name}"
     spec = importlib.util.spec_from_file_location(name, path)
     sys.modules[name] = module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -175,7 +177,7 @@ class Only:
 
 
 def main(options: dict) -> None:
-    """Load the packages, then serve: through pipes of its own, or in a sandbox through a child for each pair of pipes.
+    """Load packages and tools, then serve: through pipes of its own, or in a sandbox through a child for each pair of pipes.
 
     No student's code runs in the server: a child is forked for each question and killed after it, so that what one
     answer does to its process is over before the next one begins.
@@ -183,11 +185,12 @@ def main(options: dict) -> None:
     sys.path += options["path"]
     for package in options["load"]:
         importlib.import_module(package)
+    tools = {name: load(name, path) for name, path in options["tools"].items()}
     if options["only"] is not None:  # no sandbox: this process is used once
         requests, replies = os.dup(0), os.dup(1)
         sys.meta_path.insert(0, Only(options["only"]))
         limit(options)
-        serve(requests, replies, options["tools"])
+        serve(requests, replies, tools)
         return
     control = socket.socket(fileno=os.dup(0))
     control.send(b"r")
@@ -200,7 +203,7 @@ def main(options: dict) -> None:
             control.close()
             limit(options)
             lock_in(options)
-            serve(*pipes, options["tools"])
+            serve(*pipes, tools)
             os._exit(0)
         for pipe in pipes:
             os.close(pipe)
@@ -246,7 +249,7 @@ def lock_in(options: dict) -> None:
         raise OSError(ctypes.get_errno(), "the filter of system calls cannot be set")
 
 
-def serve(requests: int, replies: int, tools: dict[str, str]) -> None:
+def serve(requests: int, replies: int, tools: dict) -> None:
     """Answer requests until there are no more. The first reply, O, says that the packages are loaded."""
     null = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1, 2):
