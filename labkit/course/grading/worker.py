@@ -177,7 +177,7 @@ class Only:
 
 
 def main(options: dict) -> None:
-    """Load packages and tools, then serve: through pipes of its own, or in a sandbox through a child for each pair of pipes.
+    """Load packages and tools, then serve: by pipes of its own, or in a sandbox by a child for each pair of pipes.
 
     No student's code runs in the server: a child is forked for each question and killed after it, so that what one
     answer does to its process is over before the next one begins.
