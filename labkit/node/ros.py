@@ -75,8 +75,8 @@ def run_ros_node(
     """Run the node until SIGINT: a network's weights, its number of classes, and the class to grasp.
 
     The version that tutorials print ignores the target class, depth, intrinsics and the camera's pose, and publishes a
-    mask alone; this one uses all of them. weights_path: as in `labkit.network.load_model`. table_z: height of the table in the base
-    frame, metres. crf: refine the labels. version: of ROS, 2 or 1. options: those of SegmentationNode, T_base_cam and
+    mask alone; this one uses all of them. weights_path: as in `labkit.network.load_model`. table_z: height of the table
+    in the base frame, metres. crf: refine the labels. version: of ROS, 2 or 1. options: those of SegmentationNode, T_base_cam and
     topics among them. Raises FileNotFoundError or ValueError for weights that cannot be used, ModuleNotFoundError
     without ROS.
     """
