@@ -29,7 +29,7 @@ from labkit.node.messages import (
 from labkit.pipeline import Pipeline
 
 ROOT = Path(__file__).parents[1]
-PATIENCE = 60.0  # seconds: only a failure waits so long
+PATIENCE = 120.0  # seconds: a node that starts beside a whole suite compiles slowly
 MS = 1_000_000
 KINDS = {"mask": Image, "cloud": PointCloud2, "grasp": Pose, "diagnostics": Diagnostics}
 MESSAGES = [
