@@ -144,8 +144,11 @@ def draw_height(axes, story: Story) -> None:
     """How high each pixel lies over the table, in centimetres: what depth and calibration tell, seen from anywhere."""
     centimetres = 100.0 * (story.perception.points[..., 2] - story.spec.table.z)
     shown = axes.imshow(centimetres, cmap="viridis", vmin=-2.0, vmax=12.0, interpolation="nearest")
-    axes.figure.colorbar(shown, ax=axes, orientation="horizontal", shrink=0.8, extend="both", label="cm")
-    axes.set_title("2  height over the table, from depth", loc="left")
+    bar = axes.inset_axes((0.2, 0.1, 0.6, 0.04))  # within the picture, so that the panels stay in a row
+    axes.figure.colorbar(shown, cax=bar, orientation="horizontal", extend="both", ticks=[0, 4, 8, 12])
+    bar.tick_params(colors="white", labelsize=8)
+    bar.set_title("height over the table (cm)", color="white", fontsize=8, pad=3)
+    axes.set_title("2  height, from depth", loc="left")
     axes.set_axis_off()
 
 
