@@ -45,7 +45,7 @@ def release(course: Path, topics: Sequence[str] = (), check: bool = False) -> li
     if unknown:
         raise ValueError(f"topics: expected some of {', '.join(solutions)}, got {', '.join(unknown)}")
     chosen = {topic: path for topic, path in solutions.items() if not topics or topic in topics}
-    lessons = [path for path in sorted(course.glob("lessons/*.ipynb")) if not topics or path.stem in topics]
+    lessons = [path for path in sorted(course.glob("lessons/*.ipynb")) if path.stem.startswith(tuple(topics) or "")]
     tidied = {path: to_bytes(tidy(read(path))) for path in (*lessons, *chosen.values())}
     made = {course / "labs" / topic: generate(path, tidied[path]) for topic, path in chosen.items()}
     left_over = [] if topics else [f for f in course.glob("labs/*") if f.is_dir() and f.name not in solutions]

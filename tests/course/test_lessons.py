@@ -1,0 +1,377 @@
+"""What makes a lesson readable and a lab worth doing, measured: minutes, new steps, numbers in prose, endings, words.
+
+Topics of which a rule does not hold yet stand in PENDING; a topic that stands there without need fails, too.
+"""
+
+import ast
+import re
+import subprocess
+import sys
+from collections import Counter
+from difflib import SequenceMatcher
+from functools import cache
+from itertools import chain
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from labkit.course.questions.question import TOPICS
+
+ROOT = Path(__file__).parents[2]
+LESSONS = sorted(ROOT.glob("lessons/*.ipynb"))
+SOLUTIONS = sorted(ROOT.glob("solutions/*/*.ipynb"))
+PENDING = {
+    "01": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "02": {"minutes", "lab minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "03": {"minutes", "lab minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "04": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "05": {"minutes", "lab minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "06": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "07": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "08": {"minutes", "lab minutes", "new steps", "marks", "ending", "schematic", "words"},
+    "09": {"minutes", "lab minutes", "new steps", "marks", "ending", "schematic"},
+}
+MOST_MINUTES, MOST_LAB_MINUTES, WORDS_PER_MINUTE, NEW = 50, 105, 200, 0.6
+
+
+@cache
+def notebook(path: Path):
+    """Read a notebook once."""
+    return nbformat.read(path, as_version=4)
+
+
+def topic_of(path: Path) -> str:
+    """The number of a notebook's topic."""
+    return path.stem[:2]
+
+
+def pending(rule: str, topic: str) -> bool:
+    """Whether a topic is excused from a rule."""
+    return rule in PENDING.get(topic, ())
+
+
+def holds(rule: str, paths: list[Path], complaints) -> None:
+    """Fail for the topics of which a rule does not hold, those excused that are pending; excused in vain fails, too."""
+    found = {}
+    for path in paths:
+        if said := complaints(path):
+            found.setdefault(topic_of(path), []).append(f"{path.relative_to(ROOT)}: {said}")
+    wrong = [line for topic, lines in found.items() if not pending(rule, topic) for line in lines]
+    assert not wrong, "\n".join(wrong)
+    done = sorted({topic_of(path) for path in paths if pending(rule, topic_of(path))} - found.keys())
+    assert not done, f"the rule {rule!r} holds for {done}: take it out of PENDING there"
+
+
+def prose(path: Path) -> str:
+    """All Markdown of a notebook."""
+    return "\n\n".join(cell.source for cell in notebook(path).cells if cell.cell_type == "markdown")
+
+
+def section(path: Path, title: str) -> str:
+    """The text under a heading, up to the next heading."""
+    found = re.search(rf"^##+ {title}\s*$(.*?)(?=^##+ |\Z)", prose(path), re.MULTILINE | re.DOTALL)
+    return found[1] if found else ""
+
+
+# ------------------------------------------------------------------------------------------------ minutes
+
+
+def minutes(path: Path) -> float:
+    """Minutes that a lesson takes: 200 words per minute, one minute per code cell.
+
+    A formula is a word. Folded answers count. What to read next is a list to look things up in, and does not.
+    """
+    text = prose(path).replace(section(path, "Read next"), " ")
+    text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$|```.*?```", " formula ", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->|<[^<>\n]+>|\]\([^)]*\)", " ", text, flags=re.DOTALL)
+    words = re.findall(r"[^\W_]+(?:['.,-][^\W_]+)*", text)
+    cells = [cell for cell in notebook(path).cells if cell.cell_type == "code" and cell.source.strip()]
+    return len(words) / WORDS_PER_MINUTE + len(cells)
+
+
+def test_a_lesson_is_read_in_fifty_minutes_and_says_so():
+    def complaint(path: Path) -> str:
+        needed, first = minutes(path), "\n".join(cell.source for cell in notebook(path).cells[:3])
+        said = [int(number) for number in re.findall(r"(\d+) minutes", first)]
+        if needed > MOST_MINUTES:
+            return f"takes {needed:.0f} minutes"
+        return "" if said and abs(said[0] - needed) <= 5 else f"takes {needed:.0f} minutes, says {said[:1]}"
+
+    holds("minutes", LESSONS, complaint)
+
+
+def test_a_labs_minutes_are_the_sum_of_its_tasks():
+    """Each task's heading says "(N minutes"; what the first cells say of the whole is their sum."""
+
+    def complaint(path: Path) -> str:
+        tasks = [int(n) for n in re.findall(r"^##+ .*\((\d+) minutes", prose(path), re.MULTILINE)]
+        first = "\n".join(cell.source for cell in notebook(path).cells[:3] if cell.cell_type == "markdown")
+        said = [int(n) for n in re.findall(r"(\d+) minutes in all", first)]
+        if sum(tasks) > MOST_LAB_MINUTES or said != [sum(tasks)]:
+            return f"tasks {tasks} add up to {sum(tasks)}, the beginning says {said} minutes in all"
+        return ""
+
+    holds("lab minutes", SOLUTIONS, complaint)
+
+
+# ---------------------------------------------------------------------------------------------- new steps
+
+
+def tokens(node: ast.AST) -> list[str]:
+    """A piece of code as a sequence of its nodes' types; all names are alike, and so are all constants.
+
+    Names of methods and of functions in modules stay (`.argmin`): they are the operations.
+    """
+    if isinstance(node, ast.expr_context):
+        return []
+    if isinstance(node, ast.Name | ast.arg):
+        return ["name"]
+    if isinstance(node, ast.Constant):
+        return ["constant"]
+    own = [] if isinstance(node, ast.Expr) else [type(node).__name__]
+    own = [f".{node.attr}"] if isinstance(node, ast.Attribute) else own
+    return own + [token for child in ast.iter_child_nodes(node) for token in tokens(child)]
+
+
+def runs(source: str) -> set[tuple[str, ...]]:
+    """All runs of statements of a cell: of its own, and of each body in it; docstrings are left out."""
+    found = set()
+    for node in ast.walk(ast.parse(re.sub(r"^[!%].*$", "pass", source, flags=re.MULTILINE))):
+        body = node.body if isinstance(getattr(node, "body", None), list) else []
+        lines = [tokens(s) for s in body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
+        found |= {tuple(chain(*lines[i:j])) for i in range(len(lines)) for j in range(i + 1, len(lines) + 1)}
+    return found
+
+
+@cache
+def lesson_runs() -> frozenset[tuple[str, ...]]:
+    """All runs of statements of all cells of all lessons."""
+    cells = [cell.source for path in LESSONS for cell in notebook(path).cells if cell.cell_type == "code"]
+    return frozenset().union(*map(runs, cells))
+
+
+counted = cache(Counter)
+
+
+def similarity(piece: tuple[str, ...], others: frozenset[tuple[str, ...]]) -> float:
+    """How like a piece of code is to the likest of others: difflib's ratio of the sequences of nodes, at least 0.5.
+
+    Sequences that share too few tokens in any order are left out first.
+    """
+    best, shared, count = 0.5, [], Counter(piece)
+    for other in others:
+        total = len(piece) + len(other)
+        if 2 * min(len(piece), len(other)) > best * total:
+            there = counted(other)
+            common = sum(min(n, there[token]) for token, n in count.items())
+            shared.append((2 * common / total, other))
+    for bound, other in sorted(shared, reverse=True):
+        if bound <= best:
+            break
+        best = max(best, SequenceMatcher(None, piece, other, autojunk=False).ratio())
+    return best
+
+
+def answers(path: Path) -> dict[str, str]:
+    """The autograded answers of a solution: function -> source of its cell."""
+    return {
+        cell.metadata.nbgrader.grade_id: cell.source
+        for cell in notebook(path).cells
+        if cell.cell_type == "code" and cell.metadata.get("nbgrader", {}).get("solution")
+    }
+
+
+def likeness(function: str, source: str) -> float:
+    """How like an answer is to the likest lines of a lesson."""
+    (node,) = [n for n in ast.parse(source).body if isinstance(n, ast.FunctionDef) and n.name == function]
+    return similarity(tuple(token for statement in node.body[1:] for token in tokens(statement)), lesson_runs())
+
+
+def test_half_of_a_labs_points_ask_for_a_step_that_no_lesson_shows():
+    """A blank is new if no run of statements of a lesson is as like as 0.6; its solution begins "# New step: ..."."""
+
+    def complaint(path: Path) -> str:
+        cells = notebook(path).cells
+        points = {c.metadata.nbgrader.grade_id: c.metadata.nbgrader.points for c in cells
+                  if c.metadata.get("nbgrader", {}).get("grade")}  # fmt: skip
+        like = {name: likeness(name, source) for name, source in answers(path).items()}
+        new = {name for name, source in answers(path).items() if re.search(r"# New step: .{20,}", source)}
+        said = [
+            f"{name} says that it is new and is {like[name]:.2f} like a lesson" for name in new if like[name] >= NEW
+        ]
+        got = sum(points[f"check_{name}"] for name in new)
+        if 2 * got < sum(points.values()):
+            said.append(f"{got} of {sum(points.values())} points are new steps; likeness "
+                        + ", ".join(f"{name} {value:.2f}" for name, value in like.items()))  # fmt: skip
+        return "; ".join(said)
+
+    holds("new steps", SOLUTIONS, complaint)
+
+
+def test_likeness_sees_through_names_and_numbers_and_not_through_operations():
+    lesson = runs("def f(z):\n    e = np.exp(z - 3)\n    return e / e.sum()\nprint(f(2))")
+    copied, other = "a = np.exp(b - 7)\nreturn a / a.sum()", "a = np.sort(b)[::-1]\nreturn a[:3].mean() + a.std()"
+    pieces = [tuple(token for s in ast.parse(f"def g(b):\n {t.replace(chr(10), chr(10) + ' ')}").body[0].body
+                    for token in tokens(s)) for t in (copied, other)]  # fmt: skip
+    assert similarity(pieces[0], lesson) == 1.0 and similarity(pieces[1], lesson) < NEW
+
+
+# ---------------------------------------------------------------------------------------- numbers in prose
+
+NUMBER = r"(?<![\w.])-?\d+(?:,\d{3})*(?:\.\d+)?(?:e-?\d+)?"
+MARK = re.compile(rf"({NUMBER})\s?(\\?%)?[$*_)`\s]{{0,3}}<!--=\s*([0-9a-f]{{4,8}})?\s*(?::\s*([^>]*?))?\s*-->")
+
+
+def value(text: str) -> float:
+    """A number as prose or an output writes it."""
+    return float(text.replace(",", ""))
+
+
+def printed(cell) -> str:
+    """What a cell printed or gave as text."""
+    outputs = cell.get("outputs", [])
+    return "\n".join(o.get("text") or o.get("data", {}).get("text/plain", "") for o in outputs)
+
+
+def numbers(text: str) -> list[str]:
+    """The numbers of an output, as written."""
+    return re.findall(NUMBER, text)
+
+
+def shows(text: str, number: str, percent: bool, formula: str | None) -> bool:
+    """Whether an output holds a number of prose, rounded as the prose has it; formula: of numbers of the output."""
+    digits = len(number.partition(".")[2])
+    there = [value(n) for n in numbers(text)]
+    if formula:
+        assert re.fullmatch(r"[\d\s.+*/()e-]+", formula), formula
+        used = [value(n) for n in re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", formula)]
+        if any(n not in there and n not in (1, 2, 100) for n in used):
+            return False
+        there = [eval(formula)]
+    candidates = there + [100 * n for n in there] if percent else there
+    return any(abs(abs(n) - abs(value(number))) <= 0.5000001 * 10**-digits for n in candidates)
+
+
+def marked_wrong(path: Path) -> list[str]:
+    """Marked numbers of prose that their output does not show, and numbers of the last output that are not marked."""
+    last, ids, found = "", {}, []
+    for cell in notebook(path).cells:
+        ids[cell.id] = printed(cell)
+    for cell in notebook(path).cells:
+        if cell.cell_type == "code":
+            last = printed(cell) if re.search(r"\d", printed(cell)) else last
+            continue
+        for number, percent, identity, formula in MARK.findall(cell.source):
+            of = last if not identity else "\n".join(text for name, text in ids.items() if name.startswith(identity))
+            if not shows(of, number, bool(percent), formula):
+                found.append(f"{number} {formula} is not in {of.strip()[:200]!r}")
+        no_prose = r"\$\$.*?\$\$|\$[^$\n]+\$|```.*?```|`[^`\n]*`|\]\([^)]*\)|<summary>.*?</summary>"
+        bare = re.sub(no_prose, " ", cell.source, flags=re.DOTALL)
+        unmarked = re.findall(rf"({NUMBER})(?![\w.,]*\d)(?!\s?%?[$*_)`\s]{{0,3}}<!--=)", bare)
+        long = [n for n in unmarked if len(re.sub(r"\D", "", n).lstrip("0")) >= 3]
+        found += [f"{n} is not marked" for n in long if n in numbers(last)]
+    return found
+
+
+def test_numbers_of_prose_are_those_of_the_outputs():
+    """docs/style.md says how they are marked. Each lesson has some; of the last output those of three digits."""
+
+    def complaint(path: Path) -> str:
+        few = [] if len(MARK.findall(prose(path))) >= 3 else ["fewer than three marked numbers"]
+        return "; ".join([*marked_wrong(path), *few])
+
+    holds("marks", LESSONS, complaint)
+
+
+@pytest.mark.parametrize(
+    "text, right",
+    [
+        ("IoU 0.62<!--=-->", True),
+        ("IoU 0.63<!--=-->", False),
+        ("$E = 0.616$<!--=-->", True),
+        ("62 %<!--=-->", True),
+        ("1,250<!--=--> pixels", True),
+        ("twice **1.232<!--=: 2 * 0.616-->**", True),
+        ("1.3<!--=: 2 * 0.65-->", False),
+    ],
+)
+def test_a_mark_is_compared(text, right):
+    ((number, percent, _, formula),) = MARK.findall(text)
+    assert shows("IoU [0.616 0.9], of 1250 pixels", number, bool(percent), formula) == right
+
+
+# -------------------------------------------------------------------------------------- endings, schematics
+
+
+def test_a_lesson_ends_with_a_recap_five_questions_and_what_to_read():
+    """Headings `## Recap` (a quoted box), `## Test yourself` (five folded answers), `## Read next` (works by name)."""
+
+    def complaint(path: Path) -> str:
+        recap, test, read = (section(path, title) for title in ("Recap", "Test yourself", "Read next"))
+        said = [] if len(re.findall(r"^> \S", recap, re.MULTILINE)) >= 3 else ["no recap box of three lines or more"]
+        said += [] if test.count("<details") == 5 else [f"{test.count('<details')} questions with folded answers"]
+        works = re.findall(r"^- .*(?:\*|\").*(?:19|20)\d\d", read, re.MULTILINE)
+        said += [] if len(works) >= 3 else [f"{len(works)} works by author, title and year to read next"]
+        return "; ".join(said)
+
+    holds("ending", LESSONS, complaint)
+
+
+def test_each_lesson_opens_with_a_schematic():
+    def complaint(path: Path) -> str:
+        first = "\n".join(cell.source for cell in notebook(path).cells[:8] if cell.cell_type == "markdown")
+        shown = re.findall(r"!\[([^\]]{40,})\]\((schematics/\w+\.svg)\)", first)
+        return "" if shown and all((path.parent / file).is_file() for _, file in shown) else "none, or not described"
+
+    holds("schematic", LESSONS, complaint)
+
+
+def test_the_schematics_are_as_the_code_beside_them_draws_them():
+    done = subprocess.run([sys.executable, "lessons/schematics", "--check"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    shown = {file for path in LESSONS for file in re.findall(r"\((schematics/\w+\.svg)\)", prose(path))}
+    drawn = {path.relative_to(ROOT / "lessons").as_posix() for path in ROOT.glob("lessons/schematics/*.svg")}
+    assert not [name for name in drawn - shown if not pending("schematic", Path(name).name[:2])]
+
+
+# -------------------------------------------------------------------------------------------------- words
+
+THINGS = "frames?|images?|scenes?|pixels?|points?|bytes?|times?|steps?|grasps?|lifts?|labels?|scores?|numbers?|costs?"
+THINGS += "|weights?|bits?|metres|radians|minutes|seconds|ms|milliseconds|messages?|loss|nanosecond"
+ONE = "second|minute|hour|frame|image|scene|pixel|class|object|question|topic|lesson|lab|case|student|row|cell|task"
+ONE += "|pair|step|epoch|message|layer|channel"
+REFUSED = {
+    rf"\b(?:{THINGS}) an? (?:{ONE})\b": "per",
+    r"(?:^|[.?!]\s+)Who (?:minimises|wants|reads|looks|sees)\b": "whoever",
+    r"\bis no number\b": "is not a number",
+    r"\bthe other way round than\b": "the opposite of",
+    r"\bas is only\b": "only",
+    r"\bnobody can \w+ for himself\b": "say who does what",
+    r"\b[Oo]f course\b|\b[Ss]imply\b|\b[Oo]bviously\b|\b[Tt]rivially\b": "leave it out",
+    r"\bthe text(?:'s| says| has| asks| writes)\b": "the formula itself",
+    r"\b[Uu]tili[sz]e|\b[Ii]n order to\b|w\.r\.t\.|\baka\b|\betc\.": "use, to, with respect to, also called, and so on",
+}  # fmt: skip
+
+
+def refused(text: str) -> list[str]:
+    """The words of a text that docs/style.md refuses."""
+    text = re.sub(r"```.*?```|`[^`\n]*`|\$\$.*?\$\$|\$[^$\n]*\$|<[^<>]*>|\]\([^)]*\)", " ", text, flags=re.DOTALL)
+    return [f"{found[0].strip()!r}: {advice}" for rule, advice in REFUSED.items() for found in re.finditer(rule, text)]
+
+
+def test_notebooks_and_pages_use_none_of_the_refused_words():
+    holds("words", [*LESSONS, *SOLUTIONS], lambda path: "; ".join(refused(prose(path))))
+    pages = [ROOT / "README.md", *{*ROOT.glob("docs/*.md")} - {ROOT / "docs/style.md"}]
+    assert not [f"{page.name}: {word}" for page in pages for word in refused(page.read_text())]
+
+
+@pytest.mark.parametrize(
+    "wrong", ["ten frames a second", "one score a class", "Who wants more reads on.", "It is simply so."]
+)
+def test_a_refused_word_is_found(wrong):
+    assert refused(wrong) and not refused("ten frames per second, a class of its own, whoever wants more; see `etc.`")
+
+
+def test_every_topic_has_a_lesson_and_a_solution():
+    assert {topic_of(path) for path in LESSONS} == {topic_of(path) for path in SOLUTIONS} == {t[:2] for t in TOPICS}
