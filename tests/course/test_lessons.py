@@ -82,7 +82,7 @@ def minutes(path: Path) -> float:
 
     A formula is a word. Folded answers count. What to read next is a list to look things up in, and does not.
     """
-    text = prose(path).replace(section(path, "Read next"), " ")
+    text = prose(path).replace(section(path, "Read next") or "\0", " ")
     text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$|```.*?```", " formula ", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->|<[^<>\n]+>|\]\([^)]*\)", " ", text, flags=re.DOTALL)
     words = re.findall(r"[^\W_]+(?:['.,-][^\W_]+)*", text)
