@@ -126,17 +126,25 @@ class Ros1Transport(Transport):
         name, uri = self._rospy.get_name(), self._rospy.get_node_uri()
         master = xmlrpc.client.ServerProxy(ros("rosgraph").get_master_uri())
         itself = xmlrpc.client.ServerProxy(uri)
-        while not self._closing.wait(CHECK_SECONDS):
+        while not self._closing.wait(CHECK_SECONDS) and not self._rospy.is_shutdown():
             try:
-                known, _, _ = master.lookupNode(name, name)
-                if known == 1:
-                    continue
-                logger.warning("the ROS master does not know %s (was it restarted?); registering again", name)
-                for publisher in tuple(self._publishers.values()):
+                # Topic by topic: a new master may have heard of some already, from rospy, if they are new, too.
+                _, _, (published, subscribed, _) = master.getSystemState(name)
+                publishers = _unknown(name, self._publishers, published)
+                subscribers = _unknown(name, self._subscribers, subscribed)
+                if publishers or subscribers:
+                    logger.warning("the ROS master does not know %s (was it restarted?); registering again", name)
+                for publisher in publishers:
                     master.registerPublisher(name, publisher.resolved_name, publisher.type, uri)
-                for subscriber in tuple(self._subscribers.values()):
+                for subscriber in subscribers:
                     topic = subscriber.resolved_name
                     _, _, sources = master.registerSubscriber(name, topic, subscriber.type, uri)
                     itself.publisherUpdate("/master", topic, sources)
-            except (OSError, xmlrpc.client.Error):
-                continue  # the master is away: nodes that know each other go on without it
+            except Exception as error:  # the master is away, or went in the middle of a word: nodes go on without it
+                logger.debug("the ROS master: %s", error)
+
+
+def _unknown(name: str, edges: dict, state: list) -> list:
+    """Those publishers or subscribers of a node that are missing in a master's list of topics, each with its nodes."""
+    known = {topic for topic, nodes in state if name in nodes}
+    return [edge for edge in tuple(edges.values()) if edge.resolved_name not in known]

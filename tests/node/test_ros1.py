@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import xmlrpc.client
 
 import numpy as np
@@ -166,16 +167,33 @@ def test_without_a_master_it_waits_and_sigint_ends_it_with_status_0(tester):
 
 
 @pytest.fixture
-def living_master(tester, port):
-    """A master for the tests after the one that ended the first."""
-    if listens(port):
+def new_master(tester, port):
+    """Another master than the one that the tester found when it began."""
+    tester.master.kill()
+    tester.master.wait()
+    wait_for(lambda: not listens(port), "the master's end")
+    with master(port):
         yield
-    else:
-        with master(port):
-            yield
 
 
-def test_from_camera_topic_to_lift_over_ros(tester, living_master):
+def test_a_new_master_learns_all_topics_from_a_node_that_told_it_one(tester, monkeypatch, request):
+    """The node subscribes to something before it has noticed that the master is another one."""
+    monkeypatch.setattr(ros1, "CHECK_SECONDS", 2.0)
+    time.sleep(0.5)  # from here on it looks every two seconds
+    request.getfixturevalue("new_master")
+    tester.transport.subscribe("late", Image, print)
+    edges = (*tester.transport._publishers.values(), *tester.transport._subscribers.values())
+    wait_for(lambda: known_topics("/tester") == {edge.resolved_name for edge in edges}, "all topics")
+
+
+def known_topics(node: str) -> set[str]:
+    """What the master knows of a node."""
+    with xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        published, subscribed, _ = master.getSystemState("/test")[2]
+    return {topic for topic, nodes in published + subscribed if node in nodes}
+
+
+def test_from_camera_topic_to_lift_over_ros(tester, new_master):
     """Topic 08's diagram over a real master: camera and arm here, the text's run_ros_node in another process."""
     spec = data_gen.sample_scene(0, "test")
     code = (
