@@ -25,7 +25,8 @@ class SceneConfig:
 
     Ranges are (low, high): distance in metres, elevation in radians above the table (several ranges are drawn from with
     equal chance), roll about the line of sight up to so many radians. hard: object proportions and models that training
-    never sees. wide: every other object is of `data_gen.wide`'s proportions.
+    never sees. wide: every other object is of `data_gen.wide`'s proportions. fov_y: of the camera, radians. renderer:
+    as in `labkit.sim.spec.Camera`.
     """
 
     stream: int
@@ -37,6 +38,8 @@ class SceneConfig:
     roll: float = 0.15
     targets: tuple[int, int] = (1, 3)
     obstacles: tuple[int, int] = (3, 8)
+    fov_y: tuple[float, float] = (0.55, 0.85)
+    renderer: str = "tiny"
 
 
 CONFIGS = {
@@ -56,6 +59,9 @@ CONFIGS = {
         roll=0.35,
         obstacles=(3, 9),
     ),
+    "other": SceneConfig(
+        stream=4, elevations=((1.20, 1.50),), distance=(0.45, 0.75), roll=3.1, fov_y=(0.95, 1.25), renderer="egl"
+    ),
 }
 
 
@@ -63,7 +69,8 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     """Draw a scene; the same seed and config give the same scene.
 
     config: "train", "test" (the same distribution, other scenes), "hard" (shapes, textures and viewpoints that are not
-    in train) or "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data).
+    in train), "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data) or
+    "other" (test's objects as another camera sees them: from overhead, wide-angled, drawn by another renderer).
     Raises ValueError for a negative seed or an unknown config.
 
     >>> spec = sample_scene(7, "test")
@@ -144,7 +151,8 @@ def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects
             azimuth=azimuth,
             elevation=rng.uniform(low, high),
             roll=rng.uniform(-kind.roll, kind.roll),
-            fov_y=float(rng.uniform(0.55, 0.85)),
+            fov_y=float(rng.uniform(*kind.fov_y)),
+            renderer=kind.renderer,
         )
         T_cam_base = np.linalg.inv(np.array(camera.T_base_cam))
         P_cam = targets @ T_cam_base[:3, :3].T + T_cam_base[:3, 3]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labkit.frame import RGBDFrame
-from labkit.geometry.sensor import DepthSensor, perturbed
+from labkit.geometry.sensor import DepthSensor, StereoSensor, perturbed
 
 
 def test_the_sensors_noise_grows_with_the_square_of_depth():
@@ -37,3 +37,23 @@ def test_a_perturbed_frame_has_a_pose_that_is_off_by_what_it_says_and_a_sensors_
     assert 0.0005 < np.abs(seen.depth[seen.depth > 0.0] - 1.0).mean() < 0.003
     again = perturbed(frame, np.random.default_rng(seed), metres=0.01, degrees=2.0)
     assert np.array_equal(again.depth, seen.depth) and np.array_equal(again.T_base_cam, seen.T_base_cam)
+
+
+def test_a_stereo_sensor_loses_what_its_right_camera_cannot_see():
+    """Left of something nearer it is blind for as many pixels as the two disparities differ."""
+    K = np.array([[200.0, 0.0, 80.0], [0.0, 200.0, 5.0], [0.0, 0.0, 1.0]])
+    depth = np.full((10, 160), 1.0, np.float32)
+    depth[:, 90:120] = 0.5  # disparities 10 and 20 pixels
+    frame = RGBDFrame(np.zeros((10, 160, 3), np.uint8), depth, K, np.eye(4))
+    seen = StereoSensor(noise=0.0).apply(frame, np.random.default_rng(0)).depth
+    assert (np.flatnonzero(seen[4] == 0.0) == np.arange(80, 90)).all()
+    assert seen[seen > 0.0] == pytest.approx(depth[seen > 0.0])
+
+
+def test_a_stereo_sensor_errs_with_the_square_of_depth():
+    K = np.array([[200.0, 0.0, 80.0], [0.0, 200.0, 5.0], [0.0, 0.0, 1.0]])
+    errors = []
+    for d in (0.5, 1.0):
+        frame = RGBDFrame(np.zeros((300, 300, 3), np.uint8), np.full((300, 300), d, np.float32), K, np.eye(4))
+        errors.append(np.std(StereoSensor(step=1e-6).apply(frame, np.random.default_rng(0)).depth))
+    assert errors[1] / errors[0] == pytest.approx(4.0, rel=0.02)

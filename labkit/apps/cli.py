@@ -97,7 +97,7 @@ def train(
 def evaluate(
     scenes: Annotated[int, typer.Option(help="How many scenes; each is one trial.", min=1)] = 100,
     first_seed: Annotated[int, typer.Option(help="Seed of the first scene; the others follow.", min=0)] = 900_000,
-    config: Annotated[Literal["test", "hard", "train"], typer.Option(help="Which kind of scenes.")] = "test",
+    config: Annotated[Literal["test", "hard", "other", "train"], typer.Option(help="Which kind of scenes.")] = "test",
     masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
         "predicted"
     ),

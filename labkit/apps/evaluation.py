@@ -12,7 +12,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from labkit.apps.trials import in_processes
-from labkit.geometry.sensor import perturbed
+from labkit.geometry.sensor import StereoSensor, perturbed
 from labkit.labels import CLASSES, TARGET
 from labkit.metrics import (
     boundary_counts,
@@ -50,10 +50,11 @@ class Trial:
 def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = False, perturb: bool = False) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
-    spec: a SceneSpec. model: as in Pipeline, or the path of weights; None for true masks. crf: refine the model's
-    labels. perturb: depth as a sensor measures it and a camera pose that is off (labkit.geometry.sensor.perturbed), the
-    same for every model. No reachable candidate is a failure, and so is lifting anything but a target. Only the score
-    reads the simulator's truth. Raises ValueError for a CRF on true masks.
+    spec: a SceneSpec; those of the config "other" are seen by another sensor, StereoSensor. model: as in Pipeline, or
+    the path of weights; None for true masks. crf: refine the model's labels. perturb: depth as a sensor measures it and
+    a camera pose that is off (labkit.geometry.sensor.perturbed), the same for every model. No reachable candidate is a
+    failure, and so is lifting anything but a target. Only the score reads the simulator's truth. Raises ValueError for
+    a CRF on true masks.
     """
     from labkit.sim.world import World  # PyBullet stays out of this module's import
 
@@ -66,6 +67,8 @@ def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = 
         start = time.perf_counter()
         frame = world.render(size)
         rendered = time.perf_counter()
+        if spec.config == "other":
+            frame = StereoSensor().apply(frame, np.random.default_rng([spec.seed, 3]))
         if perturb:
             frame = perturbed(frame, np.random.default_rng([spec.seed, 2]))
         perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)

@@ -49,6 +49,34 @@ class DepthSensor:
         return np.where(known & ~lost, np.maximum(noisy, 0.0), 0.0).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class StereoSensor:
+    """Two cameras side by side, `baseline` metres apart: they measure the disparity f * baseline / d, in pixels.
+
+    Disparity errs by `noise` pixels (standard deviation), alike over patches of so many pixels, and comes in whole
+    `step`s. What the right camera cannot see behind something nearer gets no reading. No network was trained with it.
+    """
+
+    baseline: float = 0.05
+    noise: float = 0.08
+    step: float = 1.0 / 16.0
+    patch: int = 5
+
+    def apply(self, frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+        """The frame as this sensor would have seen it; only depth changes, and holes become 0."""
+        (h, w), fb = frame.depth.shape, frame.K[0, 0] * self.baseline
+        known = np.isfinite(frame.depth) & (frame.depth > 0.0)
+        disparity = fb / np.where(known, frame.depth, np.inf)
+        # In the right image a pixel lies `disparity` further left, hidden if one from its right lies there or beyond.
+        place = np.arange(w) - disparity
+        leftmost = np.minimum.accumulate(place[:, ::-1], axis=1)[:, ::-1]
+        seen = known & (place < np.hstack([leftmost[:, 1:], np.full((h, 1), np.inf)]))
+        coarse = rng.standard_normal((h // self.patch + 2, w // self.patch + 2)).astype(np.float32)
+        disparity += self.noise * cv2.resize(coarse, (w, h))
+        disparity = np.maximum(self.step * np.round(disparity / self.step), self.step)
+        return replace(frame, depth=np.where(seen, fb / disparity, 0.0).astype(np.float32))
+
+
 def perturbed(
     frame: RGBDFrame, rng: np.random.Generator, metres: float = 0.005, degrees: float = 0.5, sensor=DepthSensor()
 ) -> RGBDFrame:

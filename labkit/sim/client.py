@@ -1,25 +1,29 @@
 """One PyBullet simulation as an object, so that several in one process never mix."""
 
 import contextlib
+import ctypes
 import functools
+import importlib.util
 import inspect
 import os
 
 
 @contextlib.contextmanager
-def silent_stderr():
-    """Send what C code writes to stderr nowhere: PyBullet greets every process with the time it was built."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+def silent(descriptor: int = 2):
+    """Send what C code writes to stderr (or to 1, stdout) nowhere: PyBullet and its OpenGL greet every process."""
+    kept, nowhere = os.dup(descriptor), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
     try:
         yield
     finally:
-        os.dup2(kept, 2)
+        if descriptor == 1:
+            ctypes.CDLL(None).fflush(None)  # else what C's printf has kept comes out later
+        os.dup2(kept, descriptor)
         os.close(kept)
         os.close(nowhere)
 
 
-with silent_stderr():
+with silent():
     import pybullet
 
 
@@ -34,7 +38,7 @@ class Client:
 
     def __init__(self):
         # pybullet_utils' BulletClient does the same but prints a line for every simulation.
-        self.number = pybullet.connect(pybullet.DIRECT)
+        self.number, self.egl = pybullet.connect(pybullet.DIRECT), False
         if self.number < 0:
             raise RuntimeError("PyBullet could not start another simulation; close() the ones no longer needed")
 
@@ -48,9 +52,23 @@ class Client:
         setattr(self, name, bound)
         return bound
 
+    def open_egl(self) -> None:
+        """Render with OpenGL from now on; only what is loaded afterwards is seen. Raises ValueError without an EGL."""
+        plugin = importlib.util.find_spec("eglRenderer")
+        with silent(1), silent(2):
+            opened = plugin is not None and self.loadPlugin(plugin.origin, "_eglRendererPlugin") >= 0
+        if not opened:
+            raise ValueError('renderer: expected a machine with EGL for "egl", got none (Debian: libegl1)')
+        self.egl = True
+
+    def quiet(self):
+        """While entered, OpenGL's own messages go nowhere."""
+        return silent(1) if self.egl else contextlib.nullcontext()
+
     def close(self) -> None:
         """End the simulation; harmless when already closed."""
         if self.number >= 0 and pybullet.isConnected(self.number):
-            pybullet.disconnect(self.number)
+            with self.quiet():
+                pybullet.disconnect(self.number)
         self.__dict__.clear()  # methods bound to this simulation would act on the next one of the same number
         self.number = -1

@@ -96,14 +96,20 @@ class Table:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera: its pose in the base frame, (4, 4), kept row by row, and its vertical field of view."""
+    """A pinhole camera: its pose in the base frame, (4, 4), kept row by row, and its vertical field of view.
+
+    renderer: "tiny", PyBullet's own, or "egl", OpenGL without a window: other shading, softer shadows, another K.
+    """
 
     T_base_cam: Sequence[Sequence[float]] | Float[np.ndarray, "4 4"]
     fov_y: float = 0.8
     near: float = 0.1
     far: float = 6.0
+    renderer: str = "tiny"
 
     def __post_init__(self):
+        if self.renderer not in ("tiny", "egl"):
+            raise ValueError(f'renderer: expected "tiny" or "egl", got {self.renderer!r}')
         T = check_T("T_base_cam", self.T_base_cam)
         object.__setattr__(self, "T_base_cam", tuple(map(tuple, T.tolist())))
         if not 0.0 < self.fov_y < np.pi:

@@ -21,6 +21,7 @@ from labkit.sim.textures import paint
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7
 ROOM = 6.0  # edge of the square room, metres
+RENDERERS = {"tiny": pybullet.ER_TINY_RENDERER, "egl": pybullet.ER_BULLET_HARDWARE_OPENGL}
 MAX_DROP = 0.3  # metres from which an object may fall before it settles
 
 
@@ -43,6 +44,8 @@ class World:
         self.observers: list[Callable[[World], None]] = []
         self.client = Client()
         try:
+            if spec.camera.renderer == "egl":
+                self.client.open_egl()
             self.client.setGravity(0.0, 0.0, -9.81)
             self.client.setPhysicsEngineParameter(
                 fixedTimeStep=TIME_STEP, numSolverIterations=100, deterministicOverlappingPairs=1
@@ -104,29 +107,30 @@ class World:
             raise ValueError(f"size: expected width and height of at least 1, got {size}")
         camera = camera or self.spec.camera
         light = self.spec.light
-        _, _, rgba, buffer, segmentation = self.client.getCameraImage(
-            width,
-            height,
-            viewMatrix=view_matrix(np.array(camera.T_base_cam)),
-            projectionMatrix=self.client.computeProjectionMatrixFOV(
-                np.degrees(camera.fov_y), width / height, camera.near, camera.far
-            ),
-            lightDirection=light.direction,
-            lightColor=light.colour,
-            lightDistance=2.0,
-            shadow=int(light.shadow),
-            lightAmbientCoeff=light.ambient,
-            lightDiffuseCoeff=light.diffuse,
-            lightSpecularCoeff=light.specular,
-            renderer=pybullet.ER_TINY_RENDERER,
-        )
+        with self.client.quiet():
+            _, _, rgba, buffer, segmentation = self.client.getCameraImage(
+                width,
+                height,
+                viewMatrix=view_matrix(np.array(camera.T_base_cam)),
+                projectionMatrix=self.client.computeProjectionMatrixFOV(
+                    np.degrees(camera.fov_y), width / height, camera.near, camera.far
+                ),
+                lightDirection=light.direction,
+                lightColor=light.colour,
+                lightDistance=2.0,
+                shadow=int(light.shadow),
+                lightAmbientCoeff=light.ambient,
+                lightDiffuseCoeff=light.diffuse,
+                lightSpecularCoeff=light.specular,
+                renderer=RENDERERS[camera.renderer],
+            )
         buffer = np.asarray(buffer, dtype=np.float64).reshape(height, width)
         bodies = np.asarray(segmentation).reshape(height, width)
         labels, instances = self._label(bodies)
         return RGBDFrame(
             rgb=np.ascontiguousarray(np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]),
             depth=np.where(bodies < 0, 0.0, metres(buffer, camera.near, camera.far)).astype(np.float32),
-            K=intrinsics(camera.fov_y, width, height),
+            K=intrinsics(camera.fov_y, width, height, camera.renderer),
             T_base_cam=np.array(camera.T_base_cam),
             labels=labels,
             instances=instances,
@@ -263,10 +267,11 @@ class World:
         return bool(np.dot(linear, linear) < 0.002**2 and np.dot(angular, angular) < 0.05**2)
 
 
-def intrinsics(fov_y: float, width: int, height: int) -> Float[np.ndarray, "3 3"]:
-    """K of PyBullet's TinyRenderer for a vertical field of view in radians; pixel centres at integers.
+def intrinsics(fov_y: float, width: int, height: int, renderer: str = "tiny") -> Float[np.ndarray, "3 3"]:
+    """K of PyBullet's renderers for a vertical field of view in radians; pixel centres at integers.
 
-    The principal point is measured, not assumed: only cx = W / 2, cy = H / 2 - 1 puts a rendered plane on a plane.
+    The principal point is measured, not assumed: only cx = W / 2, cy = H / 2 - 1 puts a plane that TinyRenderer drew on
+    a plane, and only (W - 1) / 2, (H - 1) / 2 one that EGL drew.
 
     >>> intrinsics(np.pi / 2, 320, 240)
     array([[120.,   0., 160.],
@@ -274,7 +279,8 @@ def intrinsics(fov_y: float, width: int, height: int) -> Float[np.ndarray, "3 3"
            [  0.,   0.,   1.]])
     """
     f = height / (2.0 * np.tan(fov_y / 2.0))
-    return np.array([[f, 0.0, width / 2.0], [0.0, f, height / 2.0 - 1.0], [0.0, 0.0, 1.0]])
+    cx, cy = (width / 2.0, height / 2.0 - 1.0) if renderer == "tiny" else ((width - 1) / 2.0, (height - 1) / 2.0)
+    return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
 
 
 def view_matrix(T_base_cam: Float[np.ndarray, "4 4"]) -> list[float]:

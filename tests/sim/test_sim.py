@@ -32,13 +32,22 @@ def points_of(frame, mask):
     return back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[mask].astype(float)
 
 
+EGL = pytest.mark.debian("libegl1", "libgl1-mesa-dri")
+
+
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (201, 161)])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_rendered_plane_is_a_plane(size, seed):
+@pytest.mark.parametrize(("seed", "renderer"), [(0, "tiny"), (1, "tiny"), pytest.param(0, "egl", marks=EGL)])
+def test_a_rendered_plane_is_a_plane(size, seed, renderer, capfd):
     """Intrinsics are right to 0.05 mm: a tilted table, with any roll, stays flat and at its height."""
     rng = np.random.default_rng(seed)
     camera = Camera.looking_at(
-        (0.5, 0.0, 0.0), rng.uniform(0.5, 0.8), rng.uniform(-3, 3), rng.uniform(0.6, 1.2), rng.uniform(-3, 3), fov_y=0.6
+        (0.5, 0.0, 0.0),
+        rng.uniform(0.5, 0.8),
+        rng.uniform(-3, 3),
+        rng.uniform(0.6, 1.2),
+        rng.uniform(-3, 3),
+        fov_y=0.6,
+        renderer=renderer,
     )
     with World(scene(camera=camera, table=Table(size=(1.0, 1.4, 0.05), z=0.013))) as world:
         frame = world.render(size)
@@ -46,8 +55,9 @@ def test_a_rendered_plane_is_a_plane(size, seed):
     mask = frame.labels == SURFACE
     assert mask.mean() > 0.5
     error = np.abs(points_of(frame, mask)[:, 2] - 0.013)
-    assert error.max() < 5e-5
-    assert np.abs(points_of(shifted, mask)[:, 2] - 0.013).max() > 5e-4, "centres at (W - 1) / 2 would not do"
+    assert error.max() < (5e-5 if renderer == "tiny" else 3e-4)
+    assert np.abs(points_of(shifted, mask)[:, 2] - 0.013).max() > 5e-4, "half a pixel off would not do"
+    assert capfd.readouterr().out == "", "OpenGL greets every process"
 
 
 @pytest.mark.parametrize(
