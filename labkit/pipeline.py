@@ -57,10 +57,11 @@ class Pipeline:
     RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1; None if labels come from elsewhere, and
     only `locate` is used. table_z: height of the table in the base
     frame, metres; None takes the frame's own, or else 0. target_class: what to grasp.
-    mirror: let a network look at the image and at its mirror image, and average: better, at twice the time.
+    mirror: let a network look at the image and at its mirror image, and average: a little better, at twice the time.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.stacks.engines): equal numbers, other
     speeds; the model may then be an ONNX file of `labkit export`.
-    crf: True refines the labels with the kit's CRF; or a function (probabilities, frame) -> labels (H, W).
+    crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
+    refines those of a network, and leaves those of a plain function, which decides for itself.
     workspace: ((x, x), (y, y), (z, z)), from and to, metres in the base frame, z from the table: what the arm can meet;
     nothing outside is a target or an obstacle. gripper: the hand that the planner plans for.
     back_project: function (depth, K, T_base_cam) -> (H, W, 3). split: function of the target's points (N, 3) to a list
@@ -81,9 +82,9 @@ class Pipeline:
         table_z: float | None = None,
         target_class: int = TARGET,
         *,
-        mirror: bool = True,
+        mirror: bool = False,
         engine: str | None = None,
-        crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] = False,
+        crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] | None = None,
         workspace: Sequence[Sequence[float]] = WORKSPACE,
         gripper: Gripper | None = None,
         back_project: Callable = back_project_to_base,
@@ -102,6 +103,7 @@ class Pipeline:
         self.table_z = None if table_z is None else check_height("table_z", table_z)
         self.target_class = target_class
         self.mirror = mirror
+        crf = isinstance(model, Engine) if crf is None else crf
         self.crf = refine_labels if crf is True else crf
         self.workspace = check_finite("workspace", check_shape("workspace", workspace, (3, 2))).astype(np.float64)
         if not (self.workspace[:, 0] < self.workspace[:, 1]).all():

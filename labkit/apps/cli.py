@@ -21,7 +21,7 @@ app = typer.Typer(
 
 # Options that several commands share.
 Model = Annotated[str, typer.Option(help="unet_rgbd, unet, smallsegnet, or a file of your own weights.")]
-Refine = Annotated[bool, typer.Option("--crf", help="Refine the network's masks with the CRF.")]
+Refine = Annotated[bool | None, typer.Option("--crf/--no-crf", help="Refine a network's masks with the CRF.")]
 Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 
 
@@ -102,7 +102,7 @@ def evaluate(
         "predicted"
     ),
     model: Model = "unet_rgbd",
-    crf: Refine = False,
+    crf: Refine = None,
     perturb: Annotated[
         bool, typer.Option("--perturb", help="Depth as a sensor measures it, pose off by 5 mm and 0.5 degree.")
     ] = False,
@@ -168,7 +168,7 @@ def demo(
         int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
     ] = None,
     model: Model = "unet_rgbd",
-    crf: Refine = False,
+    crf: Refine = None,
     out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
 ) -> None:
     """Show the whole chain on one random scene: from the camera's image to the object in the air."""
@@ -241,10 +241,12 @@ def node(
     out: Annotated[Path | None, typer.Option(help="The bag to write, of either kind.")] = None,
     storage: Annotated[str, typer.Option(help="How ROS 2 shall hold it: mcap or sqlite3.")] = "mcap",
     seed: Annotated[int, typer.Option(help="Seed of the scene of --sim.", min=0)] = 0,
-    model: Model = "unet",
+    model: Model = "unet_rgbd",
     engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch",
-    mirror: Annotated[bool, typer.Option(help="Look at the mirror image, too: better, at twice the time.")] = True,
-    crf: Refine = False,
+    mirror: Annotated[
+        bool, typer.Option(help="Look at the mirror image, too: a little better, at twice the time.")
+    ] = False,
+    crf: Refine = None,
     target: Annotated[int, typer.Option(help="The class to grasp.")] = 2,
     table_z: Annotated[
         float | None, typer.Option(help="Height of the table in the base frame, metres; else 0.")

@@ -38,7 +38,7 @@ class Story:
     seconds: dict[str, float]
 
 
-def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool = False) -> Story:
+def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool | None = None) -> Story:
     """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
     start = time.perf_counter()
     with World(spec) as world:

@@ -47,11 +47,13 @@ class Trial:
     reliability: np.ndarray | None = None
 
 
-def run_trial(spec, model=None, size: tuple[int, int] = (320, 240), crf: bool = False, perturb: bool = False) -> Trial:
+def run_trial(
+    spec, model=None, size: tuple[int, int] = (320, 240), crf: bool | None = None, perturb: bool = False
+) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
     spec: a SceneSpec; those of the config "other" are seen by another sensor, StereoSensor. model: as in Pipeline, or
-    the path of weights; None for true masks. crf: refine the model's labels. perturb: depth as a sensor measures it and
+    the path of weights; None for true masks. crf: as in Pipeline. perturb: depth as a sensor measures it and
     a camera pose that is off (labkit.geometry.sensor.perturbed), the same for every model. No reachable candidate is a
     failure, and so is lifting anything but a target. Only the score reads the simulator's truth. Raises ValueError for
     a CRF on true masks.
@@ -181,7 +183,7 @@ def run_trials(
     specs,
     model=None,
     size: tuple[int, int] = (320, 240),
-    crf: bool = False,
+    crf: bool | None = None,
     perturb: bool = False,
     workers: int = 1,
     progress: bool = True,

@@ -25,14 +25,14 @@ class Settings:
     With --ros each is also a ROS parameter of the same name, which wins.
     """
 
-    model: str = "unet"
+    model: str = "unet_rgbd"
     engine: str = "torch"
-    crf: bool = False
+    crf: bool | None = None
     target: int = 2
     table_z: float | None = None
     camera_pose: str | None = None
     base_frame: str = "base_link"
-    mirror: bool = True
+    mirror: bool = False
     slop: float = 0.02
     depth_scale: float = 0.001
     qos_inputs: str = "best_effort"

@@ -68,7 +68,7 @@ def run_ros_node(
     target_class: int,
     *,
     table_z: float | None = None,
-    crf: bool = False,
+    crf: bool | None = None,
     version: int = 2,
     **options,
 ) -> Counts | None:
@@ -76,7 +76,7 @@ def run_ros_node(
 
     The version that tutorials print ignores the target class, depth, intrinsics and the camera's pose, and publishes a
     mask alone; this one uses all of them. weights_path: as in `labkit.network.load_model`. table_z: height of the table
-    in the base frame, metres. crf: refine the labels. version: of ROS, 2 or 1. options: those of SegmentationNode,
+    in the base frame, metres. crf: as in Pipeline. version: of ROS, 2 or 1. options: those of SegmentationNode,
     T_base_cam and topics among them. Raises FileNotFoundError or ValueError for weights that cannot be used,
     ModuleNotFoundError without ROS.
     """
