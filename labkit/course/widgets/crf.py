@@ -95,9 +95,9 @@ def draw_energies(axes: Axes, terms: dict[str, tuple[float, float]], limit: floa
 def gibbs(psi: Float[np.ndarray, "2 2 2"]) -> Explorer:
     """Show the probabilities of all sixteen labellings of 2 x 2 pixels, under a weight that all four pairs share."""
 
-    def draw(figure: Figure, lam: float) -> None:
+    def draw(figure: Figure, w: float) -> None:
         weights = np.zeros((2, 2, 2))
-        weights[0, :, 0] = weights[1, 0, :] = lam
+        weights[0, :, 0] = weights[1, 0, :] = w
         ((labellings, energies),) = enumerate_labellings(PottsCRF(psi, weights))
         p = np.exp(-energies)
         p /= p.sum()
@@ -108,15 +108,15 @@ def gibbs(psi: Float[np.ndarray, "2 2 2"]) -> Explorer:
         bars.set_ylabel("p(y)")
         bars.set_xticks([])
         bars.spines[["top", "right"]].set_visible(False)
-        bars.set_title(f"w = {lam:.1f}: the likeliest labelling has {p.max():.2f}, Z = {np.exp(-energies).sum():.3f}")
+        bars.set_title(f"w = {w:.1f}: the likeliest labelling has {p.max():.2f}, Z = {np.exp(-energies).sum():.3f}")
         n, v, u = np.indices(labellings.shape)
         colours = np.array([TABLE, THING])[labellings.ravel()]
         icons.scatter(n + 0.26 * (u - 0.5), 0.8 * (0.5 - v), s=90, marker="s", c=colours)
         icons.set_ylim(-0.9, 0.9)
         icons.set_axis_off()
 
-    lam = ipywidgets.FloatSlider(0.0, min=0.0, max=3.0, step=0.1, description="w")
-    return Explorer(draw, {"lam": lam}, size=(8.0, 2.8))
+    w = ipywidgets.FloatSlider(0.0, min=0.0, max=3.0, step=0.1, description="w")
+    return Explorer(draw, {"w": w}, size=(8.0, 2.6), stills=({"w": 0.0}, {"w": 0.2}, {"w": 1.5}))
 
 
 def you_are_the_solver() -> Explorer:
@@ -150,7 +150,8 @@ def you_are_the_solver() -> Explorer:
         shown["network alone"] = crf.unary.argmin(axis=2)
         draw_energies(axes[-1], {name: energy_terms(crf, labels) for name, labels in shown.items()}, 30.0)
 
-    explorer = Explorer(draw, pixels | {"lam": lam, "reveal": reveal}, size=(8.0, 2.6))
+    stills = ({"lam": 0.0, "reveal": True}, {"lam": 2.0, "reveal": True})
+    explorer = Explorer(draw, pixels | {"lam": lam, "reveal": reveal}, size=(8.0, 2.6), stills=stills)
     grid = ipywidgets.GridBox(
         list(pixels.values()), layout=ipywidgets.Layout(grid_template_columns=f"repeat({W}, 56px)")
     )
@@ -192,7 +193,8 @@ def lam_slider(
     sigma = ipywidgets.SelectionSlider(
         options=[(f"{value:g}", value) for value in SIGMAS], value=15.0, description="sigma_I"
     )
-    return Explorer(draw, {"lam": lam, "sigma_I": sigma}, size=(9.0, 2.7))
+    stills = ({"lam": 0.0, "sigma_I": 15.0}, {"lam": 2.0, "sigma_I": 15.0}, {"lam": 32.0, "sigma_I": 200.0})
+    return Explorer(draw, {"lam": lam, "sigma_I": sigma}, size=(9.0, 2.7), stills=stills)
 
 
 # -------------------------------------------------------------------------------------------------------- a cut
@@ -208,12 +210,15 @@ def draw_cut(axes: Axes, psi: Float[np.ndarray, "n 2"], w: Float[np.ndarray, "m"
     source, sink = ((n - 1) / 2, 1.0), ((n - 1) / 2, -1.0)
     arcs = [(source, (p, 0.0), psi[p, 1], y[p] == 1) for p in range(n)]
     arcs += [((p, 0.0), sink, psi[p, 0], y[p] == 0) for p in range(n)]
-    arcs += [((p, 0.0), (p + 1, 0.0), w[p], y[p] != y[p + 1]) for p in range(n - 1)]
+    arcs += [((p, 0.0), (p + 1, 0.0), w[p], y[p] < y[p + 1]) for p in range(n - 1)]
+    arcs += [((p + 1, 0.0), (p, 0.0), w[p], y[p + 1] < y[p]) for p in range(n - 1)]
     for start, end, capacity, is_cut in arcs:
         cut += capacity if is_cut else 0.0
-        colour = "crimson" if is_cut else "0.6"
-        axes.plot(*zip(start, end, strict=True), color=colour, linestyle="--" if is_cut else "-", linewidth=2, zorder=0)
-        middle = np.add(start, end) / 2
+        colour, between = "crimson" if is_cut else "0.45", start[1] == end[1]
+        arrow = {"arrowstyle": "-|>", "color": colour, "linestyle": "--" if is_cut else "-", "linewidth": 1.8}
+        arrow |= {"shrinkA": 13, "shrinkB": 13, "connectionstyle": f"arc3,rad={-0.4 if between else 0}"}
+        axes.annotate("", end, start, arrowprops=arrow, zorder=0)
+        middle = np.add(start, end) / 2 + (0.0, between * 0.3 * (end[0] - start[0]))
         axes.text(*middle, f"{capacity:g}", ha="center", va="center", color=colour, backgroundcolor="white", fontsize=9)
     nodes = [(source, TABLE, "s"), (sink, THING, "t")] + [((p, 0.0), (TABLE, THING)[y[p]], str(y[p])) for p in range(n)]
     for place, colour, name in nodes:

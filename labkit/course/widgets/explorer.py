@@ -2,19 +2,22 @@
 
 import base64
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import ipywidgets
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 
 
 class Explorer:
     """A picture that is drawn again whenever one of its controls changes.
 
     draw: function (figure, **values) that draws on an empty matplotlib Figure. controls: name -> ipywidgets control;
-    the names are draw's arguments. size: of the picture, inches; dpi: its resolution. Where widgets do not run (a code
-    host, a printed page) the notebook shows the picture as it was last drawn.
+    the names are draw's arguments. size: of the picture, inches; dpi: its resolution. stills: states worth seeing, each
+    as values of some controls; where widgets do not run (a code host, a printed page) the notebook shows these, one
+    below the other, else the picture as it was last drawn.
 
     >>> def draw(figure, slope):
     ...     figure.subplots().plot([0, 1], [0, slope])
@@ -31,8 +34,9 @@ class Explorer:
         controls: Mapping[str, ipywidgets.Widget],
         size: tuple[float, float] = (7.0, 3.0),
         dpi: int = 80,
+        stills: Sequence[Mapping] = (),
     ):
-        self.draw, self.controls, self.size, self.dpi = draw, dict(controls), size, dpi
+        self.draw, self.controls, self.size, self.dpi, self.stills = draw, dict(controls), size, dpi, stills
         # As large as it is drawn, not stretched over the page; narrower where there is less room.
         self.picture = ipywidgets.Image(format="png", layout={"max_width": "100%", "align_self": "flex-start"})
         self.widget = ipywidgets.VBox([*self.controls.values(), self.picture])
@@ -51,12 +55,27 @@ class Explorer:
         """The picture as it stands, a PNG file's bytes."""
         return bytes(self.picture.value)
 
-    def figure(self) -> Figure:
-        """Draw the picture for the controls' values, and give the figure, whose axes can be looked into."""
+    def figure(self, **values) -> Figure:
+        """Draw the picture for the controls' values, or others, and give the figure, whose axes can be looked into."""
         figure = Figure(self.size, dpi=self.dpi, layout="constrained")
         FigureCanvasAgg(figure)
-        self.draw(figure, **self.values)
+        self.draw(figure, **self.values | values)
         return figure
+
+    def still(self) -> bytes:
+        """The picture for readers without a kernel, a PNG file's bytes: the stills, each under the values it shows."""
+        if not self.stills:
+            return self.png
+        shown, file = [], io.BytesIO()
+        for values in self.stills:
+            figure = self.figure(**values)
+            figure.suptitle(
+                ", ".join(f"{name} = {value}" for name, value in values.items()), fontsize=10, weight="bold"
+            )
+            figure.canvas.draw()
+            shown.append(np.asarray(figure.canvas.buffer_rgba())[..., :3])
+        imsave(file, np.concatenate(shown), format="png")
+        return file.getvalue()
 
     def redraw(self) -> None:
         """Show the picture for the controls' values."""
@@ -66,5 +85,5 @@ class Explorer:
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         bundle = self.widget._repr_mimebundle_() or {}
-        picture = base64.b64encode(self.png).decode()
+        picture = base64.b64encode(self.still()).decode()
         return bundle | {"image/png": picture, "text/plain": "an explorer: " + ", ".join(self.controls)}

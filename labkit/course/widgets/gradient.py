@@ -57,7 +57,8 @@ def logits(z: tuple[float, float, float] = (2.0, 1.0, -1.0), y: int = 1) -> Expl
     true_class = ipywidgets.ToggleButtons(options=[0, 1, 2], value=y, description="true y")
     steps = [(f"1e{exponent}", 10.0**exponent) for exponent in range(-16, 1)]
     step = ipywidgets.SelectionSlider(options=steps, value=steps[11][1], description="step h")
-    return Explorer(draw_logits, sliders | {"y": true_class, "h": step}, size=(8.5, 3.0))
+    stills = ({"z0": z[0], "z1": z[1], "z2": z[2]}, {"z0": 6.0, "z1": -6.0, "z2": -1.0})
+    return Explorer(draw_logits, sliders | {"y": true_class, "h": step}, size=(8.5, 3.0), stills=stills)
 
 
 def keyhole(
@@ -97,7 +98,8 @@ def keyhole(
         "width": ipywidgets.SelectionSlider(options=list(widths), value=widths[0], description="sees"),
         "reveal": ipywidgets.Checkbox(False, description="show the image and the true class"),
     }
-    return Explorer(draw, controls, size=(7.0, 2.9))
+    stills = tuple({"width": width, "reveal": width == widths[-1]} for width in widths[::2] + widths[-1:])
+    return Explorer(draw, controls, size=(7.0, 2.9), stills=stills)
 
 
 def seen(rgb: np.ndarray, u: int, v: int, width: int) -> tuple[np.ndarray, tuple[int, int]]:

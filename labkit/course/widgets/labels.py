@@ -69,7 +69,9 @@ def ghost_classes(y: Integer[np.ndarray, "H W"]) -> Explorer:
         "scale": ipywidgets.FloatSlider(1.5, min=0.25, max=3.0, step=0.05, description="scale"),
         "way": ipywidgets.Dropdown(options=list(ways), value="bilinear", description="way"),
     }
-    return Explorer(draw, controls, size=(10.0, 2.9))
+    return Explorer(
+        draw, controls, size=(10.0, 2.9), stills=({"scale": 1.5, "way": "bilinear"}, {"scale": 1.5, "way": "nearest"})
+    )
 
 
 def segmentation_value(body: int, link: int) -> int:
@@ -101,7 +103,7 @@ def segmentation_bits() -> Explorer:
         "body": ipywidgets.IntSlider(5, min=0, max=40, description="body"),
         "link": ipywidgets.IntSlider(2, min=-1, max=11, description="link"),
     }
-    return Explorer(draw, controls, size=(8.5, 1.5))
+    return Explorer(draw, controls, size=(8.5, 1.5), stills=({"body": 5, "link": -1}, {"body": 5, "link": 2}))
 
 
 def raw_segmentation(world, size: tuple[int, int] = (320, 240)) -> Integer[np.ndarray, "H W"]:

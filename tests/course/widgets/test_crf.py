@@ -19,7 +19,7 @@ def test_without_pairs_z_is_the_product_of_the_pixels_sums():
     explorer = widgets.gibbs(PSI)
     Z = np.exp(-PSI).sum(axis=2).prod()
     assert f"Z = {Z:.3f}" in titles(explorer)[0]
-    explorer.controls["lam"].value = 2.5
+    explorer.controls["w"].value = 2.5
     assert titles(explorer)[0].startswith("w = 2.5")
 
 

@@ -1,8 +1,10 @@
 """What all explorers share: a control that changes redraws the picture, which is shown where widgets do not run."""
 
 import base64
+import io
 
 import ipywidgets
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -35,7 +37,7 @@ FRAMES = {"first": (FRAME, probabilities(0)), "second": (OTHER, probabilities(1)
 EXPLORERS = {
     "ghost_classes": (lambda: labels.ghost_classes(FRAME.labels), {"scale": 0.5, "way": "nearest"}),
     "segmentation_bits": (labels.segmentation_bits, {"body": 37, "link": 8}),
-    "gibbs": (lambda: crf.gibbs(probabilities(3, (2, 2))[..., :2]), {"lam": 2.5}),
+    "gibbs": (lambda: crf.gibbs(probabilities(3, (2, 2))[..., :2]), {"w": 2.5}),
     "you_are_the_solver": (crf.you_are_the_solver, {"pixel_2_1": True, "lam": 0.3, "reveal": True}),
     "lam_slider": (lambda: crf.lam_slider(FRAMES["first"][1], FRAME.rgb, FRAME.labels), {"lam": 8.0, "sigma_I": 200.0}),
     "logits": (gradient.logits, {"z0": -3.0, "z1": 4.5, "z2": 0.5, "y": 2, "h": 1.0}),
@@ -106,3 +108,17 @@ def test_a_drawing_that_fails_says_so():
 
     with pytest.raises(ValueError, match="x: too large"):
         Explorer(draw, {"x": ipywidgets.FloatSlider()})
+
+
+def test_stills_are_shown_where_no_widget_runs_and_leave_the_controls_alone():
+    drawn = []
+    slider = ipywidgets.FloatSlider(1.0, min=0, max=5)
+    explorer = Explorer(
+        lambda figure, slope: drawn.append(slope),
+        {"slope": slider},
+        size=(2.0, 1.0),
+        stills=({"slope": 3.0}, {"slope": 4.0}),
+    )
+    shown = base64.b64decode(explorer._repr_mimebundle_()["image/png"])
+    assert drawn == [1.0, 3.0, 4.0] and slider.value == 1.0
+    assert plt.imread(io.BytesIO(shown)).shape[:2] == (160, 160)  # two pictures of 80 x 160, one below the other
