@@ -63,31 +63,6 @@ def iou_float32(n):
     return iou_of(n.astype(np.float32)).astype(np.float32)
 
 
-# ---------- precision_recall
-
-
-def precision_recall_loops(n):
-    precision, recall = [], []
-    for c in range(len(n)):
-        predicted, true = sum(int(x) for x in n[:, c]), sum(int(x) for x in n[c])
-        precision.append(int(n[c, c]) / predicted if predicted else float("nan"))
-        recall.append(int(n[c, c]) / true if true else float("nan"))
-    return np.array(precision), np.array(recall)
-
-
-def precision_recall_einsum(n):
-    shape = len(n)
-    correct, predicted, true = np.einsum("ii->i", n), np.einsum("ij->j", n), np.einsum("ij->i", n)
-    return tuple(np.divide(correct, whole, out=np.full(shape, np.nan), where=whole > 0) for whole in (predicted, true))
-
-
-def precision_recall_torch(n):
-    import torch
-
-    n = torch.as_tensor(n, dtype=torch.float32)
-    return (n.diag() / n.sum(0)).numpy(), (n.diag() / n.sum(1)).numpy()
-
-
 # ---------- mean_iou
 
 
@@ -116,45 +91,80 @@ def mean_iou_torch(n_frames):
     return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).nanmean().item()
 
 
-# ---------- boundary_band
+# ---------- merge_classes
 
 
-def band_loops(mask, width):
-    H, W = mask.shape
-    band = np.zeros((H, W), bool)
-    for v, u in np.argwhere(mask):
-        whole = v >= width and u >= width and v + width < H and u + width < W
-        window = mask[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
-        band[v, u] = not (whole and window.all())
+def merged_loops(n, group):
+    G = max(group.tolist()) + 1
+    merged = np.zeros((G, G), np.int64)
+    for i in range(len(group)):
+        for j in range(len(group)):
+            merged[group[i], group[j]] += n[i, j]
+    return merged
+
+
+def merged_add_at(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, (group[:, None], group[None, :]), n)
+    return merged
+
+
+def merged_blocks(n, group):
+    classes = [np.flatnonzero(group == g) for g in np.unique(group)]
+    return np.array([[n[np.ix_(rows, columns)].sum() for columns in classes] for rows in classes])
+
+
+def merged_bincount(n, group):
+    G = group.max() + 1
+    pairs = G * group[:, None] + group
+    return np.bincount(pairs.ravel(), weights=n.ravel(), minlength=G * G).reshape(G, G).astype(int)
+
+
+# ---------- trimap_band
+
+
+def trimap_loops(y, width):
+    band = np.zeros(y.shape, bool)
+    for v, u in np.argwhere(y != 255):
+        window = y[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
+        band[v, u] = len(set(window.ravel().tolist()) - {255}) > 1
     return band
 
 
-def band_repeated_erosion(mask, width):
-    inside = mask
+def trimap_extremes(y, width):
+    low, high = y.astype(int), np.where(y == 255, -1, y.astype(int))
     for _ in range(width):
-        framed = np.pad(inside, 1)
-        across = framed[:, :-2] & framed[:, 1:-1] & framed[:, 2:]
-        inside = across[:-2] & across[1:-1] & across[2:]
-    return mask & ~inside
+        for axis in (0, 1):
+            reach = ((1, 1), (0, 0)) if axis == 0 else ((0, 0), (1, 1))
+            a, b = np.pad(low, reach, mode="edge"), np.pad(high, reach, mode="edge")
+            places = [np.arange(step, step + y.shape[axis]) for step in range(3)]
+            low = np.min([a.take(place, axis) for place in places], axis=0)
+            high = np.max([b.take(place, axis) for place in places], axis=0)
+    return (low < high) & (y < 255)
 
 
-def band_windows(mask, width):
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(mask, width), (2 * width + 1, 2 * width + 1))
-    return mask & ~windows.all(axis=(2, 3))
+def trimap_one_class_at_a_time(y, width):
+    window = (2 * width + 1, 2 * width + 1)
+    near = []
+    for c in np.unique(y[y != 255]):
+        is_near = np.lib.stride_tricks.sliding_window_view(np.pad(y == c, width), window).any(axis=(-2, -1))
+        near.append(is_near.astype(int))
+    return (np.sum(near, axis=0) > 1) * (y != 255)
 
 
-def band_torch(mask, width):
+def trimap_torch(y, width):
     import torch
 
-    outside = torch.nn.functional.pad(torch.from_numpy(~mask).float()[None, None], [width] * 4, value=1.0)
-    near = torch.nn.functional.max_pool2d(outside, 2 * width + 1, stride=1)[0, 0] > 0.5
-    return mask & near.numpy()
+    classes = torch.unique(torch.from_numpy(y[y != 255]))
+    masks = (torch.from_numpy(y)[None] == classes[:, None, None]).float()
+    near = torch.nn.functional.max_pool2d(masks, 2 * width + 1, stride=1, padding=width)
+    return (near.sum(0) > 1).numpy() & (y != 255)
 
 
 ALTERNATIVES = {
     "confusion_matrix": (confusion_loops, confusion_bincount, confusion_one_hot, confusion_torch),
     "iou": (iou_loops, iou_einsum, iou_torch, iou_float32),
-    "precision_recall": (precision_recall_loops, precision_recall_einsum, precision_recall_torch),
     "mean_iou": (mean_iou_loops, mean_iou_einsum, mean_iou_torch),
-    "boundary_band": (band_loops, band_repeated_erosion, band_windows, band_torch),
+    "merge_classes": (merged_loops, merged_add_at, merged_blocks, merged_bincount),
+    "trimap_band": (trimap_loops, trimap_extremes, trimap_one_class_at_a_time, trimap_torch),
 }

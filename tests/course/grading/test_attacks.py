@@ -194,14 +194,14 @@ def test_copies_of_the_kits_code_are_flagged_whatever_their_names_and_layout(tmp
     """The references with every variable renamed and comments put in, and a function of the library."""
     copied = kit.copied_answers(TOPIC)
     renamed = {name: re.sub(r"\bn\b", "counts", cell).replace("\n", "  # mine\n", 1) for name, cell in copied.items()}
-    library = inspect.getsource(metrics.boundary_counts).replace("boundary_counts", "boundary_band")
+    library = inspect.getsource(metrics.boundary_counts).replace("boundary_counts", "trimap_band")
     kit.write_lab(tmp_path, TOPIC)
     kit.submit(tmp_path, "renamed", TOPIC, renamed)
-    kit.submit(tmp_path, "library", TOPIC, kit.right_answers(TOPIC) | {"boundary_band": library})
+    kit.submit(tmp_path, "library", TOPIC, kit.right_answers(TOPIC) | {"trimap_band": library})
     library, same = grade_course(TOPIC, tmp_path, seed="secret", progress=False).records
     assert all("has a copy of the kit's" in result.flag for result in same.results)
     flags = {result.question: result.flag for result in library.results}
-    assert "labkit.metrics.boundary_counts" in flags["boundary_band"] and not flags["iou"]
+    assert "labkit.metrics.boundary_counts" in flags["trimap_band"] and not flags["iou"]
     for question in of_topic(TOPIC).values():
         for answer in kit.alternatives(question):
             assert copies.of_the_kit(shapes_in(kit.as_cell(answer, question.function)), question.reference) == []

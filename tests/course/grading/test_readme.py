@@ -17,9 +17,9 @@ ROOT = Path(__file__).parents[3]
 PAGES = [page for page in (ROOT / "README.md", ROOT / "docs/grading.md") if "labkit grade 04_iou\n" in page.read_text()]
 # What the students of tests/data/submitted have right.
 RIGHT = {
-    "ada": {"confusion_matrix", "iou", "precision_recall", "mean_iou", "boundary_band"},
-    "ben": {"confusion_matrix", "boundary_band"},
-    "eve": {"confusion_matrix", "precision_recall"},
+    "ada": {"confusion_matrix", "iou", "mean_iou", "merge_classes", "trimap_band"},
+    "ben": {"confusion_matrix", "trimap_band"},
+    "eve": {"confusion_matrix", "merge_classes"},
 }
 
 

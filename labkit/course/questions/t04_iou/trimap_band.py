@@ -1,0 +1,80 @@
+"""04_iou.trimap_band: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def trimap_band(y, width):
+    """Mark the pixels within `width` rows and columns of a pixel of another class; 255 is no class."""
+    H, W = y.shape
+    framed = np.pad(y, width, constant_values=255)
+    band = np.zeros(y.shape, bool)
+    for down in range(2 * width + 1):
+        for right in range(2 * width + 1):
+            near = framed[down : down + H, right : right + W]
+            band |= (near != y) & (near != 255)
+    return band & (y != 255)
+
+
+def _labels(rng):
+    """Draw three classes with a slanted edge, one lone pixel, and a strip that nobody judged; H != W."""
+    H, W = int(rng.integers(11, 14)), int(rng.integers(19, 24))
+    v, u = np.mgrid[0:H, 0:W]
+    y = np.where(0.5 * u + v < 0.25 * W + 0.3 * H, 2, 1).astype(np.uint8)
+    y[u > W - 7] = 3
+    y[:, W - int(rng.integers(5, 8))] = 255
+    y[int(rng.integers(1, H - 1)), int(rng.integers(9, 12))] = 0
+    return np.roll(y, int(rng.integers(-1, 2)), axis=1), int(rng.integers(1, 4))
+
+
+QUESTION = Question(
+    name="04_iou.trimap_band",
+    reference=trimap_band,
+    inputs=_labels,
+    by_hand=(
+        (np.array([[1, 1, 1, 2, 2], [1, 1, 1, 1, 1]], np.uint8), 1),
+        (np.full((4, 7), 3, np.uint8), 2),  # one class: no edge, at the image's border neither
+        (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 1),  # one step from 1 nothing was judged
+        (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 2),
+        (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property(
+            "no pixel that was not judged (255) is in the band",
+            lambda arguments, band: not np.any(np.asarray(band, bool) & (arguments[0] == 255)),
+        ),
+    ),
+    forbidden=("cv2", "scipy", "skimage"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "An image of one class has no edge: beyond its border there is no class, not class 0.")
+def border_is_an_edge(y, width):
+    return trimap_band(np.pad(y, width), width)[width:-width, width:-width]
+
+
+@wrong(QUESTION, "255 is no class: two pixels are not on an edge because nobody judged the pixel between them.")
+def unjudged_is_a_class(y, width):
+    return trimap_band(np.where(y == 255, 9, y), width) & (y != 255)
+
+
+@wrong(QUESTION, "A step down and a step to the right at once: is that pixel within one row and one column?")
+def cross_window(y, width):
+    def along(y):
+        return np.stack([trimap_band(row[None], width)[0] for row in y])
+
+    return along(y) | along(y.T).T
+
+
+@wrong(QUESTION, "An edge has two sides: the pixels of the lower class belong to the band, too.")
+def one_side(y, width):
+    H, W = y.shape
+    framed = np.pad(y, width, constant_values=255)
+    reach = range(2 * width + 1)
+    return (y != 255) & np.any([framed[v : v + H, u : u + W] < y for v in reach for u in reach], axis=0)
