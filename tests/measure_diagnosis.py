@@ -4,7 +4,8 @@
 
 Wrong answers are the mutants of references and alternatives (`mutants`); those of the same outputs count once.
 One is named by a sentence that is true of it and false for nine tenths of the question's others; where it is wrong does
-not count alone. "strict" leaves out slips, which know the operators that are not held out.
+not count alone. "strictly" leaves out slips, which know the operators that are not held out, and properties; "at once"
+counts only the sentence that is said first.
 """
 
 import argparse
@@ -19,7 +20,6 @@ import numpy as np
 from alternatives import alternatives
 from mutants import mutants
 
-from labkit.course.questions import diagnosis
 from labkit.course.questions.comparison import Problem, compare, expected_cases, parts
 from labkit.course.questions.diagnosis import Sentence, sentences
 from labkit.course.questions.question import TOPICS, Question, of_topic
@@ -35,15 +35,18 @@ class Named:
     wrong: int = 0
     named: int = 0
     strict: int = 0
+    at_once: int = 0
     kinds: Counter = field(default_factory=Counter)
     unnamed: list[str] = field(default_factory=list)
 
     def __add__(self, other: "Named") -> "Named":
         kinds, unnamed = self.kinds + other.kinds, self.unnamed + other.unnamed
-        return Named(self.wrong + other.wrong, self.named + other.named, self.strict + other.strict, kinds, unnamed)
+        counts = ((getattr(a, n) for a in (self, other)) for n in ("wrong", "named", "strict", "at_once"))
+        return Named(*map(sum, counts), kinds, unnamed)
 
     def __str__(self) -> str:
-        share = f"{self.named / max(self.wrong, 1):.0%} named, strictly {self.strict / max(self.wrong, 1):.0%}"
+        named, strict, at_once = (n / max(self.wrong, 1) for n in (self.named, self.strict, self.at_once))
+        share = f"{named:.0%} named, strictly {strict:.0%}, strictly and at once {at_once:.0%}"
         return f"{self.wrong} wrong answers, {share}; {', '.join(f'{k} {n}' for k, n in self.kinds.most_common())}"
 
 
@@ -86,7 +89,9 @@ def measure(question: Question, held_out: bool | None = None, sample: int | None
     for name, found in said.items():
         good = [s for s in found if s.kind != "place" and true_of[s] - 1 <= SHARE * (len(wrong) - 1)]
         result.named += bool(good)
-        result.strict += any(s.kind not in ("slip", "property") for s in good)
+        strict = [s for s in good if s.kind not in ("slip", "property")]
+        result.strict += bool(strict)
+        result.at_once += bool(strict) and found[0] is strict[0]
         result.kinds[good[0].kind if good else "none"] += 1
         if not good:
             result.unnamed.append(f"{question.name}: {name}\n    {first(found)}")
@@ -106,7 +111,6 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--held-out", action="store_true", help="only of the operators that slips do not know")
     parser.add_argument("--unnamed", action="store_true", help="list those that are not named")
     given = parser.parse_args(arguments)
-    diagnosis.LONGEST_S = 60.0
     total = Named()
     for topic in given.topics:
         questions = of_topic(topic).values()

@@ -29,7 +29,14 @@ LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should lo
 ONLY_HIDDEN = (
     "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
 )
-NAMES_THE_MISTAKE = ("misconception", "exception", "relation", "input", "slip")  # kinds of hints; others say where
+NAMES_THE_MISTAKE = (
+    "misconception",
+    "exception",
+    "relation",
+    "input",
+    "step",
+    "slip",
+)  # kinds of hints; others say where
 WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 
 

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labkit.course.questions.relations import NUMBERS, View, relation
+from labkit.course.questions.relations import LOOSE, NUMBERS, Relation, View, relation
+
+DIRECTIONS: list[Relation] = []  # true of many wrong answers, so they are asked last
 
 
 @relation(NUMBERS)
@@ -16,7 +18,7 @@ def always_the_same(view: View) -> str:
     if not view.shaped:
         return ""
     e, g, _ = view.numbers()
-    if g.size < 2 or not view.same(g, np.full(g.shape, g[0])):
+    if g.size < 2 or np.isnan(g[0]) or not view.same(g, np.full(g.shape, g[0])):
         return ""
     if view.same(e, np.full(e.shape, e[0])) and not np.isnan(e[0]):
         return ""  # then it is an offset
@@ -124,7 +126,16 @@ def factor(view: View) -> str:
                 if all(q is not None and q > 0 and np.isclose(abs(k), q**power, rtol=1e-3, atol=0.0) for k, q in pairs):
                     of = {1: name, 2: f"the square of {name}", 0.5: f"the root of {name}"}[abs(power)]
                     return f"Yours are too {words} by a factor that is {of}: divide or multiply by it."
-    return "In each case yours are the right values times one number, another in each case." if several(view) else ""
+    return ""
+
+
+@relation(LOOSE)
+def some_factor(view: View) -> str:
+    """A factor in each case that cannot be named."""
+    factors = [factor_of(view, e, g) for e, g in zip(view.expected, view.got, strict=True)]
+    if not several(view) or not all(k is None or (np.isfinite(k) and k) for k in factors):
+        return ""
+    return "In each case yours are the right values times one number, another in each case."
 
 
 def enough(view: View, told: list) -> bool:
@@ -170,7 +181,16 @@ def offset(view: View) -> str:
             for part, of in ((1.0, ""), (2.0, "twice "), (0.5, "half of ")):
                 if all(q is not None and np.isclose(c, sign * part * q, rtol=1e-3, atol=view.atol) for c, q in pairs):
                     return f"Yours are too {words} by {of}{name}."
-    return "In each case yours are off by one number, another in each case: which term is it?" if several(view) else ""
+    return ""
+
+
+@relation(LOOSE)
+def some_offset(view: View) -> str:
+    """An offset in each case that cannot be named."""
+    offsets = [offset_of(view, e, g) for e, g in zip(view.expected, view.got, strict=True)]
+    if not several(view) or not all(c is None or np.isfinite(c) for c in offsets):
+        return ""
+    return "In each case yours are off by one number, another in each case: which term is it?"
 
 
 def offset_of(view: View, e: np.ndarray, g: np.ndarray) -> float | None:
@@ -195,9 +215,61 @@ def straight_line(view: View) -> str:
     if np.unique(e[use]).size < 4 or any(a.dtype.kind == "b" for a in (*view.expected, *view.got)):
         return ""
     k, c = np.polyfit(e[use], g[use], 1)
-    if abs(k) < 1e-9 or not view.gives(lambda e: k * e + c):
+    if abs(k) < 1e-9 or abs(k - 1) < 1e-9 or not view.gives(lambda e: k * e + c):
         return ""
     return f"Each of yours is {k:.4g} times the right value {'plus' if c > 0 else 'minus'} {abs(c):.4g}."
+
+
+@relation(DIRECTIONS)
+def no_number(view: View) -> str:
+    """All that is wrong is NaN, or infinite."""
+    _, g, wrong = wrong_numbers(view)
+    if not wrong.any() or np.isfinite(g[wrong]).any():
+        return ""
+    if np.isnan(g[wrong]).all():
+        return "What is wrong is NaN: 0 / 0, the mean of nothing, or the logarithm or root of a negative number."
+    return "What is wrong is infinite: something is divided by 0, or grows without end."
+
+
+@relation(DIRECTIONS)
+def one_direction(view: View) -> str:
+    """What is wrong is always too large, or always too small."""
+    e, g, wrong = wrong_numbers(view)
+    if not np.isfinite(g[wrong]).all() or np.count_nonzero(wrong) < 2:
+        return ""
+    truths = all(a.dtype.kind == "b" for a in (*view.expected, *view.got))
+    for larger, sign, whole in (
+        (True, "large", "True where it should be, and elsewhere, too"),
+        (False, "small", "True only where it should be, but not everywhere there"),
+    ):
+        if ((g > e) == larger)[wrong].all():
+            if truths:
+                return f"Yours is {whole}."
+            towards = "; the sign is right" if (np.sign(g) == np.sign(e))[wrong].all() and (e < 0).any() else ""
+            return f"Wherever yours are wrong, they are too {sign}{towards}."
+    return ""
+
+
+@relation(DIRECTIONS)
+def order_kept(view: View) -> str:
+    """The right ones in order of size are yours in order of size, or the reverse."""
+    e, g, wrong = wrong_numbers(view)
+    if e.size < 6 or np.unique(e).size < 6 or not np.isfinite(e).all() or not np.isfinite(g).all() or not wrong.any():
+        return ""
+    sorted_by_right = g[np.argsort(e, kind="stable")]
+    if (np.diff(sorted_by_right) > 0).all():
+        return "Yours grow where the right ones grow, in all cases together: a number in the formula is another."
+    if (np.diff(sorted_by_right) < 0).all():
+        return "Yours shrink where the right ones grow: is a sign or a quotient the wrong way round?"
+    return ""
+
+
+def wrong_numbers(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All numbers that are expected and that came, and where they differ; nothing if shapes or types are others."""
+    if not view.shaped or len({a.dtype.kind == "b" for a in (*view.expected, *view.got)}) > 1:
+        return np.zeros(0), np.zeros(0), np.zeros(0, bool)
+    e, g, _ = view.numbers()
+    return e, g, np.concatenate([np.ravel(w) for w in view.wrong()])
 
 
 @relation(NUMBERS)

@@ -8,22 +8,23 @@ is wrong.
 
 import copy
 import functools
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from labkit.course.questions.by_number import NUMBERS
+from labkit.course.questions import forms, made_of  # noqa: F401  they enter their relations
+from labkit.course.questions.by_number import DIRECTIONS, NUMBERS
 from labkit.course.questions.comparison import Case, Problem, alike, parts, trusted
 from labkit.course.questions.errors import explain
-from labkit.course.questions.inputs import changes
+from labkit.course.questions.inputs import ARRAYS, changes
 from labkit.course.questions.places import places
 from labkit.course.questions.question import Misconception, Property, Question
-from labkit.course.questions.relations import ARRANGED, COMBINED, View
+from labkit.course.questions.relations import ARRANGED, COMBINED, LOOSE, Relation, View, attempt
 from labkit.course.questions.slips import Slip, slips
+from labkit.course.questions.steps import changed_steps, steps
 
-LONGEST_S = 1.0  # no further sentence is looked for after that
+MOST_TRIES = 1500  # functions that are tried for one answer: a number, so that all machines say the same
 
 
 @dataclass(frozen=True)
@@ -43,21 +44,31 @@ def diagnose(question: Question, cases: Sequence[Case], outputs: Sequence[object
 
 def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
     """All sentences that are true of wrong outputs, the most specific first."""
-    end = time.monotonic() + LONGEST_S
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
     yield from explained(question, cases, outputs)
     views = list(views_of(question, cases, outputs))
     for name, view in views:
-        yield from (Sentence("relation", name + says) for says in related(view))
+        yield from related(name, view, (*ARRANGED, *NUMBERS, *COMBINED))
     yield from tuple_in_another_order(question, cases, outputs)
-    for says in changed_inputs(question, cases, outputs, end):
-        yield Sentence("input", says)
+    yield from another_form(question, cases, outputs)
+    tried = Tried(question, cases, outputs)
+    for says, change in changes(question, cases[0].args):
+        if tried.explains(lambda args, change=change: question.reference(*change(args))):
+            yield Sentence("input", says)
     for name, view in views:
         yield from local(name, view)
+    for says, function in changed_steps(question.reference, ARRAYS):
+        if tried.explains(function):
+            yield Sentence("step", says)
+    for slip in slips_of(question.reference):
+        if tried.explains(lambda args, slip=slip: slip.function(*args)):
+            yield Sentence("slip", str(slip))
+    for name, view in views:
+        yield from related(name, view, LOOSE)
     yield from broken_properties(question, cases, outputs)
-    for says in slipped(question, cases, outputs, end):
-        yield Sentence("slip", says)
+    for name, view in views:
+        yield from directed(name, view)
     for name, view in views:
         yield from (Sentence("place", f"{name}It is wrong only {where}.") for where, _ in places(view))
 
@@ -95,13 +106,19 @@ def output_of(misconception: Misconception, args: tuple) -> object:
 
 
 def explained(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
-    """What the first exception means in this task."""
-    for case, got in zip(cases, outputs, strict=True):
-        if isinstance(got, Problem) and got.kind == "exception":
-            args = dict(zip(question.parameters, case.args, strict=True))
-            if said := explain(got.says, args):
-                yield Sentence("exception", said)
-            return
+    """What the first exception means in this task, and in which cases there is one."""
+    raised = [isinstance(got, Problem) and got.kind == "exception" for got in outputs]
+    if not any(raised):
+        return
+    first = raised.index(True)
+    says = explain(outputs[first].says, dict(zip(question.parameters, cases[first].args, strict=True)))
+    failed = tuple(np.array(float(r)) for r in raised)
+    view = View(tuple(np.zeros(len(cases))), failed, tuple(c.args for c in cases), question.parameters, 0.0, 0.0)
+    where = next((where for where, _ in places(view) if where.startswith("in cases")), "") if says else ""
+    if where:
+        yield Sentence("exception", f"{says} It fails only {where}.")
+    if says:
+        yield Sentence("exception", says)
 
 
 # ------------------------------------------------------------------------------------------------- relations
@@ -114,29 +131,66 @@ def views_of(question: Question, cases: Sequence[Case], outputs: Sequence[object
     if not pairs or len(counts) != 1:
         return
     (count,) = counts
+    on_the_way = tuple(steps(question.reference, [case.args for case, _ in pairs]))
     for k in range(count):
         expected = tuple(np.asarray(parts(case.expected)[k]) for case, _ in pairs)
         got = tuple(np.asarray(parts(got)[k]) for _, got in pairs)
         args = tuple(case.args for case, _ in pairs)
-        view = View(expected, got, args, question.parameters, question.rtol, question.atol)
+        view = View(expected, got, args, question.parameters, question.rtol, question.atol, on_the_way)
         if not all(view.same(e, g) for e, g in zip(expected, got, strict=True)):
             yield f"Output {k + 1} of {count}: " if count > 1 else "", view
 
 
-def related(view: View) -> Iterator[str]:
-    """The relations that hold everywhere."""
-    for relation in (*ARRANGED, *NUMBERS, *COMBINED):
+def related(name: str, view: View, relations: Sequence[Relation]) -> Iterator[Sentence]:
+    """Those of some relations that hold everywhere."""
+    for relation in relations:
         if said := relation(view):
-            yield said
+            yield Sentence("relation", name + said)
 
 
 def local(name: str, view: View) -> Iterator[Sentence]:
     """The relations that hold at some places outside of which all is right."""
-    for where, masks in places(view):
-        narrow = view.at(masks)
-        for relation in NUMBERS:
-            if said := relation(narrow):
-                yield Sentence("relation", f"{name}It is wrong only {where}. {said}")
+    for where, masks in (*places(view), *wherever_wrong(view)):
+        yield from related(f"{name}It is wrong only {where}. There: ", view.at(masks), NUMBERS)
+
+
+def directed(name: str, view: View) -> Iterator[Sentence]:
+    """How it is wrong at the narrowest place outside of which all is right, or wherever it is wrong."""
+    where = next((f"It is wrong only {where}. " for where, _ in places(view)), "")
+    yield from related(name + where, view, DIRECTIONS)
+
+
+def wherever_wrong(view: View) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """The places that are wrong, if there are several and some are right."""
+    wrong = view.wrong() if view.shaped else []
+    count = sum(int(w.sum()) for w in wrong)
+    if 2 < count < sum(w.size for w in wrong):
+        yield "in some numbers", wrong
+
+
+def another_form(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
+    """One array in the place of several, or several in the place of one."""
+    pairs = with_outputs(question, cases, outputs)
+    if not pairs or len({isinstance(got, tuple) for _, got in pairs}) > 1:
+        return
+    several = isinstance(pairs[0][0].expected, tuple)
+    if several and not isinstance(pairs[0][1], tuple):
+        count = len(pairs[0][0].expected)
+        for k in range(count):
+            if all(alike(question, case.expected[k], got) for case, got in pairs):
+                yield Sentence("relation", f"You return only output {k + 1} of {count}; the others are missing.")
+        if all(np.shape(got) and len(got) == count for _, got in pairs):
+            yield Sentence("relation", f"You return one array of {count} rows in the place of {count} outputs.")
+    elif not several and isinstance(pairs[0][1], tuple):
+        for k in range(min(len(got) for _, got in pairs)):
+            if all(alike(question, case.expected, got[k]) for case, got in pairs):
+                yield Sentence(
+                    "relation", f"The right output is number {k + 1} of those that you return: return it alone."
+                )
+        made = [attempt(np.stack, got) for _, got in pairs]
+        right = all(m is not None and alike(question, c.expected, m) for (c, _), m in zip(pairs, made, strict=True))
+        values = "its values are right" if right else "its values are others, too"
+        yield Sentence("relation", f"You return a list or a tuple, and one array is asked for; {values}.")
 
 
 def tuple_in_another_order(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
@@ -154,34 +208,33 @@ def tuple_in_another_order(question: Question, cases: Sequence[Case], outputs: S
                 yield Sentence("relation", f"Outputs {j + 1} and {i + 1} are exchanged.")
 
 
-# ------------------------------------------------------------------------------------------- changed arguments
+# ---------------------------------------------------------------------------------------- functions that are tried
 
 
-def changed_inputs(question: Question, cases: Sequence[Case], outputs: Sequence[object], end: float) -> Iterator[str]:
-    """The changes of the arguments with which a right answer gives these outputs."""
-    pairs = with_outputs(question, cases, outputs)
-    for says, change in changes(question, cases[0].args) if pairs else ():
-        if time.monotonic() > end:
-            return
-        if explains(question, pairs, lambda args, change=change: question.reference(*change(args))):
-            yield says
+class Tried:
+    """Functions of the arguments that may give the outputs; MOST_TRIES are tried."""
+
+    def __init__(self, question: Question, cases: Sequence[Case], outputs: Sequence[object]):
+        self.question, self.pairs, self.count = question, with_outputs(question, cases, outputs), 0
+
+    def explains(self, function: Callable) -> bool:
+        """Whether a function gives the outputs (where it fails, the right ones), some of them wrong."""
+        self.count += 1
+        if not self.pairs or self.count > MOST_TRIES:
+            return False
+        shown = 0
+        for case, got in self.pairs:
+            new = attempted(function, case.args)
+            if not alike(self.question, case.expected if new is None else new, got):
+                return False
+            shown += new is not None and not alike(self.question, new, case.expected)
+        return shown > 0
 
 
 def with_outputs(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[tuple[Case, object]]:
     """The cases that have an output, the wrong ones first: they decide soonest."""
     pairs = [(case, got) for case, got in zip(cases, outputs, strict=True) if not isinstance(got, Problem)]
     return sorted(pairs, key=lambda pair: alike(question, pair[0].expected, pair[1]))
-
-
-def explains(question: Question, pairs: Sequence[tuple[Case, object]], function: Callable) -> bool:
-    """Whether a function of the arguments gives the outputs (where it fails, the right ones), some of them wrong."""
-    shown = 0
-    for case, got in pairs:
-        new = attempted(function, case.args)
-        if not alike(question, case.expected if new is None else new, got):
-            return False
-        shown += new is not None and not alike(question, new, case.expected)
-    return shown > 0
 
 
 def attempted(function: Callable, args: tuple) -> object | None:
@@ -213,16 +266,6 @@ def fulfilled(prop: Property, case: Case, got: object) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------------ slips
-
-
-def slipped(question: Question, cases: Sequence[Case], outputs: Sequence[object], end: float) -> Iterator[str]:
-    """The slips in the reference that give these outputs."""
-    pairs = with_outputs(question, cases, outputs)
-    for slip in slips_of(question.reference) if pairs else ():
-        if time.monotonic() > end:
-            return
-        if explains(question, pairs, lambda args, slip=slip: slip.function(*args)):
-            yield str(slip)
 
 
 @functools.cache

@@ -21,6 +21,10 @@ def explain(text: str, args: dict) -> str:
     for pattern, function in EXPLAINED:
         if (found := pattern.match(text)) and (said := function(found, args)):
             return said
+    for pattern, says in TABLE.items():
+        if found := re.match(pattern, text):
+            groups = [found[0], *(group for group in found.groups() if group is not None)]
+            return says.format(*groups) if "{" in says else says
     return ""
 
 
@@ -49,7 +53,9 @@ def outside(found: re.Match, args: dict) -> str:
     if index < 0:
         return f"The index {index} counts from the end, and there are only {size} entries along axis {axis}."
     if index == size:
-        return f"The index {index} is one past the end: the last one along axis {axis} is {size - 1}."
+        of = " and ".join(name for name, a in arrays(args).items() if a.ndim > axis and a.shape[axis] == size)
+        along = f"axis {axis}{' (as long as that of ' + of + ')' if of else ''}"
+        return f"The index {index} is one past the end: the last one along {along} is {size - 1}."
     lengths = [f"axis {k} of {name}" for name, a in arrays(args).items() for k, n in enumerate(a.shape) if index < n]
     if holding:
         return f"A value of {holding[0]}, {index}, is used as an index into an axis of only {size}."
@@ -58,37 +64,8 @@ def outside(found: re.Match, args: dict) -> str:
     return f"An index of {index} into an axis of {size}: which numbers can stand there?"
 
 
-@when(r"IndexError: (?:arrays used as indices|only integers|.*is not a valid index)")
-def no_index(found: re.Match, args: dict) -> str:
-    """Floats as indices."""
-    return "An index must be whole numbers or truth values: convert it with .astype(int), or compare."
-
-
-@when(r"IndexError: boolean index did not match .*?axis (\d+); .*?is (\d+) but .*?is (\d+)")
-def mask_does_not_fit(found: re.Match, args: dict) -> str:
-    """A mask of another shape."""
-    return f"A mask of {found[3]} entries along axis {found[1]} selects from an array of {found[2]}: whose mask is it?"
-
-
-@when(r"IndexError: too many indices.*?(\d+)-dimensional, but (\d+)")
-def too_many_indices(found: re.Match, args: dict) -> str:
-    """More indices than axes."""
-    return f"{found[2]} indices for an array of {found[1]} axes: which argument has how many axes? Print its shape."
-
-
-@when(r"IndexError: invalid index to scalar|TypeError: .*object is not subscriptable")
-def index_into_a_number(found: re.Match, args: dict) -> str:
-    """An index into a number."""
-    return "You take an entry of something that is a single number: does a sum lack its axis?"
-
-
-@when(r"IndexError: (?:list|tuple|string) index out of range")
-def past_the_list(found: re.Match, args: dict) -> str:
-    """An index beyond a list's end."""
-    return "The list is shorter than you think in this case: how long is it, and where does the index start?"
-
-
 @when(r"ValueError: operands could not be broadcast together with shapes? \(([\d,]*)\) \(([\d,]*)\)")
+@when(r"ValueError: operands could not be broadcast together with remapped shapes.*?: \(([\d,]*)\).*? \(([\d,]*)\)->")
 def shapes_do_not_fit(found: re.Match, args: dict) -> str:
     """Two shapes that do not fit, named by the arguments that have them."""
     a, b = (tuple(int(n) for n in text.split(",") if n) for text in found.groups())
@@ -106,51 +83,6 @@ def whose(shape: tuple[int, ...], args: dict) -> str:
     return f" (the shape of {' and '.join(names)})" if names else ""
 
 
-@when(r"ValueError: matmul.*?size (\d+) is different from (\d+)")
-def product_does_not_fit(found: re.Match, args: dict) -> str:
-    """A matrix product of shapes that do not fit."""
-    fit = f"In a product A @ B the columns of A ({found[2]}) must be as many as the rows of B ({found[1]})."
-    return f"{fit} Points that are rows are multiplied from the left: P @ R.T."
-
-
-@when(r"ValueError: shapes \(([\d,]*)\) and \(([\d,]*)\) not aligned")
-def dot_does_not_fit(found: re.Match, args: dict) -> str:
-    """The same for np.dot."""
-    return (
-        f"Shapes ({found[1]}) and ({found[2]}) have no product: the first has other columns than the second has rows."
-    )
-
-
-@when(r"ValueError: could not broadcast input array from shape \(([\d,]*)\) into shape \(([\d,]*)\)")
-def does_not_fit_in(found: re.Match, args: dict) -> str:
-    """An assignment of another shape."""
-    return f"You put something of shape ({found[1]}) into a place of shape ({found[2]})."
-
-
-@when(r"ValueError: (?:shape mismatch|could not be broadcast|.*shape mismatch)")
-def indices_do_not_fit(found: re.Match, args: dict) -> str:
-    """Index arrays of different shapes."""
-    return "Index arrays that are used together must have one shape: print the shape of each."
-
-
-@when(r"ValueError: all the input array|ValueError: need at least one array|ValueError: all input arrays")
-def cannot_stack(found: re.Match, args: dict) -> str:
-    """Arrays of different shapes stacked."""
-    return "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
-
-
-@when(r"ValueError: cannot reshape array of size (\d+) into shape \(([\d,-]*)\)")
-def does_not_reshape(found: re.Match, args: dict) -> str:
-    """A reshape to another size."""
-    return f"{found[1]} numbers do not fill the shape ({found[2]}): is there padding that does not belong to it?"
-
-
-@when(r"ValueError: The truth value of an array|ValueError: The truth value of a")
-def truth_of_an_array(found: re.Match, args: dict) -> str:
-    """if, and, or, max of arrays."""
-    return "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: use np.where, &, | or np.minimum."
-
-
 @when(r"(?:numpy\.exceptions\.)?AxisError: axis (-?\d+) is out of bounds for array of dimension (\d+)")
 def no_such_axis(found: re.Match, args: dict) -> str:
     """An axis that there is not."""
@@ -160,110 +92,10 @@ def no_such_axis(found: re.Match, args: dict) -> str:
     )
 
 
-@when(r"ValueError: '?axes?'?.*match|ValueError: axes don't match")
-def axes_do_not_match(found: re.Match, args: dict) -> str:
-    """Transposing with another number of axes."""
-    return "The list of axes must name each axis of the array once."
-
-
-@when(r"ValueError: zero-size array to reduction operation (\w+)")
-def nothing_to_reduce(found: re.Match, args: dict) -> str:
-    """min or max of nothing."""
-    return f"The {found[1]} of nothing: in this case nothing is left. What is right then?"
-
-
-@when(r"ValueError: (?:not enough|too many) values to unpack")
-def unpacked(found: re.Match, args: dict) -> str:
-    """Another number of values."""
-    return "The left side names another number of values than there are on the right: print what stands there."
-
-
-@when(r"ValueError: (?:setting an array element|.*inhomogeneous)")
-def ragged(found: re.Match, args: dict) -> str:
-    """A list of unlike lengths."""
-    return "The parts of the array have different lengths: which of them is a list or an array by mistake?"
-
-
-@when(r"ZeroDivisionError")
-def divided_by_zero(found: re.Match, args: dict) -> str:
-    """Python's own division by zero."""
-    return "Something that you divide by is 0 in this case."
-
-
-@when(r"OverflowError|FloatingPointError")
-def overflow(found: re.Match, args: dict) -> str:
-    """A number that is too large."""
-    return "A number grows too large: which exponential, power or cast is it?"
-
-
-@when(r"(?:numpy\.linalg\.)?LinAlgError: Singular matrix")
-def singular(found: re.Match, args: dict) -> str:
-    """A matrix that has no inverse."""
-    return "This matrix has no inverse: is it the one that you mean, and are all its rows filled?"
-
-
-@when(r"(?:numpy\.linalg\.)?LinAlgError")
-def linear_algebra(found: re.Match, args: dict) -> str:
-    """Other complaints of linear algebra."""
-    return "np.linalg wants square matrices of finite numbers, in the last two axes."
-
-
-@when(r".*?: Cannot cast ufunc '(\w+)' output from dtype\('(\w+)'\) to dtype\('(\w+)'\)")
-def in_place_cast(found: re.Match, args: dict) -> str:
-    """In-place arithmetic on whole numbers."""
-    return f"An array of {found[3]} cannot hold {found[2]} in place: write x = x + ..., or x.astype(float) before."
-
-
-@when(r"TypeError: (?:unsupported operand type|bad operand type).*?'NoneType'")
-def none_in_arithmetic(found: re.Match, args: dict) -> str:
-    """None in arithmetic."""
-    return "One of the operands is None: a function without `return`, or one that works in place, gives None."
-
-
-@when(r"TypeError: numpy boolean (subtract|negative)|TypeError: The numpy boolean (negative|subtract)")
-def boolean_arithmetic(found: re.Match, args: dict) -> str:
-    """Minus of truth values."""
-    return "Truth values have no minus: use ~ for not, ^ for different, or .astype(int)."
-
-
-@when(r"TypeError: ufunc '(\w+)' not supported|TypeError: unsupported operand type\(s\) for ([&|^~]+)")
-def wrong_types(found: re.Match, args: dict) -> str:
-    """&, |, ~ of floats."""
-    return "&, |, ^ and ~ work on truth values and whole numbers: compare first, in brackets, as in (a > 0) & (b > 0)."
-
-
-@when(r"TypeError: only (?:length-1|0-dimensional|integer scalar|size-1) arrays")
-def array_for_a_number(found: re.Match, args: dict) -> str:
-    """An array where Python wants one number."""
-    return (
-        "Python wants one number there and gets an array: use NumPy's function, np.exp for math.exp, or take one entry."
-    )
-
-
-@when(r"TypeError: 'numpy\.ndarray' object is not callable|TypeError: '(\w+)' object is not callable")
-def not_a_function(found: re.Match, args: dict) -> str:
-    """Round brackets after something that is no function."""
-    return (
-        "Round brackets call a function; entries are taken with square ones. Or has a variable taken a function's name?"
-    )
-
-
 @when(r"TypeError: .+?\(\) (?:takes|missing).*positional")
 def signature(found: re.Match, args: dict) -> str:
     """Another number of arguments than the check gives."""
     return f"The check calls it with these arguments: {', '.join(args)}. Keep the first line of the cell as it is."
-
-
-@when(r"TypeError: (.+?)\(\) got an unexpected keyword argument '(\w+)'")
-def unknown_keyword(found: re.Match, args: dict) -> str:
-    """A keyword that a function does not know."""
-    return f"{found[1]} has no option {found[2]}: look it up with `{found[1]}?`."
-
-
-@when(r"TypeError: (?:'\w+' object cannot be interpreted as an int|expected a sequence of int|slice indices must be)")
-def wants_an_integer(found: re.Match, args: dict) -> str:
-    """A float where a whole number belongs."""
-    return "A length or a bound must be a whole number: / gives a float, // a whole number."
 
 
 @when(r"NameError: name '(\w+)' is not defined")
@@ -275,12 +107,6 @@ def no_such_name(found: re.Match, args: dict) -> str:
         if near
         else (f"No cell that counts here defines {found[1]}: is it spelled right, and was its cell run?")
     )
-
-
-@when(r"UnboundLocalError: cannot access local variable '(\w+)'")
-def unbound(found: re.Match, args: dict) -> str:
-    """A local name read before it has a value."""
-    return f"{found[1]} is read before it gets a value: in this case no branch, or no turn of the loop, sets it."
 
 
 @when(r"AttributeError: module 'numpy(?:\.\w+)?' has no attribute '(\w+)'")
@@ -301,25 +127,127 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
     )
 
 
-@when(r"KeyError")
-def no_such_key(found: re.Match, args: dict) -> str:
-    """A key that is not in a dictionary."""
-    return "The dictionary has no such key in this case: which values can occur?"
-
-
-@when(r"RecursionError")
-def endless_recursion(found: re.Match, args: dict) -> str:
-    """A function that calls itself without end."""
-    return "It calls itself without end: in which case does it stop?"
-
-
-@when(r"MemoryError|numpy\._core\._exceptions\._ArrayMemoryError|_ArrayMemoryError")
-def too_large(found: re.Match, args: dict) -> str:
-    """An array that is too large."""
-    return "An array of that size does not fit into memory: which length is wrong?"
-
-
-@when(r"ValueError: negative dimensions|ValueError: negative shift count|ValueError: array is too big")
-def negative_length(found: re.Match, args: dict) -> str:
-    """A length below 0."""
-    return "A length comes out negative or huge: which subtraction, or which byte order, is the wrong way round?"
+# Exceptions that one sentence explains; {1} is what the first bracket of the pattern holds.
+TABLE = {
+    r"IndexError: (?:arrays used as indices|only integers|.*is not a valid index)|TypeError: \w+ indices must be": (
+        "An index must be whole numbers or truth values: convert it with .astype(int), or compare."
+    ),
+    r"IndexError: boolean index did not match .*?axis (\d+); .*?is (\d+) but .*?is (\d+)": (
+        "A mask of {3} entries along axis {1} selects from an array of {2}: whose mask is it?"
+    ),
+    r"IndexError: too many indices.*?(\d+)-dimensional, but (\d+)": (
+        "{2} indices for an array of {1} axes: which argument has how many axes? Print its shape."
+    ),
+    r"IndexError: invalid index to scalar|TypeError: .*object is not subscriptable": (
+        "You take an entry of something that is a single number: does a sum lack its axis?"
+    ),
+    r"IndexError: (?:list|tuple|string)(?: assignment)? index out of range": (
+        "The list is shorter than you think in this case: how long is it, and where does the index start?"
+    ),
+    r"ValueError: matmul.*?size (\d+) is different from (\d+)": (
+        "In a product A @ B the columns of A ({2}) must be as many as the rows of B ({1}). Points that are rows are "
+        "multiplied from the left: P @ R.T."
+    ),
+    r"ValueError: shapes \(([\d,]*)\) and \(([\d,]*)\) not aligned": (
+        "Shapes ({1}) and ({2}) have no product: the first has other columns than the second has rows."
+    ),
+    r"ValueError: could not broadcast input array from shape \(([\d,]*)\) into shape \(([\d,]*)\)": (
+        "You put something of shape ({1}) into a place of shape ({2})."
+    ),
+    r"(?:Value|Index)Error: (?:shape mismatch|could not be broadcast|.*shape mismatch)": (
+        "Index arrays that are used together must have one shape: print the shape of each."
+    ),
+    r"ValueError: all the input array|ValueError: need at least one array|ValueError: all input arrays": (
+        "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
+    ),
+    r"ValueError: cannot reshape array of size (\d+) into shape \(([\d,-]*)": (
+        "{1} numbers do not fill the shape ({2}): is there padding that does not belong to it?"
+    ),
+    r"ValueError: The truth value of an array|ValueError: The truth value of a": (
+        "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: use np.where, &, | or np.minimum."
+    ),
+    r"ValueError: (?:'?axes?'?.*match|axes don't match|repeated axis|duplicate value in 'axis')": (
+        "The list of axes must name each axis of the array once."
+    ),
+    r"ValueError: zero-size array to reduction operation (\w+)|ValueError: attempt to get (\w+) of an empty": (
+        "The {1} of nothing: in this case nothing is left. What is right then?"
+    ),
+    r"ValueError: (\w+)\(\) (?:arg is an empty sequence|iterable argument is empty)": (
+        "The {1} of nothing: in this case nothing is left. What is right then?"
+    ),
+    r"ValueError: zip\(\) argument": "The lists that you go through together have different lengths: print them.",
+    r"ValueError: slice step cannot be zero": "The step of a slice is 0 in this case: which number should it be?",
+    r"ValueError: .*(?:enough dimensions|too small depth)": (
+        "A function gets one number where it wants a row or a matrix: was a sum, or an index, taken too early?"
+    ),
+    r"ValueError: .*(?:too many subscripts|too deep|must be 1 dimensional|mismatch in its core)": (
+        "A function gets an array of another shape than it wants: print the shape of each of its arguments."
+    ),
+    r"ValueError: index can't contain negative": "A width, length or index is below 0: which difference is it?",
+    r"ValueError: strides is incompatible|ValueError: buffer is smaller": (
+        "The buffer holds fewer bytes than the shape and the steps need: which of them is too large?"
+    ),
+    r"ValueError: (?:not enough|too many) values to unpack": (
+        "The left side names another number of values than there are on the right: print what stands there."
+    ),
+    r"ValueError: (?:setting an array element|.*inhomogeneous)": (
+        "The parts of the array have different lengths: which of them is a list or an array by mistake?"
+    ),
+    r"ZeroDivisionError": "Something that you divide by is 0 in this case.",
+    r"OverflowError|FloatingPointError": "A number grows too large: which exponential, power or cast is it?",
+    r"(?:numpy\.linalg\.)?LinAlgError: Singular matrix": (
+        "This matrix has no inverse: is it the one that you mean, and are all its rows filled?"
+    ),
+    r"(?:numpy\.linalg\.)?LinAlgError": "np.linalg wants square matrices of finite numbers, in the last two axes.",
+    r".*?: Cannot cast (?:ufunc '\w+' output|array data) from dtype\('(\w+)'\) to dtype\('(\w+)'\)": (
+        "An array of {2} cannot hold {1} in place: write x = x + ..., or x.astype(float) before."
+    ),
+    r"TypeError: (?:unsupported operand type|bad operand type).*?'NoneType'": (
+        "One of the operands is None: a function without `return`, or one that works in place, gives None."
+    ),
+    r"TypeError: (?:unsupported operand type|can only concatenate).*?(list|tuple)": (
+        "You calculate with a {1}: for Python, + joins such and * repeats it. Make an array of it before."
+    ),
+    r"TypeError: numpy boolean (?:subtract|negative)|TypeError: The numpy boolean (?:negative|subtract)": (
+        "Truth values have no minus: use ~ for not, ^ for different, or .astype(int)."
+    ),
+    r"TypeError: ufunc '(\w+)' not supported|TypeError: unsupported operand type\(s\) for ([&|^~]+)": (
+        "&, |, ^ and ~ work on truth values and whole numbers: compare first, in brackets, as in (a > 0) & (b > 0)."
+    ),
+    r"TypeError: only (?:length-1|0-dimensional|integer scalar|size-1) arrays": (
+        "Python wants one number there and gets an array: use NumPy's function, np.exp for math.exp, or take one entry."
+    ),
+    r"TypeError: (?:int|float)\(\) argument must be|TypeError: must be real number, not": (
+        "Python wants one number there and gets a list or a tuple: which of its entries do you mean?"
+    ),
+    r"TypeError: 'numpy\.ndarray' object is not callable|TypeError: '(\w+)' object is not callable": (
+        "Round brackets call a function; entries are taken with square ones. Or has a variable taken a function's name?"
+    ),
+    r"TypeError: '(?:numpy\.)?\w+' object is not iterable|TypeError: Value after \* must be an iterable": (
+        "You go through something that is one number: is it the length, where `range` or the array itself is meant?"
+    ),
+    r"TypeError: '(\w+)' object does not support item assignment": (
+        "You assign to an entry of a {1}, which has none that can change: was an array meant?"
+    ),
+    r"TypeError: (.+?)\(\) got an unexpected keyword argument '(\w+)'": (
+        "{1} has no option {2}: look it up with `{1}?`."
+    ),
+    r"TypeError: (?:'\w+' object cannot be interpreted as an int|expected a sequence of int|slice indices must be)": (
+        "A length or a bound must be a whole number: / gives a float, // a whole number."
+    ),
+    r"TypeError: data type '(.*)' not understood": "There is no dtype {1}: are a field's name and its type exchanged?",
+    r"TypeError: .*?expected at most (\d+) arguments?, got (\d+)": (
+        "A function gets {2} arguments and takes {1}: look it up."
+    ),
+    r"UnboundLocalError: cannot access local variable '(\w+)'": (
+        "{1} is read before it gets a value: in this case no branch, or no turn of the loop, sets it."
+    ),
+    r"KeyError": "The dictionary has no such key in this case: which values can occur?",
+    r"RecursionError": "It calls itself without end: in which case does it stop?",
+    r"MemoryError|numpy\._core\._exceptions\._ArrayMemoryError|_ArrayMemoryError": (
+        "An array of that size does not fit into memory: which length is wrong?"
+    ),
+    r"ValueError: negative dimensions|ValueError: negative shift count|ValueError: array is too big": (
+        "A length comes out negative or huge: which subtraction, or which byte order, is the wrong way round?"
+    ),
+}

@@ -3,12 +3,12 @@
 Each relation is one small function of a `View`, which holds the expected and the returned array of every case. It gives
 one sentence for the student, "" if it does not hold; it holds only if it does so in every case that can show it.
 ARRANGED are relations of whole arrays; NUMBERS are relations number by number, which can also be asked of some places
-alone (`places`); COMBINED are those with the arguments, which are asked last.
+alone (`places`); COMBINED are those with the arguments and steps; LOOSE are true of more answers, so they come late.
 """
 
 import itertools
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ Array = np.ndarray | np.generic
 class View:
     """The expected and the returned array of each case, with the case's arguments and their names.
 
-    rtol, atol: what counts as equal.
+    rtol, atol: what counts as equal. steps: what the reference computes on the way, see `steps`.
     """
 
     expected: tuple[np.ndarray, ...]
@@ -29,6 +29,7 @@ class View:
     names: tuple[str, ...]
     rtol: float
     atol: float
+    steps: tuple[tuple[str, list], ...] = ()
 
     def different(self, a: Array, b: Array) -> np.ndarray:
         """Where two arrays of one shape differ; truth values are no numbers."""
@@ -81,6 +82,7 @@ Relation = Callable[[View], str]
 ARRANGED: list[Relation] = []
 NUMBERS: list[Relation] = []
 COMBINED: list[Relation] = []
+LOOSE: list[Relation] = []
 
 
 def relation(entries: list[Relation]) -> Callable[[Relation], Relation]:
@@ -269,90 +271,3 @@ def factors_along(view: View, e: np.ndarray, g: np.ndarray, axis: int) -> bool:
         return False
     scaled = ~np.isclose(factor, 1.0, rtol=view.rtol, atol=0.0)
     return bool((np.count_nonzero(e, axis=axis, keepdims=True)[scaled] > 1).all())
-
-
-# --------------------------------------------------------------------------------- made of the arguments alone
-
-
-def ingredients(view: View) -> Iterator[tuple[str, list[np.ndarray | None]]]:
-    """What is easily made of one argument: itself, its sums, extremes and places; the same for every case."""
-    for i, name in enumerate(view.names):
-        values = [args[i] for args in view.args]
-        yield name, [attempt(np.asarray, v) for v in values]
-        if not all(isinstance(v, np.ndarray) and v.ndim for v in values):
-            continue
-        for words, function in SIMPLE.items():
-            yield f"{words} of {name}", [attempt(function, v) for v in values]
-        for axis in range(min(v.ndim for v in values)):
-            for words, function in ALONG.items():
-                yield f"{words} of {name} over axis {axis}", [attempt(function, v, axis) for v in values]
-
-
-SIMPLE = {
-    "the diagonal": lambda v: np.diagonal(v) if v.ndim == 2 else None,
-    "the trace": lambda v: np.trace(v) if v.ndim == 2 else None,
-    "the sum": np.sum,
-    "the mean": np.mean,
-    "the largest": np.max,
-    "the smallest": np.min,
-    "the median": np.median,
-    "the standard deviation": np.std,
-    "the length": len,
-    "the exponentials": lambda v: np.exp(v) if v.dtype.kind == "f" else None,
-    "the logarithms": lambda v: np.log(v) if v.dtype.kind == "f" else None,
-}
-ALONG = {
-    "the sum": np.sum,
-    "the mean": np.mean,
-    "the largest": np.max,
-    "the smallest": np.min,
-    "the median": np.median,
-    "the spread": np.std,
-    "the place of the largest": np.argmax,
-    "the place of the smallest": np.argmin,
-    "the range": np.ptp,
-    "the product": np.prod,
-    "the differences": lambda v, axis: np.diff(v, axis=axis),
-}
-OPERATIONS = {
-    "times": np.multiply,
-    "divided by": np.divide,
-    "plus": np.add,
-    "minus": np.subtract,
-}
-
-
-@relation(COMBINED)
-def the_right_one_and_an_argument(view: View) -> str:
-    """The right value times, divided by, plus or minus an argument."""
-    for name, values in ingredients(view):
-        if any(v is None or v.dtype.kind not in "iuf" for v in values):
-            continue
-        for words, operation in OPERATIONS.items():
-            for fitted in (lambda v: v, lambda v: v[..., None], lambda v: v[..., None, None]):
-                predicted = [
-                    attempt(lambda e, v, f=fitted, o=operation: o(e, f(v)), e, v)
-                    for e, v in zip(view.expected, values, strict=True)
-                ]
-                if view.is_(predicted):
-                    return f"Yours are the right values {words} {name}."
-    return ""
-
-
-@relation(COMBINED)
-def made_of_the_arguments(view: View) -> str:
-    """Something simple of one argument, or of two that are combined."""
-    first = next(i for i, (e, g) in enumerate(zip(view.expected, view.got, strict=True)) if not view.same(e, g))
-    known = [(name, v) for name, v in ingredients(view) if v[first] is not None and v[first].dtype.kind in "iufb"]
-    for name, values in known:
-        if view.same(values[first], view.got[first]) and view.is_(values):
-            return f"What you return is {name}: what else has to be done with it?"
-    known = [(name, v) for name, v in known if v[first].dtype.kind != "b" and v[first].ndim <= view.got[first].ndim]
-    for (a, xs), (b, ys) in itertools.permutations(known, 2):
-        for words, operation in OPERATIONS.items():
-            predicted = attempt(operation, xs[first], ys[first])
-            if predicted is None or not view.same(predicted, view.got[first]):
-                continue
-            if view.is_([attempt(operation, x, y) for x, y in zip(xs, ys, strict=True)]):
-                return f"What you return is {a} {words} {b}."
-    return ""

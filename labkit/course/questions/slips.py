@@ -52,13 +52,7 @@ def slips(function: Callable, operators: Operators = OPERATORS) -> list[Slip]:
 
     Raises ValueError for anything but a `def`.
     """
-    tree = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(function))))
-    (definition,) = tree.body
-    if not isinstance(definition, ast.FunctionDef):
-        raise ValueError(f"function: expected a plain `def`, got {ast.unparse(definition)[:60]}")
-    definition.decorator_list, definition.returns = [], None
-    if ast.get_docstring(definition) is not None:
-        definition.body = definition.body[1:] or [ast.Pass()]
+    definition = definition_of(function)
     sources = made_of(definition)
     found: dict[str, tuple[str, str, tuple[str, ...]]] = {}
     for path in observable(definition):
@@ -72,13 +66,34 @@ def slips(function: Callable, operators: Operators = OPERATORS) -> list[Slip]:
                 near = tuple(sorted(set().union(*(sources.get(name, set()) for name in names_in(old)))))
                 found.setdefault(text, (f"line {line}: {shown(old)} -> {shown(new)}", says, near))
     found.pop(ast.unparse(definition), None)
-    return [Slip(name, says, near, compiled(text, function)) for text, (name, says, near) in found.items()]
+    return [Slip(*told, compiled(text, function)) for text, told in found.items() if is_python(text)]
 
 
-def compiled(text: str, function: Callable) -> Callable:
-    """Define the function that a text defines, among the names that the original sees."""
+def definition_of(function: Callable) -> ast.FunctionDef:
+    """The definition of a plain function, without decorators and docstring; raises ValueError for anything else."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(function))))
+    (definition,) = tree.body
+    if not isinstance(definition, ast.FunctionDef):
+        raise ValueError(f"function: expected a plain `def`, got {ast.unparse(definition)[:60]}")
+    definition.decorator_list, definition.returns = [], None
+    if ast.get_docstring(definition) is not None:
+        definition.body = definition.body[1:] or [ast.Pass()]
+    return definition
+
+
+def is_python(text: str) -> bool:
+    """Whether a text can be compiled: a tuple without its brackets, say, cannot stand everywhere."""
+    try:
+        compile(text, "<slip>", "exec")
+    except SyntaxError:
+        return False
+    return True
+
+
+def compiled(text: str, function: Callable, **more: object) -> Callable:
+    """Define the function that a text defines, among the names that the original sees and more."""
     function = inspect.unwrap(function)
-    names = dict(function.__globals__)
+    names = function.__globals__ | more
     exec(compile(text, f"<slip of {function.__name__}>", "exec"), names)
     return names[function.__name__]
 

@@ -1,6 +1,5 @@
 """What is said of a wrong answer: each relation where it holds, none where it does not; how many mutants are named."""
 
-import time
 import warnings
 
 import jaxtyping
@@ -17,10 +16,9 @@ from labkit.course.questions.run import Printed, call, judge, run
 
 
 @pytest.fixture(autouse=True)
-def as_outside_the_suite(shape_checks_off_for_bad_input, monkeypatch):
-    """Without the shape checks, and with time enough on a busy machine."""
+def as_outside_the_suite(shape_checks_off_for_bad_input):
+    """Without the shape checks."""
     jaxtyping.config.update("jaxtyping_disable", True)
-    monkeypatch.setattr(diagnosis, "LONGEST_S", 30.0)
 
 
 def table(a, k):
@@ -65,9 +63,21 @@ RELATIONS = [
     (lambda a, k: table(a, 1.0), "too small by a factor that is k"),
     (lambda a, k: table(a, -k), "sign"),
     (lambda a, k: table(np.flip(a, 1), k), "order from column to column is reversed"),
-    (lambda a, k: table(a, k) * (np.arange(len(a))[:, None] < len(a) - 1), "in the last row. Yours is always 0"),
+    (lambda a, k: table(a, k) * (np.arange(len(a))[:, None] < len(a) - 1), "in the last row. There: Yours is always 0"),
     (lambda a, k: table(a[:, :-1], k), "a were without its last column"),
     (lambda a, k: a[9], "An index of 9"),
+    (lambda a, k: table(a, k).sum(), "the sum of the right values, over all of them"),
+    (lambda a, k: table(a, k)[..., None] * [2.0, 3.0, 7.0], "axis too many"),
+    (lambda a, k: table(a, k) > 0.5, "You return truth values"),
+    (lambda a, k: list(table(a, k)), "list or a tuple, and one array is asked for; its values are right"),
+    (lambda a, k: np.full(a.shape, a.sum()) ** 0.5 + a[0, 0], "Yours do not change from row to row"),
+    (lambda a, k: np.zeros((len(a), 9)) + k, "always has length 9"),
+    (lambda a, k: a * a.sum(), "a number that stays the same from column to column"),
+    (lambda a, k: a.sum(axis=1, keepdims=True), "What you return is the result of sum, made of a"),
+    (lambda a, k: table(a, k) + a.mean(axis=0), "the right values plus the mean of a over axis 0"),
+    (lambda a, k: np.where(table(a, k) > 0.8, np.nan, table(a, k)), "What is wrong is NaN"),
+    (lambda a, k: table(a, k) + (table(a, k) > 0.8) * a, "Wherever yours are wrong, they are too large"),
+    (lambda a, k: k * a / np.sqrt(a.sum(axis=1, keepdims=True)), "a number that stays the same from column to column"),
 ]  # fmt: skip
 
 
@@ -101,7 +111,7 @@ def raised(function) -> str:
 ARGS = {"y": np.array([[0, 255]]), "P": np.zeros((5, 3)), "R": np.eye(3)}
 EXCEPTIONS = [
     (lambda: np.zeros(3)[np.array([[0, 255]])], "ignored pixels of y, labelled 255"),
-    (lambda: np.zeros(3)[3], "one past the end: the last one along axis 0 is 2"),
+    (lambda: np.zeros(3)[3], "one past the end: the last one along axis 0 (as long as that of R) is 2"),
     (lambda: np.zeros(3)[1.5], "whole numbers or truth values"),
     (lambda: np.zeros(3)[np.ones(4, bool)], "A mask of 4 entries"),
     (lambda: np.zeros(3)[0, 1], "2 indices for an array of 1 axes"),
@@ -146,21 +156,20 @@ def test_most_mutants_are_named(capsys):
     found = sum((measure(find(name), sample=8) for name in SAMPLE), Named())
     with capsys.disabled():
         print(f"\n{found}")
-    assert found.named >= 0.6 * found.wrong and found.strict >= 0.4 * found.wrong
+    assert found.named >= 0.6 * found.wrong and found.strict >= 0.6 * found.wrong
 
 
-def test_a_diagnosis_ends_in_time(monkeypatch):
-    """However long changed arguments take, no more of them are tried after the limit."""
-    monkeypatch.setattr(diagnosis, "LONGEST_S", 0.05)
+def test_a_diagnosis_tries_so_many_functions_and_no_more(monkeypatch):
+    """However long each takes: a limit in seconds would say other things on a busy machine."""
+    monkeypatch.setattr(diagnosis, "MOST_TRIES", 7)
     calls = []
 
-    def slow(a, k):
+    def counted(a, k):
         calls.append(1)
-        time.sleep(0.02)
         return table(a, k)
 
-    question = Question(name="00_test.slow", reference=slow, inputs=TABLE.inputs)
+    question = Question(name="00_test.counted", reference=counted, inputs=TABLE.inputs)
     cases = expected_cases(question, 0)
     calls.clear()
     list(sentences(question, cases, [np.full(case.expected.shape, 0.123) for case in cases]))
-    assert len(calls) < 20
+    assert 0 < len(calls) <= 7
