@@ -113,7 +113,8 @@ def explained(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     first = raised.index(True)
     says = explain(outputs[first].says, dict(zip(question.parameters, cases[first].args, strict=True)))
     failed = tuple(np.array(float(r)) for r in raised)
-    view = View(tuple(np.zeros(len(cases))), failed, tuple(c.args for c in cases), question.parameters, 0.0, 0.0)
+    args = tuple(case.args for case in cases)
+    view = View(tuple(np.array(0.0) for _ in cases), failed, args, question.parameters, 0.0, 0.0)
     where = next((where for where, _ in places(view) if where.startswith("in cases")), "") if says else ""
     if where:
         yield Sentence("exception", f"{says} It fails only {where}.")
@@ -151,7 +152,8 @@ def related(name: str, view: View, relations: Sequence[Relation]) -> Iterator[Se
 def local(name: str, view: View) -> Iterator[Sentence]:
     """The relations that hold at some places outside of which all is right."""
     for where, masks in (*places(view), *wherever_wrong(view)):
-        yield from related(f"{name}It is wrong only {where}. There: ", view.at(masks), NUMBERS)
+        relations = (*NUMBERS, *COMBINED) if where.startswith(("in column", "in entry")) else NUMBERS
+        yield from related(f"{name}It is wrong only {where}. There: ", view.at(masks), relations)
 
 
 def directed(name: str, view: View) -> Iterator[Sentence]:

@@ -39,7 +39,7 @@ def reduced(view: View) -> str:
     return ""
 
 
-@relation(LOOSE)
+@relation(ARRANGED)
 def another_type(view: View) -> str:
     """Truth values, whole numbers or others in the place of the right type."""
     kinds = {(e.dtype.kind, g.dtype.kind) for e, g in zip(view.expected, view.got, strict=True)}

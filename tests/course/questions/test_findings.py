@@ -7,16 +7,14 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from labkit.course.questions import diagnosis
 from labkit.course.questions.question import find
 from labkit.course.questions.run import judge
 
 
 @pytest.fixture(autouse=True)
-def as_outside_the_suite(shape_checks_off_for_bad_input, monkeypatch):
-    """Without the shape checks, and with time enough on a busy machine."""
+def as_outside_the_suite(shape_checks_off_for_bad_input):
+    """Without the shape checks."""
     jaxtyping.config.update("jaxtyping_disable", True)
-    monkeypatch.setattr(diagnosis, "LONGEST_S", 30.0)
 
 
 def mask_of_16_bits(segmentation, class_of_body):
@@ -162,7 +160,7 @@ def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
 
 
 NAMED = [
-    ("06_back_projection.intrinsics", centre_at_half, "entry at [1, 2]. Yours are too large by 1"),
+    ("06_back_projection.intrinsics", centre_at_half, "entry at [1, 2]. There: Yours are too large by 1"),
     ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "gradient"),
     ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),
     ("04_iou.confusion_matrix", bitten_off, "y_true and y_pred were without their last row"),
