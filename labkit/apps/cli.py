@@ -50,12 +50,14 @@ def check(lab: Annotated[Path, typer.Argument(help="A saved lab, your own notebo
 
 @app.command()
 def train(
-    data: Annotated[list[Path], typer.Argument(help="Data sets to train on, as data_gen writes them.")] = (
-        Path("data/train"),
-    ),
+    data: Annotated[
+        list[Path], typer.Argument(help="Data sets of data_gen, or folders of color/, depth/ and mask/ PNGs.")
+    ] = (Path("data/train"),),
     scenes: Annotated[int | None, typer.Option(help="Take only the first so many scenes of each.", min=1)] = None,
     val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
-    model: Annotated[str, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet.")] = "unet",
+    model: Annotated[
+        str | None, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet; that of --init, or else unet.")
+    ] = None,
     init: Annotated[
         str | None, typer.Option(help="Weights to start from, to train on: a name as in --model, or a file.")
     ] = None,
@@ -71,18 +73,24 @@ def train(
 
     import data_gen
     from labkit import training
+    from labkit.apps.own_data import PictureFolder
     from labkit.network import architecture_of, load_model, weights_path
 
+    network = None if init is None else load_model(weights_path(init))
+    model = model or ("unet" if network is None else architecture_of(network))
     if model not in training.RECIPES:
         raise ValueError(f"model: expected {' or '.join(training.RECIPES)}, got {model!r}")
-    recipe = training.RECIPES[model]
-    asked = {name: value for name, value in (("epochs", epochs), ("lr", lr)) if value is not None}
-    config = replace(recipe, seed=seed, **asked)
-    network = None if init is None else load_model(weights_path(init))
     if network is not None and architecture_of(network) != model:
         raise ValueError(f"init: expected weights of {model}, got {init} of {architecture_of(network)}")
-    val_set = None if val is None else data_gen.load(val)
-    train_set = data_gen.Joined([data_gen.load(path) for path in data], each=scenes)
+    recipe = training.RECIPES[model] if network is None else training.fine_tuning(model, validated=val is not None)
+    asked = {name: value for name, value in (("epochs", epochs), ("lr", lr)) if value is not None}
+    config = replace(recipe, seed=seed, **asked)
+
+    def opened(path: Path):
+        return PictureFolder(path) if (path / "color").is_dir() else data_gen.load(path)
+
+    val_set = None if val is None else opened(val)
+    train_set = data_gen.Joined([opened(path) for path in data], each=scenes)
     try:
         history = training.train(train_set, val_set, config, out, resume, device, model=network)
     except KeyboardInterrupt as stop:  # it says where the checkpoint is

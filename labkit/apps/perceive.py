@@ -18,7 +18,7 @@ from matplotlib.colors import to_hex
 
 from labkit.course.views import View
 from labkit.frame import RGBDFrame, read_image
-from labkit.geometry import Plane, back_project, fit_plane, invert_transform
+from labkit.geometry import Plane, back_project, back_project_to_base, fit_plane, invert_transform
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
 from labkit.pipeline import Perception, Pipeline
@@ -151,6 +151,13 @@ def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None =
     return RGBDFrame(rgb, metres, intrinsics.K, np.eye(4))
 
 
+def on_table(frame: RGBDFrame) -> tuple[RGBDFrame, Plane]:
+    """Find the table in a frame's depth, and give the frame with the base frame laid on it; its table_z is 0."""
+    P = back_project(frame.depth, frame.K)
+    plane = fit_plane(P[np.isfinite(P[..., 2])])
+    return RGBDFrame(frame.rgb, frame.depth, frame.K, base_on_table(plane), table_z=0.0), plane
+
+
 def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
     """Lay a base frame on a table that was found in the camera's frame: T_base_cam.
 
@@ -193,17 +200,17 @@ def perceive(
     plane of the depth picture is taken for the table, and `table_z` for 0. All that was seen over the table is the
     workspace. Raises ValueError if no plane can be found. Topics 06 and 07.
     """
-    P_cam = back_project(frame.depth, frame.K)
-    P_cam = P_cam[np.isfinite(P_cam[..., 2])]
     plane = None
     if T_base_cam is None:
-        plane, table_z = fit_plane(P_cam), 0.0
-        T_base_cam = base_on_table(plane)
-    frame = RGBDFrame(frame.rgb, frame.depth, frame.K, T_base_cam, table_z=table_z)
-    P = P_cam @ T_base_cam[:3, :3].T + T_base_cam[:3, 3]
+        frame, plane = on_table(frame)
+        table_z = 0.0
+    else:
+        frame = RGBDFrame(frame.rgb, frame.depth, frame.K, T_base_cam, table_z=table_z)
+    P = back_project_to_base(frame.depth, frame.K, frame.T_base_cam).reshape(-1, 3)
     over = P[(P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM)]
     low, high = (over.min(axis=0) - 1e-3, over.max(axis=0) + 1e-3) if len(over) else (-np.ones(3), np.ones(3))
-    workspace = ((low[0], high[0]), (low[1], high[1]), (-TABLE_MARGIN, ROOM))
+    (x0, y0), (x1, y1) = low[:2].tolist(), high[:2].tolist()
+    workspace = ((x0, x1), (y0, y1), (-TABLE_MARGIN, ROOM))
     pipeline = Pipeline(model, workspace=workspace, gripper=gripper)
     return Seen(frame, pipeline.run(frame) if labels is None else pipeline.locate(frame, labels), plane)
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from types import SimpleNamespace
 
 import cv2
@@ -14,8 +15,10 @@ import data_gen
 from data_gen import DepthSensor
 from labkit.apps import perceive
 from labkit.apps.cli import app
-from labkit.geometry import Plane, transform_points
-from labkit.labels import TARGET
+from labkit.apps.own_data import PictureFolder
+from labkit.geometry import Plane, back_project_to_base, transform_points
+from labkit.labels import SURFACE, TARGET
+from labkit.network import load_model, predict_probabilities, weights_path
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 
@@ -166,3 +169,44 @@ def test_a_camera_that_looks_straight_down_has_a_base_frame_too():
     T = perceive.base_on_table(plane)
     assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3)) and np.isclose(np.linalg.det(T[:3, :3]), 1.0)
     assert np.allclose(transform_points(T, np.array([[0.2, 0.1, 0.7]]))[0, 2], 0.0), "a point of the table"
+
+
+@pytest.fixture
+def own(shot, tmp_path):
+    """A folder of one picture of somebody's own camera, with its mask."""
+    for kind in ("color", "depth", "mask"):
+        (tmp_path / kind).mkdir()
+    cv2.imwrite(str(tmp_path / "color" / "a.png"), shot.frame.rgb[..., ::-1])
+    cv2.imwrite(str(tmp_path / "mask" / "a.png"), shot.frame.labels)
+    shutil.copy(shot.folder / "depth.png", tmp_path / "depth" / "a.png")
+    (tmp_path / "camera.txt").write_text(shot.K)
+    return tmp_path
+
+
+def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own):
+    """Frames with labels, on a table that was found where it is."""
+    (frame,) = PictureFolder(own)[:]
+    assert np.array_equal(frame.labels, shot.frame.labels) and np.array_equal(frame.rgb, shot.frame.rgb)
+    z = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[frame.labels == SURFACE, 2]
+    assert abs(np.nanmedian(z) - frame.table_z) < 0.002
+    cv2.imwrite(str(own / "mask" / "a.png"), np.where(shot.frame.labels == TARGET, 200, 0).astype(np.uint8))
+    with pytest.raises(ValueError, match=r"mask: expected classes 0 to 3, or 255, in .*a\.png"):
+        PictureFolder(own)[0]
+    (own / "camera.txt").unlink()
+    with pytest.raises(FileNotFoundError, match=r"camera\.json"):
+        PictureFolder(own)
+    with pytest.raises(FileNotFoundError, match="color/, depth/ and mask/"):
+        PictureFolder(own / "mask")
+
+
+def test_training_goes_on_with_ones_own_pictures(own, tmp_path):
+    """A few steps on one picture from the shipped weights: --init's network, better on that picture than before."""
+    options = ["--init", "unet_rgbd", "--epochs", "12", "--device", "cpu", "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(app, ["train", str(own), *options])
+    assert done.exit_code == 0, done.output
+    frame, trained = PictureFolder(own)[0], load_model(tmp_path / "run" / "unet_rgbd.pt")
+    before, after = (
+        np.mean(predict_probabilities(model, frame).argmax(axis=-1) == frame.labels)
+        for model in (load_model(weights_path("unet_rgbd")), trained)
+    )
+    assert after > before
