@@ -1,4 +1,4 @@
-# Each target works first on a fresh machine that has only Python 3.11, and reuses its environment after that.
+# Each target works first on a fresh machine that has only Python 3.11 to 3.13, and reuses its environment after that.
 #   make demo    set up .venv, then one scene from the camera's image to the lifted object
 #   make test    set up .venv, then lint and every test
 #   make lab     JupyterLab; alone on a machine, it installs what students need and no more
@@ -10,14 +10,15 @@
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make mutants how many wrong answers that nobody wrote down a check can name, by lab (an hour)
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
+#   make everywhere  the same on two Debians, with Python 3.11 and 3.13; what both make of fixed seeds is compared
 #   make clean   remove what can be made again in seconds; environments and data/ stay
-# make PYTHON=/path/to/python3.11 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
+# make PYTHON=/path/to/python3.12 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench mutants fresh clean
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench mutants fresh everywhere clean
 
 BIN := .venv/bin
 ARGS ?=
@@ -56,6 +57,9 @@ mutants: .venv/installed
 fresh: .venv/installed
 	$(BIN)/python tests/fresh/run $(ARGS)
 
+everywhere: .venv/installed
+	$(BIN)/python tests/fresh/run --suite bookworm trixie $(ARGS)
+
 clean:
 	rm -rf out build *.egg-info .pytest_cache .ruff_cache .hypothesis .coverage
 	find . -path './.venv*' -prune -o -name __pycache__ -type d -exec rm -rf {} +
@@ -92,12 +96,12 @@ train: .venv/installed
 # `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
 # A changed pyproject.toml or constraints.txt only installs the difference.
 .venv/installed .venv/installed-lab .venv-bench/installed .venv-ros2/installed: pyproject.toml constraints.txt
-	@is_right='import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))'
-	for python in $(or $(PYTHON),python3.11 python3 python) ""; do
+	@is_right='import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))'
+	for python in $(or $(PYTHON),python3.13 python3.12 python3.11 python3 python) ""; do
 	    if "$$python" -c "$$is_right" 2>/dev/null; then break; fi
 	done
 	if [ -z "$$python" ]; then
-	    echo "labkit needs Python 3.11 with its venv module (Debian, Ubuntu: python3.11-venv); $(if $(PYTHON),PYTHON=$(PYTHON) is not one,make PYTHON=/path/to/python3.11 names one)." >&2
+	    echo "labkit needs Python 3.11, 3.12 or 3.13 with its venv module (Debian, Ubuntu: python3-venv); $(if $(PYTHON),PYTHON=$(PYTHON) is not one,make PYTHON=/path/to/python3.12 names one)." >&2
 	    exit 1
 	fi
 	if [ -e $(@D)/installing ] || ! $(@D)/bin/python -c "import pip; $$is_right" 2>/dev/null; then rm -rf $(@D); fi

@@ -67,7 +67,7 @@ def generate(
         shutil.rmtree(unfinished, ignore_errors=True)
         return Dataset(out)
     if (unfinished / "request.json").exists():
-        _check_same(out, request, json.loads((unfinished / "request.json").read_text()))
+        _check_same(out, request, json.loads((unfinished / "request.json").read_bytes()))
     elif out.exists() and any(path.name != ".unfinished" for path in out.iterdir()):
         raise ValueError(f"out: {out} holds other files; choose an empty folder")
     write_atomically(unfinished / "request.json", _json(request))
@@ -78,7 +78,7 @@ def generate(
     with bar:
         for _ in _run(write_frame, jobs, executor):
             bar.update()
-    _finish(out, request, [json.loads((unfinished / f"{i:06d}.json").read_text()) for i in range(len(seeds))])
+    _finish(out, request, [json.loads((unfinished / f"{i:06d}.json").read_bytes()) for i in range(len(seeds))])
     return Dataset(out)
 
 
@@ -206,7 +206,7 @@ def read_description(path) -> dict:
         )
         raise FileNotFoundError(f"path: {path} {state} ({file.name} is missing)")
     try:
-        description = json.loads(file.read_text())
+        description = json.loads(file.read_bytes())
         version = description["version"]
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"path: {file} is damaged ({error})") from error
@@ -237,7 +237,7 @@ class Dataset(Sequence):
     def __init__(self, path):
         self.path = Path(path)
         self.description = read_description(path)
-        self._cameras = json.loads((self.path / "scene_camera.json").read_text())
+        self._cameras = json.loads((self.path / "scene_camera.json").read_bytes())
 
     def __repr__(self) -> str:
         width, height = self.description["size"]
@@ -265,7 +265,7 @@ class Dataset(Sequence):
     def objects(self, index: int) -> list[dict]:
         """The objects of a frame as scene_gt.json has them (poses in the camera frame, millimetres)."""
         if not hasattr(self, "_objects"):
-            self._objects = json.loads((self.path / "scene_gt.json").read_text())
+            self._objects = json.loads((self.path / "scene_gt.json").read_bytes())
         return self._objects[str(range(len(self))[index])]
 
 

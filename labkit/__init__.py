@@ -8,13 +8,13 @@ Each arrow is a module; `labkit.pipeline` puts them in a row. Labs need more nam
 import sys
 from collections.abc import Callable
 
-if sys.version_info[:2] != (3, 11):
+if not (3, 11) <= sys.version_info[:2] < (3, 14):
     raise ImportError(
-        f"labkit needs Python 3.11, this is {sys.version_info[0]}.{sys.version_info[1]}: PyBullet and other packages "
+        f"labkit needs Python 3.11, 3.12 or 3.13, this is {sys.version_info[0]}.{sys.version_info[1]}: the packages "
         "that it is pinned to have wheels for no other (`make` sets up .venv with the right one)"
     )
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def check(name: str, answer: object) -> Callable:

@@ -8,6 +8,7 @@ ends with a table of what was skipped and the command that would enable it.
 """
 
 import subprocess
+import sys
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -39,6 +40,26 @@ def shape_checks_off_for_bad_input(request):
     jaxtyping.config.update("jaxtyping_disable", marked)
     yield
     jaxtyping.config.update("jaxtyping_disable", False)
+
+
+# ------------------------------------------------------------------------------------------- other systems
+
+# What is tested on some systems only: the start of a test's id, the systems, and why not on others.
+NOT_EVERYWHERE = {
+    "tests/course/grading/": ("linux", "`labkit grade` needs Linux"),
+    "tests/test_repository.py": ("linux", "needs GNU make 4 and bash"),
+    "tests/course/questions/test_judge.py": ("linux darwin", "Windows has no alarm that stops an endless answer"),
+    "tests/data_gen/test_data_gen.py::test_the_command_says_a_full_disk": ("linux darwin", "needs a limit on files"),
+    "tests/apps/test_cli.py::test_ctrl_c": ("linux darwin", "Windows sends no Ctrl-C to one process"),
+}
+
+
+def pytest_collection_modifyitems(items):
+    """Skip what this system cannot do."""
+    for item in items:
+        for start, (systems, reason) in NOT_EVERYWHERE.items():
+            if item.nodeid.startswith(start) and sys.platform not in systems.split():
+                item.add_marker(pytest.mark.skip(reason=reason))
 
 
 # ------------------------------------------------------------------------------------------- Debian packages

@@ -348,6 +348,8 @@ def grade(
     """Grade submissions of a lab in a sandbox; exit status 1 if something needs a look, 2 if it could not be done."""
     import os
 
+    if sys.platform != "linux":
+        raise ValueError(f"labkit grade needs Linux, this is {sys.platform}: grade on Linux, in WSL or in a container")
     from labkit.course.grading.outputs import terminal_table
     from labkit.course.grading.run import grade_course
     from labkit.course.grading.sandbox import NO_SANDBOX

@@ -6,7 +6,6 @@ import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 from packaging.requirements import Requirement
@@ -70,7 +69,7 @@ def check_python() -> list[Finding]:
     version = platform.python_version()
     if sys.prefix != sys.base_prefix:
         return [Finding("Python", OK, f"{version}, in a virtual environment")]
-    mend = "python3.11 -m venv .venv, and install labkit there"
+    mend = "python -m venv .venv, and install labkit there"
     return [Finding("Python", NOTE, f"{version}, shared with other projects, which may change its packages", mend)]
 
 
@@ -108,14 +107,11 @@ def compare(title: str, installed: dict[str, str | None], pins: dict[str, Requir
 
 
 def check_pybullet() -> list[Finding]:
-    """PyBullet must be built with numpy: without it, images arrive as tuples, a hundred times slower."""
+    """PyBullet comes as one of two distributions; one built without numpy gives the same images as tuples."""
     from labkit.sim.client import pybullet  # imported only under labkit.sim
 
-    version = metadata.version("pybullet")
-    if pybullet.isNumpyEnabled():
-        return [Finding("PyBullet", OK, f"{version}, with numpy")]
-    mend = "python -m pip install --force-reinstall --no-deps --only-binary :all: -c constraints.txt pybullet"
-    return [Finding("PyBullet", WRONG, f"{version}, built without numpy", mend)]
+    found = [f"{name} {version}" for name, version in requirements("labkit").items() if name.startswith("pybullet")]
+    return [Finding("PyBullet", OK, f"{found[0]}, {'with' if pybullet.isNumpyEnabled() else 'without'} numpy")]
 
 
 def check_render() -> list[Finding]:

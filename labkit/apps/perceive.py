@@ -58,7 +58,7 @@ def read_intrinsics(text: str) -> Intrinsics:
     path = Path(text)
     if not path.is_file():
         raise FileNotFoundError(f'intrinsics: expected "fx fy cx cy" or a file, got {text!r}')
-    content = path.read_text(errors="replace")
+    content = path.read_text(encoding="utf-8", errors="replace")
     try:
         return _from_json(json.loads(content))
     except json.JSONDecodeError:

@@ -67,7 +67,7 @@ def write_rows(path, rows: Sequence) -> None:
 
 def read_rows(path, kind: type) -> list:
     """Read what `write_rows` wrote of dataclasses of this kind. Raises ValueError if the columns are others."""
-    with open(path, newline="") as file:
+    with open(path, newline="", encoding="utf-8") as file:
         lines = list(csv.reader(file))
     types = {field.name: field.type for field in fields(kind)}
     if not lines or lines[0] != list(types):

@@ -14,7 +14,7 @@ def canonical(name: str) -> str:
 
 def read_pins(constraints) -> dict[str, Requirement]:
     """Read the lines NAME==VERSION of a constraints file, by canonical name."""
-    lines = (line.split("#")[0].strip() for line in Path(constraints).read_text().splitlines())
+    lines = (line.split("#")[0].strip() for line in Path(constraints).read_text(encoding="utf-8").splitlines())
     pins = [Requirement(line) for line in lines if line]
     return {canonical(pin.name): pin for pin in pins}
 

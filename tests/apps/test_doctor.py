@@ -77,10 +77,12 @@ def test_without_a_constraints_file_versions_are_not_compared(tmp_path):
     assert packages.state == OK and "pinned" not in packages.found
 
 
-def test_pybullet_without_numpy_is_found(monkeypatch):
-    assert doctor.check_pybullet()[0].state == OK
-    monkeypatch.setattr("pybullet.isNumpyEnabled", lambda: 0)
-    assert doctor.check_pybullet()[0].state == WRONG
+@pytest.mark.parametrize("name, numpy, words", [("pybullet", 1, "with"), ("pybullet-arm64", 0, "without")])
+def test_pybullet_is_found_whichever_distribution_it_is_of(monkeypatch, name, numpy, words):
+    assert doctor.check_pybullet()[0].found.startswith("pybullet")
+    monkeypatch.setattr(doctor, "requirements", lambda package: {"numpy": "2.4", name: "3.2.8"})
+    monkeypatch.setattr("pybullet.isNumpyEnabled", lambda: numpy)
+    assert doctor.check_pybullet() == [doctor.Finding("PyBullet", OK, f"{name} 3.2.8, {words} numpy")]
 
 
 def test_the_render_check_passes_here_and_sees_a_shift_of_half_a_pixel(monkeypatch):
@@ -119,7 +121,7 @@ def test_a_gpu_is_welcome_but_not_needed(monkeypatch):
 
 
 def test_outside_a_virtual_environment_the_report_says_so(monkeypatch):
-    assert doctor.check_python()[0].found.startswith("3.11.")
+    assert doctor.check_python()[0].state == OK
     monkeypatch.setattr("sys.prefix", "/usr")
     monkeypatch.setattr("sys.base_prefix", "/usr")
     assert doctor.check_python()[0].state == NOTE

@@ -4,7 +4,6 @@ import errno
 import hashlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -220,7 +219,7 @@ def test_killed_at_any_moment_and_run_again_it_gives_the_same_bytes(undisturbed,
         deadline = time.monotonic() + 60.0
         while len(list(out.glob("rgb/0*.png"))) < frames_before_the_kill and time.monotonic() < deadline:
             time.sleep(0.005)
-        process.send_signal(signal.SIGKILL)
+        process.kill()
         process.wait()
         assert not (out / "dataset.json").exists()
         with pytest.raises(FileNotFoundError, match="not finished"):

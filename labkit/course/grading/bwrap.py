@@ -40,7 +40,7 @@ def executable() -> str:
     found = candidates()
     if not found:
         if sys.platform != "linux":
-            raise NoSandbox("bubblewrap is not installed, it exists for Linux only", "grade on a Linux machine")
+            raise NoSandbox("bubblewrap exists for Linux only", "grade on Linux, in WSL or in a container")
         raise NoSandbox("bubblewrap is not installed", INSTALL)
     usable = {path: version for path, version in found.items() if version >= OLDEST}
     if not usable:
