@@ -24,109 +24,129 @@ def unary_float32(p, floor):
     return np.minimum(-np.log(np.maximum(p.astype(np.float32), 1e-30)), np.float32(-np.log(floor)))
 
 
-# ---------- right_weights
+# ---------- pair_weights
+
+STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 def weights_loops(image, lam, sigma_I, sigma_p):
     """Pair by pair."""
     H, W, channels = image.shape
-    w = np.zeros((H, W - 1))
-    for v in range(H):
-        for u in range(W - 1):
-            squared = sum((float(image[v, u, k]) - float(image[v, u + 1, k])) ** 2 for k in range(channels))
-            w[v, u] = lam * np.exp(-squared / (2 * sigma_I**2)) * np.exp(-1 / (2 * sigma_p**2))
+    w = np.zeros((4, H, W))
+    for d, v, u in np.ndindex(4, H, W):
+        b, a = v + STEPS[d][0], u + STEPS[d][1]
+        if b < H and 0 <= a < W:
+            squared = sum((float(image[v, u, k]) - float(image[b, a, k])) ** 2 for k in range(channels))
+            distance = np.hypot(b - v, a - u)
+            w[d, v, u] = lam * np.exp(-squared / (2 * sigma_I**2)) * np.exp(-(distance**2) / (2 * sigma_p**2))
     return w
 
 
-def weights_einsum(image, lam, sigma_I, sigma_p):
-    """With the colours divided by sigma_I first."""
-    scaled = image.astype(float) / sigma_I
-    d = scaled[:, 1:] - scaled[:, :-1]
-    return lam * np.exp(-0.5 * (np.einsum("ijk,ijk->ij", d, d) + sigma_p**-2))
+def weights_padded(image, lam, sigma_I, sigma_p):
+    """With a ring of pixels that are infinitely far from every colour."""
+    far = np.pad(image / sigma_I, ((0, 1), (1, 1), (0, 0)), constant_values=np.inf)
+    H, W, _ = image.shape
+    w = []
+    for down, right in STEPS:
+        d = far[down : H + down, 1 + right : W + 1 + right] - image / sigma_I
+        w.append(lam * np.exp(-0.5 * (np.einsum("ijk,ijk->ij", d, d) + (down + right**2) / sigma_p**2)))
+    return np.array(w)
 
 
 def weights_torch(image, lam, sigma_I, sigma_p):
     """In single precision."""
     x = torch.from_numpy(image.astype(np.float32))
-    squared = (x[:, 1:] - x[:, :-1]).pow(2).sum(dim=2)
-    return (lam * torch.exp(-squared / (2 * sigma_I**2) - 1 / (2 * sigma_p**2))).numpy()
+    w = torch.zeros(4, *image.shape[:2])
+    for d, (p, q) in enumerate(
+        (
+            (np.s_[:, :-1], np.s_[:, 1:]),
+            (np.s_[:-1], np.s_[1:]),
+            (np.s_[:-1, :-1], np.s_[1:, 1:]),
+            (np.s_[:-1, 1:], np.s_[1:, :-1]),
+        )
+    ):
+        squared = (x[p] - x[q]).pow(2).sum(dim=2)
+        w[d][p] = lam * torch.exp(-squared / (2 * sigma_I**2) - (1 + (d > 1)) / (2 * sigma_p**2))
+    return w.numpy()
 
 
 # ---------- energy
 
 
-def energy_loops(y, psi, w_right, w_down):
-    """Pixel by pixel; each asks the neighbours to its right and below."""
-    H, W = y.shape
+def energy_loops(y, psi, weights):
+    """Pixel by pixel; each asks the neighbours whose pairs it owns."""
     total = 0.0
-    for v in range(H):
-        for u in range(W):
-            total += psi[v, u, y[v, u]]
-            if u < W - 1 and y[v, u] != y[v, u + 1]:
-                total += w_right[v, u]
-            if v < H - 1 and y[v, u] != y[v + 1, u]:
-                total += w_down[v, u]
+    for v, u in np.ndindex(*y.shape):
+        total += psi[v, u, y[v, u]]
+        for d, (down, right) in enumerate(STEPS):
+            if v + down < y.shape[0] and 0 <= u + right < y.shape[1] and y[v, u] != y[v + down, u + right]:
+                total += weights[d, v, u]
     return total
 
 
-def energy_einsum(y, psi, w_right, w_down):
+def energy_einsum(y, psi, weights):
     """With one-hot labels: the product of two of them is 1 where they agree."""
     Y = np.eye(psi.shape[2])[y]
-    agree_right = np.einsum("ijc,ijc->ij", Y[:, 1:], Y[:, :-1])
-    agree_down = np.einsum("ijc,ijc->ij", Y[1:], Y[:-1])
-    return (Y * psi).sum() + (w_right * (1 - agree_right)).sum() + (w_down * (1 - agree_down)).sum()
+    near = np.stack([np.roll(Y, (-down, -right), (0, 1)) for down, right in STEPS])
+    return (Y * psi).sum() + (weights * (1 - np.einsum("vuc,dvuc->dvu", Y, near))).sum()
 
 
-def energy_torch(y, psi, w_right, w_down):
-    """In torch."""
-    y, psi = torch.as_tensor(y.astype(np.int64)), torch.as_tensor(psi)
+def energy_torch(y, psi, weights):
+    """In torch, with slices."""
+    y, psi, w = torch.as_tensor(y.astype(np.int64)), torch.as_tensor(psi), torch.as_tensor(weights)
     total = psi.gather(2, y[..., None]).sum()
-    total += torch.as_tensor(w_right)[y[:, 1:] != y[:, :-1]].sum()
-    return float(total + torch.as_tensor(w_down)[y[1:] != y[:-1]].sum())
+    total += w[0, :, :-1][y[:, 1:] != y[:, :-1]].sum() + w[1, :-1][y[1:] != y[:-1]].sum()
+    total += w[2, :-1, :-1][y[1:, 1:] != y[:-1, :-1]].sum() + w[3, :-1, 1:][y[1:, :-1] != y[:-1, 1:]].sum()
+    return float(total)
 
 
-def energy_float32(y, psi, w_right, w_down):
+def energy_float32(y, psi, weights):
     """In single precision."""
     unary = np.take_along_axis(psi.astype(np.float32), y[..., None].astype(int), axis=2).sum()
-    right = (w_right.astype(np.float32) * (np.diff(y.astype(int), axis=1) != 0)).sum()
-    return unary + right + (w_down.astype(np.float32) * (np.diff(y.astype(int), axis=0) != 0)).sum()
+    labels = np.pad(y.astype(int), ((0, 1), (1, 1)), constant_values=-1)
+    H, W = y.shape
+    near = np.stack([labels[down : H + down, 1 + right : W + 1 + right] for down, right in STEPS])
+    return unary + (weights.astype(np.float32) * (near != y)).sum()
 
 
 # ---------- icm_costs
 
 
-def icm_by_energies(y, psi, w_right, w_down, v, u):
+def icm_by_energies(y, psi, weights, v, u):
     """The whole energy with each class at the pixel, less what does not touch the pixel."""
-    costs = []
+    costs, rest = [], weights.copy()
+    rest[:, v, u] = 0.0
+    for d, (down, right) in enumerate(STEPS):
+        if v >= down and 0 <= u - right < y.shape[1]:
+            rest[d, v - down, u - right] = 0.0
     for c in range(psi.shape[2]):
         changed = y.copy()
         changed[v, u] = c
-        costs.append(energy_loops(changed, psi, w_right, w_down))
-    alone_r, alone_d = w_right.copy(), w_down.copy()
-    alone_r[v, max(u - 1, 0) : u + 1] = 0.0
-    alone_d[max(v - 1, 0) : v + 1, u] = 0.0
-    rest = energy_loops(y, psi, alone_r, alone_d) - psi[v, u, y[v, u]]
-    return np.array(costs) - rest
+        costs.append(energy_loops(changed, psi, weights))
+    return np.array(costs) - (energy_loops(y, psi, rest) - psi[v, u, y[v, u]])
 
 
-def icm_loop(y, psi, w_right, w_down, v, u):
-    """Neighbour by neighbour, class by class, in single precision."""
+def icm_loop(y, psi, weights, v, u):
+    """Every pixel asked whether it is a neighbour, in single precision."""
     costs = psi[v, u].astype(np.float32)
-    for b, a in ((v, u + 1), (v, u - 1), (v + 1, u), (v - 1, u)):
-        if 0 <= b < y.shape[0] and 0 <= a < y.shape[1]:
-            w = w_right[v, min(u, a)] if b == v else w_down[min(v, b), u]
-            for c in range(len(costs)):
-                costs[c] += w if c != y[b, a] else 0.0
+    for b, a in np.ndindex(*y.shape):
+        step = (b - v, a - u)
+        w = weights[STEPS.index(step), v, u] if step in STEPS else 0.0
+        step = (v - b, u - a)
+        w = weights[STEPS.index(step), b, a] if step in STEPS else w
+        for c in range(len(costs)):
+            costs[c] += w if c != y[b, a] else 0.0
     return costs
 
 
-def icm_padded(y, psi, w_right, w_down, v, u):
+def icm_padded(y, psi, weights, v, u):
     """With a ring of pixels around the image that cost nothing."""
-    Y = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0)))
-    right, down = np.pad(w_right, ((0, 0), (1, 1))), np.pad(w_down, ((1, 1), (0, 0)))
-    weights = np.array([right[v, u], right[v, u + 1], down[v, u], down[v + 1, u]])
-    near = np.stack([Y[v + 1, u], Y[v + 1, u + 2], Y[v, u + 1], Y[v + 2, u + 1]])
-    return torch.from_numpy(psi[v, u] + weights @ (1.0 - near)).numpy()
+    Y, w = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0))), np.pad(weights, ((0, 0), (1, 1), (1, 1)))
+    v, u, costs = v + 1, u + 1, psi[v, u].copy()
+    for d, (down, right) in enumerate(STEPS):
+        costs += w[d, v, u] * (1 - Y[v + down, u + right])
+        costs += w[d, v - down, u - right] * (1 - Y[v - down, u - right])
+    return torch.from_numpy(costs).numpy()
 
 
 # ---------- terminal_capacities
@@ -158,49 +178,44 @@ def capacities_torch(psi):
     return excess[..., 1].numpy(), excess[..., 0].numpy(), float(lowest.sum())
 
 
-# ---------- row_bound
+# ---------- row_labels
 
 
-def bound_loops(psi, w_right):
-    """Row by row, class by class."""
-    H, W, C = psi.shape
-    total = 0.0
-    for v in range(H):
-        best = list(psi[v, 0])
-        for u in range(1, W):
-            best = [
-                psi[v, u, c] + min(best[k] + (w_right[v, u - 1] if k != c else 0.0) for k in range(C)) for c in range(C)
-            ]
-        total += min(best)
-    return total
+def labels_enumerated(psi, w):
+    """All C^n labellings of the row."""
+    n, C = psi.shape
+    y = np.indices((C,) * n, dtype=np.int8).reshape(n, -1)
+    costs = psi[np.arange(n)[:, None], y].sum(axis=0) + (w[:, None] * (y[1:] != y[:-1])).sum(axis=0)
+    return y[:, costs.argmin()]
 
 
-def bound_enumerated(psi, w_right):
-    """All C^W labellings of each row."""
-    H, W, C = psi.shape
-    y = np.indices((C,) * W).reshape(W, -1)
-    total = 0.0
-    for v in range(H):
-        costs = psi[v][np.arange(W)[:, None], y].sum(axis=0)
-        total += (costs + (w_right[v][:, None] * (y[1:] != y[:-1])).sum(axis=0)).min()
-    return total
+def labels_by_min_marginals(psi, w):
+    """Both walks, from the left and from the right: what each class at each pixel costs at least."""
+
+    def forward(psi, w):
+        best = [psi[0]]
+        for u in range(1, len(psi)):
+            best.append(psi[u] + np.minimum(best[-1], best[-1].min() + w[u - 1]))
+        return np.array(best)
+
+    return (forward(psi, w) + forward(psi[::-1], w[::-1])[::-1] - psi).argmin(axis=1)
 
 
-def bound_torch(psi, w_right):
-    """From right to left, in single precision."""
-    psi, w = torch.as_tensor(psi, dtype=torch.float32), torch.as_tensor(w_right, dtype=torch.float32)
-    best = psi[:, -1]
-    for u in range(psi.shape[1] - 2, -1, -1):
-        pair = w[:, u, None, None] * (1 - torch.eye(psi.shape[2]))
-        best = psi[:, u] + (best[:, None, :] + pair).amin(dim=2)
-    return float(best.amin(dim=1).sum())
+def labels_carried_along(psi, w):
+    """The cheapest labels up to each pixel, one list per class."""
+    ways = [(cost, [c]) for c, cost in enumerate(psi[0])]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        ways = [
+            min((cost + weight * (way[-1] != c) + costs[c], [*way, c]) for cost, way in ways) for c in range(len(costs))
+        ]
+    return np.array(min(ways)[1])
 
 
 ALTERNATIVES = {
     "unary_from_probabilities": (unary_torch, unary_loops, unary_float32),
-    "right_weights": (weights_loops, weights_einsum, weights_torch),
+    "pair_weights": (weights_loops, weights_padded, weights_torch),
     "energy": (energy_loops, energy_einsum, energy_torch, energy_float32),
     "icm_costs": (icm_by_energies, icm_loop, icm_padded),
     "terminal_capacities": (capacities_by_difference, capacities_loops, capacities_torch),
-    "row_bound": (bound_loops, bound_enumerated, bound_torch),
+    "row_labels": (labels_enumerated, labels_by_min_marginals, labels_carried_along),
 }

@@ -4,23 +4,40 @@ import numpy as np
 
 from labkit.course.questions import t02_crf
 from labkit.course.questions.question import of_topic
-from labkit.crf import PottsCRF, unary_from_probabilities
+from labkit.crf import PottsCRF, solve, unary_from_probabilities
 
 SEEDS = range(5)
 QUESTIONS = of_topic("02_crf")
 right = {name: question.reference for name, question in QUESTIONS.items()}
 
 
-def model(seed: int, C: int = 3):
-    """A small random model as arrays of the questions' shapes, and the same as the kit's."""
-    psi, w_right, w_down = t02_crf.model(np.random.default_rng(seed), 3, 4, C)
-    return psi, w_right, w_down, as_crf(psi, w_right, w_down)
-
-
-def as_crf(psi, w_right, w_down) -> PottsCRF:
-    return PottsCRF(psi, np.stack([np.pad(w_right, ((0, 0), (0, 1))), np.pad(w_down, ((0, 1), (0, 0)))]))
-
-
 def test_costs_are_the_kits():
     p, floor = QUESTIONS["unary_from_probabilities"].inputs(np.random.default_rng(1))
     assert np.allclose(right["unary_from_probabilities"](p, floor), unary_from_probabilities(p, floor), atol=1e-12)
+
+
+def test_weights_are_the_kits():
+    image, *settings = QUESTIONS["pair_weights"].inputs(np.random.default_rng(1))
+    kit = PottsCRF.from_image(np.zeros((*image.shape[:2], 2)), image, *settings, connectivity=8)
+    assert np.allclose(right["pair_weights"](image, *settings), kit.weights)
+
+
+def test_energy_and_a_pixels_costs_are_the_kits():
+    for seed in SEEDS:
+        y, psi, weights = t02_crf.labelled_model(np.random.default_rng(seed))
+        kit = PottsCRF(psi, weights)
+        assert np.isclose(right["energy"](y, psi, weights), kit.energy(y))
+        for v, u in ((0, 0), (1, 3), (3, 5), (2, 0)):
+            changed = [np.where(np.arange(y.size).reshape(y.shape) == v * y.shape[1] + u, c, y) for c in range(3)]
+            costs = right["icm_costs"](y, psi, weights, v, u)
+            assert np.allclose(np.diff(costs), np.diff([kit.energy(labels) for labels in changed]))
+
+
+def test_capacities_and_a_rows_labels_solve_their_problems():
+    for seed in SEEDS:
+        psi, w = QUESTIONS["row_labels"].inputs(np.random.default_rng(seed))
+        row = PottsCRF(psi[None], np.stack([np.append(w, 0.0)[None], np.zeros((1, len(psi)))]))
+        assert np.array_equal(right["row_labels"](psi, w), solve(row, "brute_force").labels[0])
+        source, sink, constant = right["terminal_capacities"](psi[None, :, :2])
+        for label, arc in ((1, source), (0, sink)):
+            assert np.allclose(arc.sum() + constant, psi[:, label].sum())

@@ -3,23 +3,23 @@
 import numpy as np
 
 from labkit.course.questions.question import Question, wrong
-from labkit.course.questions.t02_crf import labelled_model
+from labkit.course.questions.t02_crf import PAIRS, disagreeing, labelled_model, unary_part
 
 
-def energy(y, psi, w_right, w_down):
+def energy(y, psi, weights):
     """Add up what the labels cost the pixels and what disagreement costs the pairs, each pair once."""
     rows, columns = np.indices(y.shape)
-    unary = psi[rows, columns, y].sum()
-    right = w_right[y[:, 1:] != y[:, :-1]].sum()
-    down = w_down[y[1:] != y[:-1]].sum()
-    return float(unary + right + down)
+    total = psi[rows, columns, y].sum()
+    for w, (down, right) in zip(weights, ((0, 1), (1, 0), (1, 1), (1, -1)), strict=True):
+        neighbour = np.roll(y, (-down, -right), axis=(0, 1))  # what comes round the border meets a weight of 0
+        total = total + w[y != neighbour].sum()
+    return float(total)
 
 
-# Four pixels, two classes, four pairs: small enough for a pencil.
+# Four pixels, two classes, six pairs: small enough for a pencil.
 _PENCIL = (
     np.array([[[0.0, 2.0], [1.5, 0.5]], [[0.2, 1.0], [3.0, 0.1]]]),
-    np.array([[1.0], [0.4]]),
-    np.array([[0.3, 0.8]]),
+    np.array([[[1.0, 0.0], [0.4, 0.0]], [[0.3, 0.8], [0.0, 0.0]], [[0.7, 0.0], [0.0, 0.0]], [[0.0, 0.2], [0.0, 0.0]]]),
 )
 
 
@@ -31,46 +31,58 @@ QUESTION = Question(
         (np.array([[0, 1], [0, 1]], np.uint8), *_PENCIL),
         (np.array([[0, 0], [0, 1]], np.uint8), *_PENCIL),
         (np.zeros((2, 2), np.uint8), *_PENCIL),
-        (np.array([[2, 0, 2]], np.uint8), np.arange(9.0).reshape(1, 3, 3), np.array([[0.5, 0.25]]), np.zeros((0, 3))),
+        (
+            np.array([[2, 0, 2]], np.uint8),
+            np.arange(9.0).reshape(1, 3, 3),
+            np.stack([np.array([[0.5, 0.25, 0.0]]), *np.zeros((3, 1, 3))]),
+        ),
     ),
-    points=2,
+    points=3,
     forbidden=("labkit",),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def unary_part(y, psi):
-    """What the pixels cost on their own."""
-    return np.take_along_axis(psi, y[..., None].astype(int), axis=2).sum()
-
-
-def pair_part(y, w_right, w_down):
-    """What disagreement costs."""
-    return w_right[y[:, 1:] != y[:, :-1]].sum() + w_down[y[1:] != y[:-1]].sum()
-
-
 @wrong(QUESTION, "What does agreement cost in the Potts model? Label everything alike: only unary costs may remain.")
-def spins(y, psi, w_right, w_down):
+def spins(y, psi, weights):
     """Agreement is rewarded by w, disagreement costs w, as for spins of +1 and -1."""
-    right, down = np.where(y[:, 1:] == y[:, :-1], -1, 1), np.where(y[1:] == y[:-1], -1, 1)
-    return unary_part(y, psi) + (w_right * right).sum() + (w_down * down).sum()
+    return unary_part(y, psi) + (weights * np.where(disagreeing(y), 1, -1)).sum()
 
 
 @wrong(QUESTION, "Classes have names, not sizes: a pair (0, 2) disagrees no more than a pair (0, 1).")
-def label_steps(y, psi, w_right, w_down):
+def label_steps(y, psi, weights):
     """Labels subtracted as if they were numbers."""
-    right, down = np.abs(np.diff(y.astype(float), axis=1)), np.abs(np.diff(y.astype(float), axis=0))
-    return unary_part(y, psi) + (w_right * right).sum() + (w_down * down).sum()
+    y_as_numbers = y.astype(int)
+    steps = [np.abs(y_as_numbers - np.roll(y_as_numbers, (-down, -right), (0, 1))) for down, right in PAIRS]
+    return unary_part(y, psi) + (weights * np.stack(steps)).sum()
 
 
 @wrong(QUESTION, "The weight is paid where neighbours differ: what does an image of one label cost?")
-def agreement_charged(y, psi, w_right, w_down):
+def agreement_charged(y, psi, weights):
     """The weight paid where neighbours agree."""
-    return unary_part(y, psi) + w_right.sum() + w_down.sum() - pair_part(y, w_right, w_down)
+    return unary_part(y, psi) + (weights * ~disagreeing(y)).sum()
 
 
-@wrong(QUESTION, "An H by W grid has H (W - 1) + W (H - 1) pairs: does yours visit each of them once?")
-def pairs_twice(y, psi, w_right, w_down):
+@wrong(QUESTION, "Each pair stands once in weights, at the pixel that owns it: does yours visit it from one end only?")
+def pairs_twice(y, psi, weights):
     """Each pair counted from both ends."""
-    return unary_part(y, psi) + 2.0 * pair_part(y, w_right, w_down)
+    return unary_part(y, psi) + 2.0 * (weights * disagreeing(y)).sum()
+
+
+@wrong(QUESTION, "A pixel in the middle has eight neighbours: how many kinds of pairs does yours add up?")
+def four_neighbours(y, psi, weights):
+    """The diagonals forgotten."""
+    return unary_part(y, psi) + (weights * disagreeing(y))[:2].sum()
+
+
+@wrong(QUESTION, "weights[3] belongs to the neighbour below to the left: which way does your shift go?")
+def both_diagonals_to_the_right(y, psi, weights):
+    """The second diagonal taken for the first."""
+    return unary_part(y, psi) + (weights * disagreeing(y, (*PAIRS[:3], PAIRS[2]))).sum()
+
+
+@wrong(QUESTION, "np.roll by +1 brings the left neighbour: with which sign does the right one come?")
+def rolled_backwards(y, psi, weights):
+    """Each pair compared with the neighbour on the other side."""
+    return unary_part(y, psi) + (weights * disagreeing(y, [(-down, -right) for down, right in PAIRS])).sum()

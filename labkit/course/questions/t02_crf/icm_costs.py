@@ -3,22 +3,18 @@
 import numpy as np
 
 from labkit.course.questions.question import Question, wrong
-from labkit.course.questions.t02_crf import labelled_model, model
+from labkit.course.questions.t02_crf import PAIRS, labelled_model
 
 
-def icm_costs(y, psi, w_right, w_down, v, u):
+def icm_costs(y, psi, weights, v, u):
     """Say what each class would cost pixel (v, u), whose neighbours keep their labels."""
-    H, W = y.shape
-    classes = np.arange(psi.shape[2])
+    H, W, C = psi.shape
     costs = psi[v, u]
-    if u + 1 < W:
-        costs = costs + w_right[v, u] * (classes != y[v, u + 1])
-    if u > 0:
-        costs = costs + w_right[v, u - 1] * (classes != y[v, u - 1])
-    if v + 1 < H:
-        costs = costs + w_down[v, u] * (classes != y[v + 1, u])
-    if v > 0:
-        costs = costs + w_down[v - 1, u] * (classes != y[v - 1, u])
+    for w, (down, right) in zip(weights, ((0, 1), (1, 0), (1, 1), (1, -1)), strict=True):
+        for b, a in ((v + down, u + right), (v - down, u - right)):
+            if 0 <= b < H and 0 <= a < W:
+                pair = w[v, u] if b > v or (b == v and a > u) else w[b, a]
+                costs = costs + pair * (np.arange(C) != y[b, a])
     return costs
 
 
@@ -27,10 +23,10 @@ def _pixel_of_a_model(rng):
     return *labelled_model(rng), int(rng.integers(4)), int(rng.integers(6))
 
 
-_LABELS = np.array([[0, 1, 1, 2], [0, 2, 1, 0], [2, 2, 0, 1]], np.uint8)
+_LABELS, *_REST = labelled_model(np.random.default_rng(2), 3, 4)
 
 
-_MODEL = tuple(part.round(1) for part in model(np.random.default_rng(2), 3, 4, 3))
+_MODEL = tuple(part.round(1) for part in _REST)
 
 
 _PIXELS = ((1, 1), (1, 2), (0, 0), (2, 3), (0, 3), (2, 0), (1, 0), (0, 2))  # the inside, all corners, two sides
@@ -48,55 +44,47 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def padded_weights(w_right, w_down, v, u):
-    """Weights of the pairs to the left, right, top and bottom of a pixel, 0 outside the image."""
-    right, down = np.pad(w_right, ((0, 0), (1, 1))), np.pad(w_down, ((1, 1), (0, 0)))
-    return right[v, u], right[v, u + 1], down[v, u], down[v + 1, u]
+def pairs_of(weights, v, u):
+    """The pairs of a pixel, as (weight, row, column of the neighbour): those it owns, then those of its neighbours."""
+    H, W = weights.shape[1:]
+    own = [(w[v, u], v + down, u + right) for w, (down, right) in zip(weights, PAIRS, strict=True)]
+    owned = [(d, v - down, u - right) for d, (down, right) in enumerate(PAIRS)]
+    owned = [(weights[d, b, a], b, a) for d, b, a in owned if 0 <= b < H and 0 <= a < W]
+    return [pair for pair in own if 0 <= pair[1] < H and 0 <= pair[2] < W], owned
 
 
-def charged(weights, y, psi, v, u):
-    """psi of a pixel and these weights for the neighbours to the left, right, top and bottom."""
-    Y = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0)))
-    near = np.stack([Y[v + 1, u], Y[v + 1, u + 2], Y[v, u + 1], Y[v + 2, u + 1]])
-    return psi[v, u] + np.array(weights) @ (1.0 - near)
+def charged(pairs, y, psi, v, u):
+    """psi of a pixel and the weights of the pairs whose neighbour has another class."""
+    return psi[v, u] + sum((w * (np.arange(psi.shape[2]) != y[b, a]) for w, b, a in pairs), np.zeros(psi.shape[2]))
 
 
 @wrong(
-    QUESTION, "A class pays for each neighbour that has another label: which class should four like neighbours favour?"
+    QUESTION, "A class pays for each neighbour that has another label: which class should eight like neighbours favour?"
 )
-def charged_for_agreeing(y, psi, w_right, w_down, v, u):
+def charged_for_agreeing(y, psi, weights, v, u):
     """Every class pays for the neighbours that have it."""
-    weights = np.array(padded_weights(w_right, w_down, v, u))
-    return psi[v, u] + weights.sum() - (charged(weights, y, psi, v, u) - psi[v, u])
+    own, owned = pairs_of(weights, v, u)
+    return 2 * psi[v, u] + sum(w for w, _, _ in own + owned) - charged(own + owned, y, psi, v, u)
 
 
-@wrong(QUESTION, "The pair with the left neighbour belongs to that neighbour: at which index of w_right does it stand?")
-def own_weights(y, psi, w_right, w_down, v, u):
-    """The weights stored at the pixel, also for the pairs behind it."""
-    _, right, _, down = padded_weights(w_right, w_down, v, u)
-    return charged((right, right, down, down), y, psi, v, u)
-
-
-@wrong(QUESTION, "In NumPy, index -1 is the last row or column: has a pixel at the border a neighbour on that side?")
-def closed_to_a_ring(y, psi, w_right, w_down, v, u):
-    """Index -1 is the last row or column, so that the border has neighbours on the other side."""
+@wrong(QUESTION, "The pair with the left neighbour belongs to that neighbour: at which pixel does its weight stand?")
+def own_weights(y, psi, weights, v, u):
+    """The weights stored at the pixel, also for the pairs that its neighbours own."""
     H, W = y.shape
-    right, down = np.pad(w_right, ((0, 0), (0, 1)), mode="edge"), np.pad(w_down, ((0, 1), (0, 0)), mode="edge")
-    weights = (right[v, u - 1], right[v, u], down[v - 1, u], down[v, u])
-    near = (y[v, u - 1], y[v, (u + 1) % W], y[v - 1, u], y[(v + 1) % H, u])
-    classes = np.arange(psi.shape[2])
-    return psi[v, u] + sum(w * (classes != label) for w, label in zip(weights, near, strict=True))
+    back = [(w[v, u], v - down, u - right) for w, (down, right) in zip(weights, PAIRS, strict=True)]
+    back = [(w, b, a) for w, b, a in back if 0 <= b < H and 0 <= a < W]
+    return charged(pairs_of(weights, v, u)[0] + back, y, psi, v, u)
 
 
-@wrong(QUESTION, "w_right joins neighbours of one row, (v, u) and (v, u + 1): which weight goes with which neighbour?")
-def directions_exchanged(y, psi, w_right, w_down, v, u):
-    """w_down for neighbours of one row."""
-    left, right, up, down = padded_weights(w_right, w_down, v, u)
-    return charged((up, down, left, right), y, psi, v, u)
-
-
-@wrong(QUESTION, "In the energy each pair counts once, but a pixel in the middle belongs to four pairs.")
-def ahead_only(y, psi, w_right, w_down, v, u):
+@wrong(QUESTION, "In the energy each pair counts once, but a pixel in the middle belongs to eight pairs.")
+def ahead_only(y, psi, weights, v, u):
     """Only the pairs that the energy's loop visits at this pixel."""
-    _, right, _, down = padded_weights(w_right, w_down, v, u)
-    return charged((0.0, right, 0.0, down), y, psi, v, u)
+    return charged(pairs_of(weights, v, u)[0], y, psi, v, u)
+
+
+@wrong(QUESTION, "Neighbours touch at corners, too: how many pairs has a pixel in the middle?")
+def four_neighbours(y, psi, weights, v, u):
+    """The diagonals forgotten."""
+    straight = np.concatenate([weights[:2], np.zeros_like(weights[2:])])
+    own, owned = pairs_of(straight, v, u)
+    return charged(own + owned, y, psi, v, u)

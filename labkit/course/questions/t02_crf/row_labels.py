@@ -1,0 +1,83 @@
+"""02_crf.row_labels: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def row_labels(psi, w):
+    """Find the cheapest labels of one row: walk along it, remember where each minimum came from, and walk back."""
+    n, C = psi.shape
+    best, origins = psi[0], []
+    for u in range(1, n):
+        switch = best.min() + w[u - 1]
+        origins.append(np.where(best <= switch, np.arange(C), best.argmin()))
+        best = psi[u] + np.minimum(best, switch)
+    labels = [best.argmin()]
+    for origin in reversed(origins):
+        labels.append(origin[labels[-1]])
+    return np.array(labels[::-1], dtype=np.uint8)
+
+
+def cost(psi, w, labels):
+    """What a row's labels cost."""
+    labels = np.asarray(labels).astype(int)
+    return psi[np.arange(len(psi)), labels].sum() + w[labels[1:] != labels[:-1]].sum()
+
+
+QUESTION = Question(
+    name="02_crf.row_labels",
+    reference=row_labels,
+    inputs=lambda rng: (rng.normal(1.0, 1.0, (9, 3)), rng.uniform(0.1, 1.6, 8)),
+    by_hand=(
+        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
+        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
+        (np.array([[0.0, 0.5, 3.0], [1.0, 0.9, 3.0], [3.0, 0.0, 2.5]]), np.array([0.8, 0.3])),
+        (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the labels cost no more than each pixel's own cheapest class does",
+            lambda given, labels: bool(cost(*given, labels) <= cost(*given, given[0].argmin(axis=1)) + 1e-9),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def walk(psi, w):
+    """The least cost of the row up to each pixel, by its class, (n, C)."""
+    best = [psi[0]]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        best.append(costs + np.minimum(best[-1], best[-1].min() + weight))
+    return np.array(best)
+
+
+@wrong(QUESTION, "That is each pixel's own choice: where did the weights come in?")
+def pixel_by_pixel(psi, w):
+    """The weights forgotten."""
+    return psi.argmin(axis=1)
+
+
+@wrong(QUESTION, "The cheapest class so far is not yet the class on the cheapest way through the whole row: walk back.")
+def never_walked_back(psi, w):
+    """The minimum at each pixel of the forward walk."""
+    return walk(psi, w).argmin(axis=1)
+
+
+@wrong(QUESTION, "Choosing pixel by pixel from the left cannot know what comes: keep a cost for every class.")
+def greedy(psi, w):
+    """From the left, each pixel the class that is cheapest given the label before it."""
+    labels = [psi[0].argmin()]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        labels.append((costs + weight * (np.arange(len(costs)) != labels[-1])).argmin())
+    return np.array(labels)
+
+
+@wrong(QUESTION, "Going from pixel u - 1 to pixel u, the pair stands at w[u - 1].")
+def next_pairs_weight(psi, w):
+    """The weight of the pair ahead, charged for the pair behind."""
+    return row_labels(psi, np.roll(w, -1))
