@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from labkit.course.questions.t05_class_weights.adjusted_grad import parts
 from labkit.course.questions.t05_class_weights.two_means import losses_and_weights
-from labkit.course.questions.t05_class_weights.weighted_grad import parts
 
 # ---------- class_weights
 
@@ -32,29 +32,6 @@ def weights_float32(counts, power):
     return weights_einsum(counts.astype(np.float32), np.float32(power))
 
 
-# ---------- weighted_grad
-
-
-def weighted_grad_one_hot(z, y, w):
-    p, Y, _ = parts(z, y)
-    return np.einsum("...k,k->...", Y, w)[..., None] * (p - Y)
-
-
-def weighted_grad_loops(z, y, w):
-    out = np.zeros(z.shape)
-    for place in np.ndindex(y.shape):
-        c = int(y[place])
-        if c != 255:
-            e = np.exp(z[place] - z[place].max())
-            for k in range(z.shape[-1]):
-                out[place][k] = w[c] * (e[k] / e.sum() - (k == c))
-    return out
-
-
-def weighted_grad_float32(z, y, w):
-    return weighted_grad_one_hot(z.astype(np.float32), y, w.astype(np.float32))
-
-
 # ---------- two_means
 
 
@@ -78,106 +55,108 @@ def two_means_float32(z, y, w):
     return two_means_weighted(z.astype(np.float32), y, w.astype(np.float32))
 
 
-# ---------- weighted_optimum
+# ---------- least_cost
 
 
-def weighted_optimum_einsum(p, w):
-    return np.einsum("...c,c,...->...c", p, w, 1.0 / (p @ w))
+def least_cost_loops(p, cost):
+    said = np.empty(p.shape[:-1], int)
+    for place in np.ndindex(said.shape):
+        prices = [sum(p[place][i] * cost[i, j] for i in range(len(cost))) for j in range(len(cost))]
+        said[place] = prices.index(min(prices))
+    return said
 
 
-def weighted_optimum_loops(p, w):
-    out = np.empty(p.shape)
-    for place in np.ndindex(p.shape[:-1]):
-        total = sum(p[place][c] * w[c] for c in range(len(w)))
-        for c in range(len(w)):
-            out[place][c] = p[place][c] * w[c] / total
+def least_cost_einsum(p, cost):
+    return np.argmin(np.einsum("...i,ij->...j", p, cost), axis=-1).astype(np.uint8)
+
+
+def least_cost_torch(p, cost):
+    import torch
+
+    return torch.argmax(-torch.from_numpy(p).float() @ torch.from_numpy(cost).float(), dim=-1).numpy()
+
+
+# ---------- weight_for_recall
+
+
+def weight_by_trying(p1, y, recall):
+    odds = np.unique((1.0 - p1) / p1)
+    for w in odds:
+        if np.count_nonzero(w * p1[y] >= (1.0 - p1[y]) * (1 - 1e-12)) >= recall * np.count_nonzero(y):
+            return w
+
+
+def weight_by_partition(p1, y, recall):
+    true = p1[np.flatnonzero(y)]
+    missed = int(np.floor((1.0 - recall) * len(true) + 1e-9))
+    return 1.0 / np.partition(true, missed)[missed] - 1.0
+
+
+def weight_by_quantile(p1, y, recall):
+    return float(np.quantile((1.0 - p1[y]) / p1[y], recall, method="inverted_cdf"))
+
+
+# ---------- adjusted_grad
+
+
+def adjusted_grad_of_products(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    q = p * shares**tau
+    return np.where(counted, q / q.sum(axis=-1, keepdims=True) - Y, 0.0)
+
+
+def adjusted_grad_loops(z, y, shares, tau):
+    out = np.zeros(z.shape)
+    for place in np.ndindex(y.shape):
+        if y[place] != 255:
+            a = [z[place][k] + tau * np.log(shares[k]) for k in range(len(shares))]
+            total = sum(np.exp(x - max(a)) for x in a)
+            for k in range(len(shares)):
+                out[place][k] = np.exp(a[k] - max(a)) / total - (k == y[place])
     return out
 
 
-def weighted_optimum_torch(p, w):
-    import torch
-
-    return torch.softmax(torch.from_numpy(p).log() + torch.from_numpy(w).log(), dim=-1).numpy()
-
-
-def weighted_optimum_float32(p, w):
-    return weighted_optimum_einsum(p.astype(np.float32), w.astype(np.float32))
+def adjusted_grad_float32(z, y, shares, tau):
+    p, Y, counted = parts((z + tau * np.log(shares)).astype(np.float32), y)
+    return np.float32(p - Y) * counted
 
 
-# ---------- boundary
+# ---------- change_prior
 
 
-def boundary_of_logs(means, sigma, counts, w):
-    step = np.log(counts[0]) + np.log(w[0]) - np.log(counts[1]) - np.log(w[1])
-    return float(0.5 * (means[0] + means[1]) + step * sigma * sigma / (means[1] - means[0]))
-
-
-def boundary_by_halving(means, sigma, counts, w):
-    def excess(x):  # how much better class 1 explains x, in logarithms; linear in x
-        log_density = np.log(counts * w) - (x - means) ** 2 / (2 * sigma**2)
-        return log_density[1] - log_density[0]
-
-    low, high = -1e4, 1e4
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if (excess(middle) > 0) == (means[1] > means[0]):
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
-
-
-def boundary_of_two_values(means, sigma, counts, w):
-    at = [np.diff(np.log(counts * w) - (x - means) ** 2 / (2 * sigma**2))[0] for x in (0.0, 1.0)]
-    return float(at[0] / (at[0] - at[1]))
-
-
-def boundary_torch(means, sigma, counts, w):
-    import torch
-
-    m, n = torch.from_numpy(means), torch.from_numpy(counts * w)
-    return (m.mean() + sigma**2 / (m[1] - m[0]) * torch.log(n[0] / n[1])).item()
-
-
-def boundary_float32(means, sigma, counts, w):
-    return boundary_of_logs(means.astype(np.float32), np.float32(sigma), counts, w.astype(np.float32))
-
-
-# ---------- undo_weights
-
-
-def undo_loops(z, w, share):
+def change_prior_loops(z, w, shares, new_shares):
     out = z.copy()
     for c in range(len(w)):
-        out[..., c] -= share * np.log(w[c])
+        out[..., c] += np.log(new_shares[c]) - np.log(shares[c]) - np.log(w[c])
     return out
 
 
-def undo_as_log_probabilities(z, w, share):
-    p = np.exp(z - z.max(axis=-1, keepdims=True)) * w**-share
-    return np.log(p) - np.log(p.sum(axis=-1, keepdims=True))
+def change_prior_of_probabilities(z, w, shares, new_shares):
+    p = np.exp(z - z.max(axis=-1, keepdims=True)) / w / shares * new_shares
+    return np.log(p / p.sum(axis=-1, keepdims=True))
 
 
-def undo_torch(z, w, share):
+def change_prior_torch(z, w, shares, new_shares):
     import torch
 
-    return torch.from_numpy(z).sub(torch.from_numpy(w).log(), alpha=share).numpy()
+    ratio = torch.from_numpy(new_shares / shares / w)
+    return torch.log_softmax(torch.from_numpy(z) + ratio.log(), dim=-1).numpy()
 
 
-def undo_float32(z, w, share):
-    return undo_loops(z.astype(np.float32), w.astype(np.float32), share)
+def change_prior_float32(z, w, shares, new_shares):
+    return change_prior_loops(z.astype(np.float32), w.astype(np.float32), shares, new_shares)
 
 
 ALTERNATIVES = {
     "class_weights": (weights_loops, weights_einsum, weights_torch, weights_float32),
-    "weighted_grad": (weighted_grad_one_hot, weighted_grad_loops, weighted_grad_float32),
     "two_means": (two_means_weighted, two_means_loops, two_means_float32),
-    "weighted_optimum": (
-        weighted_optimum_einsum,
-        weighted_optimum_loops,
-        weighted_optimum_float32,
-        weighted_optimum_torch,
+    "least_cost": (least_cost_loops, least_cost_einsum, least_cost_torch),
+    "weight_for_recall": (weight_by_trying, weight_by_partition, weight_by_quantile),
+    "adjusted_grad": (adjusted_grad_of_products, adjusted_grad_loops, adjusted_grad_float32),
+    "change_prior": (
+        change_prior_loops,
+        change_prior_of_probabilities,
+        change_prior_torch,
+        change_prior_float32,
     ),
-    "boundary": (boundary_of_logs, boundary_by_halving, boundary_of_two_values, boundary_torch, boundary_float32),
-    "undo_weights": (undo_loops, undo_as_log_probabilities, undo_torch, undo_float32),
 }

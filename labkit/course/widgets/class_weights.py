@@ -47,7 +47,8 @@ def draw_gaussians(figure: Figure, exponent: float, distance: float, share: floa
     left.fill_between(x, rare, color=RARE, alpha=0.7, label="rare")
     left.plot(x, 2.0**exponent * rare, color=RARE, linestyle="--", label="rare, weighted")
     left.axvline(boundary, color=CHOSEN)
-    left.set(ylim=(0.0, 1.05), xlim=(-4.0, 9.0), xlabel="feature of a pixel", title=f"boundary at {boundary:.2f}")
+    left.set(yscale="log", ylim=(1e-4, 2.0 + 2.0**exponent * share), xlim=(-4.0, 9.0))
+    left.set(xlabel="feature of a pixel", ylabel="pixels (log scale)", title=f"boundary at {boundary:.2f}")
     left.legend(fontsize=8, loc="upper right")
     _, *curves = gaussian_scores(distance, share, 2.0**EXPONENTS)
     draw_scores(right, EXPONENTS, curves, exponent)
@@ -56,11 +57,11 @@ def draw_gaussians(figure: Figure, exponent: float, distance: float, share: floa
 
 def draw_scores(axes: Axes, exponents: np.ndarray, curves, chosen: float) -> None:
     """Draw precision, recall and IoU over the binary logarithm of the weight, and the one that is chosen."""
-    for name, values, colour in zip(SCORES, curves, (COMMON, RARE, "#009e73"), strict=True):
-        axes.plot(exponents, values, label=name, color=colour)
+    for name, values, colour, dash in zip(SCORES, curves, (COMMON, RARE, "#009e73"), ("--", "-", ":"), strict=True):
+        axes.plot(exponents, values, dash, label=name, color=colour)
     axes.axvline(chosen, color=CHOSEN)
-    axes.set(ylim=(0.0, 1.02), xlabel="log2 of the weight")
-    axes.legend(fontsize=8, loc="center left")
+    axes.set(ylim=(0.0, 1.02), xlabel="log2 of the weight", ylabel="score of the rare class")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def said(scores: Sequence[float]) -> str:
@@ -91,7 +92,7 @@ def two_gaussians(distance: float = 2.0, share: float = 0.02) -> Explorer:
         "distance": ipywidgets.FloatSlider(distance, min=0.5, max=5.0, step=0.25, description="distance"),
         "share": ipywidgets.SelectionSlider(options=shares, value=share, description="rare share"),
     }
-    return Explorer(draw_gaussians, controls, size=(8.5, 3.0))
+    return Explorer(draw_gaussians, controls, size=(9.5, 3.0), stills=({"exponent": 0.0}, {"exponent": 5.5}))
 
 
 def reweighted(p: np.ndarray, exponent: float) -> np.ndarray:
@@ -136,4 +137,5 @@ def trained_masks(frames: Mapping[str, tuple[RGBDFrame, Float[np.ndarray, "H W C
         scores.set_title(said(target_scores(frame.labels, p, exponent)))
 
     names = ipywidgets.ToggleButtons(options=list(frames), description="frame")
-    return Explorer(draw, {"exponent": weight_slider(), "name": names}, size=(8.5, 3.0))
+    stills = ({"exponent": 0.0}, {"exponent": 4.75})
+    return Explorer(draw, {"exponent": weight_slider(), "name": names}, size=(9.5, 3.0), stills=stills)

@@ -1,4 +1,4 @@
-"""Questions of topic 05: weights and their gradient, the two means, where training ends, and how to undo it."""
+"""Questions of topic 05: weights, two means, decisions at a price, and shares of classes inside and after training."""
 
 import numpy as np
 
@@ -8,13 +8,24 @@ def draw_weights(rng, C):
     return np.exp(rng.uniform(-2.0, 3.0, C))
 
 
-def draw_pixels(rng):
-    """Logits (H, W, C), labels (H, W), some of them ignored, and weights."""
-    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+def draw_shares(rng, C):
+    """Shares of C classes of all pixels, from about 1 % up; they sum to 1."""
+    shares = np.exp(rng.uniform(-3.0, 1.0, C))
+    return shares / shares.sum()
+
+
+def some_labels(rng, H, W, C):
+    """Labels (H, W) of C classes, some of them 255."""
     y = rng.integers(0, C, (H, W)).astype(np.uint8)
     y[rng.random(y.shape) < 0.2] = 255
     y[0, 0], y[1, 1], y[1, 2] = 255, C - 1, 0
-    return 2.0 * rng.normal(size=(H, W, C)), y, draw_weights(rng, C)
+    return y
+
+
+def draw_pixels(rng):
+    """Logits (H, W, C), labels (H, W), some of them ignored, and weights."""
+    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+    return 2.0 * rng.normal(size=(H, W, C)), some_labels(rng, H, W, C), draw_weights(rng, C)
 
 
 TOY = np.array([[2.0, 1.0, -1.0]])

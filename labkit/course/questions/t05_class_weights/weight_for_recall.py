@@ -1,0 +1,62 @@
+"""05_class_weights.weight_for_recall: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Question, wrong
+
+
+def weight_for_recall(p1, y, recall):
+    """Find the smallest weight of class 1 with which at least this share of its pixels is found."""
+    found_first = np.sort(p1[y])[::-1]
+    last = found_first[int(np.ceil(recall * len(found_first))) - 1]
+    return float((1.0 - last) / last)
+
+
+def _pixels(rng):
+    """Draw probabilities of two overlapping classes, the second one rare, and a recall between two steps."""
+    y = rng.permutation(np.arange(int(rng.integers(40, 60))) < int(rng.integers(7, 12)))
+    n = int(y.sum())
+    p1 = 1.0 / (1.0 + np.exp(-rng.normal(np.where(y, -0.5, -2.5), 1.0)))
+    return p1, y, float((rng.integers(2, n) - rng.uniform(0.3, 0.7)) / n)
+
+
+QUESTION = Question(
+    name="05_class_weights.weight_for_recall",
+    reference=weight_for_recall,
+    inputs=_pixels,
+    by_hand=(
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
+        (np.array([0.3, 0.3, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),  # two alike
+    ),
+    points=3,
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
+def of_all_pixels(p1, y, recall):
+    return weight_for_recall(p1, np.ones_like(y), recall)
+
+
+@wrong(QUESTION, "Pixels are found from the surest to the least sure; yours starts with the least sure one.")
+def from_below(p1, y, recall):
+    return 1.0 / weight_for_recall(1.0 - p1, y, recall)
+
+
+@wrong(QUESTION, "At least the share: 0.4 of three pixels are 1.2, and one found pixel is too few.")
+def one_too_few(p1, y, recall):
+    found_first = np.sort(p1[y])[::-1]
+    last = found_first[max(int(recall * len(found_first)), 1) - 1]
+    return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "You have the probability of the last pixel that must be found. Which w lifts w p1 to 1 - p1 there?")
+def the_threshold(p1, y, recall):
+    return 1.0 / (1.0 + weight_for_recall(p1, y, recall))
+
+
+@wrong(QUESTION, "Weighted, class 1 need not reach 1: it competes with 1 - p1.")
+def against_one(p1, y, recall):
+    return 1.0 + weight_for_recall(p1, y, recall)
