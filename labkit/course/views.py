@@ -30,7 +30,7 @@ class View:
 
     >>> view = View().points(np.zeros((2, 3)), "cloud").frame(np.eye(4), "base")
     >>> sorted(view._repr_mimebundle_())
-    ['application/vnd.plotly.v1+json', 'image/png']
+    ['application/vnd.plotly.v1+json', 'image/png', 'text/plain']
     """
 
     title: str = ""
@@ -151,7 +151,8 @@ class View:
         """What Jupyter shows: the figure to turn, and the picture for pages that run nothing."""
         png = io.BytesIO()
         self.picture().savefig(png, format="png")
-        return {PLOTLY: json.loads(self.plotly().to_json()), "image/png": png.getvalue()}
+        words = "a view to turn: " + ", ".join(dict.fromkeys(layer["name"] for layer in self.layers))
+        return {PLOTLY: json.loads(self.plotly().to_json()), "image/png": png.getvalue(), "text/plain": words}
 
 
 def _colours(colour):

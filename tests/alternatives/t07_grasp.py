@@ -2,44 +2,9 @@
 
 import numpy as np
 
-from labkit.course.questions.t07_grasp.grasp_pose import DOWN, pose, unit
+from labkit.course.questions.t07_grasp.grasp_pose import pose, unit
+from labkit.course.questions.t07_grasp.pad_slice import in_grasp, middle_and_width
 from labkit.course.questions.t07_grasp.points_in_fingers import in_boxes, moved
-from labkit.course.questions.t07_grasp.width_across import extent
-
-# ---------- centroid_and_covariance
-
-
-def centroid_loops(P):
-    mu = [sum(float(p[k]) for p in P) / len(P) for k in range(3)]
-    Sigma = np.zeros((3, 3))
-    for p in P:
-        for i in range(3):
-            for j in range(3):
-                Sigma[i, j] += (p[i] - mu[i]) * (p[j] - mu[j]) / len(P)
-    return np.array(mu), Sigma
-
-
-def centroid_einsum(P):
-    mu = np.einsum("ni->i", P) / len(P)
-    return mu, np.einsum("ni,nj->ij", P - mu, P - mu) / len(P)
-
-
-def centroid_torch(P):
-    import torch
-
-    P = torch.as_tensor(P, dtype=torch.float64)
-    return P.mean(0), torch.cov(P.T, correction=0)
-
-
-def centroid_float32(P):
-    mu = P.mean(axis=0, dtype=np.float32)
-    centred = (P - mu).astype(np.float32)
-    return mu, centred.T @ centred / np.float32(len(P))
-
-
-def centroid_numpy_cov(P):
-    return np.average(P, axis=0), np.cov(P.T, ddof=0)
-
 
 # ---------- closing_yaw
 
@@ -81,33 +46,6 @@ def closing_yaw_float32(Sigma):
     return np.arctan2(axes[1, 0], axes[0, 0])
 
 
-# ---------- width_across
-
-
-def width_loops(P, yaw):
-    low, high = float("inf"), -float("inf")
-    for x, y, _ in P:
-        a = float(x) * np.cos(yaw) + float(y) * np.sin(yaw)
-        low, high = min(low, a), max(high, a)
-    return high - low
-
-
-def width_einsum(P, yaw):
-    return np.ptp(np.einsum("ni,i->n", P, [np.cos(yaw), np.sin(yaw), 0.0]))
-
-
-def width_torch(P, yaw):
-    import torch
-
-    across = torch.as_tensor(P[:, :2]) @ torch.tensor([np.cos(yaw), np.sin(yaw)], dtype=torch.float64)
-    return across.max() - across.min()
-
-
-def width_float32(P, yaw):
-    d = np.array([np.cos(yaw), np.sin(yaw)], np.float32)
-    return extent((P[:, :2] - P[:, :2].mean(axis=0)).astype(np.float32) @ d)
-
-
 # ---------- grasp_height
 
 
@@ -143,42 +81,78 @@ def height_float32(P, table_z, palm, tips, clearance):
 # ---------- grasp_pose
 
 
-def grasp_pose_cross(position, yaw):
-    return pose(np.cross(unit(yaw), DOWN), unit(yaw), DOWN, position)
+def grasp_pose_crossed(position, approach, closing):
+    x = unit(np.cross(closing, approach))
+    return pose(x, np.cross(unit(approach), x), unit(approach), position)
 
 
-def grasp_pose_other_way_round(position, yaw):
-    return grasp_pose_cross(position, yaw + np.pi)
+def grasp_pose_other_way_round(position, approach, closing):
+    return grasp_pose_crossed(position, approach, -closing)
 
 
-def grasp_pose_product(position, yaw):
-    c, s = np.cos(yaw - np.pi / 2), np.sin(yaw - np.pi / 2)
-    T_base_turned, T_turned_grasp = np.eye(4), np.diag([-1.0, 1.0, -1.0, 1.0])
-    T_base_turned[:2, :2], T_base_turned[:3, 3] = [[c, -s], [s, c]], position
-    return T_base_turned @ T_turned_grasp
+def grasp_pose_qr(position, approach, closing):
+    z, y = np.linalg.qr(np.column_stack([approach, closing]))[0].T
+    z = z * np.sign(z @ approach)
+    return pose(np.cross(y, z), y, z, position)
 
 
-def grasp_pose_loops(position, yaw):
-    T = [[0.0] * 4 for _ in range(4)]
-    columns = (np.cross(unit(yaw), DOWN), unit(yaw), DOWN, position)
-    for j, column in enumerate(columns):
-        for i in range(3):
-            T[i][j] = float(column[i])
-    T[3][3] = 1.0
-    return np.array(T)
-
-
-def grasp_pose_torch(position, yaw):
+def grasp_pose_torch(position, approach, closing):
     import torch
 
-    y, z = torch.from_numpy(unit(yaw)), torch.from_numpy(DOWN)
+    z, y = (torch.from_numpy(np.ascontiguousarray(v)) for v in (approach, closing))
+    z = z / z.norm()
+    y = y - torch.dot(y, z) * z
+    y = y / y.norm()
     T = torch.eye(4, dtype=torch.float64)
     T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = torch.linalg.cross(y, z), y, z, torch.as_tensor(position)
     return T
 
 
-def grasp_pose_float32(position, yaw):
-    return grasp_pose_cross(position, yaw).astype(np.float32)
+def grasp_pose_float32(position, approach, closing):
+    return grasp_pose_crossed(position, approach, closing).astype(np.float32)
+
+
+# ---------- pad_slice
+
+
+def slice_by_inverse(P, T_base_grasp, half):
+    homogeneous = np.column_stack([P, np.ones(len(P))]) @ np.linalg.inv(T_base_grasp).T
+    return middle_and_width(homogeneous[np.abs(homogeneous[:, 0]) <= half, 1])
+
+
+def slice_loops(P, T_base_grasp, half):
+    low, high = float("inf"), -float("inf")
+    for p in P:
+        x, y = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in (0, 1))
+        if -half <= x <= half:
+            low, high = min(low, y), max(high, y)
+    return (low + (high - low) / 2, high - low) if high >= low else (0.0, 0.0)
+
+
+def slice_float32(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp).astype(np.float32)
+    return middle_and_width(y[np.abs(x) <= np.float32(half)])
+
+
+# ---------- slip_across
+
+
+def slip_by_inverse(T_base_grasp, middle):
+    off = np.linalg.inv(T_base_grasp) @ np.append(middle, 1.0)
+    return abs(1000.0 * off[1]), abs(1000.0 * off[0])
+
+
+def slip_by_products(T_base_grasp, middle):
+    off = middle - T_base_grasp[:3, 3]
+    return tuple(1000.0 * abs(sum(off[i] * T_base_grasp[i, k] for i in range(3))) for k in (1, 0))
+
+
+def slip_torch(T_base_grasp, middle):
+    import torch
+
+    T = torch.from_numpy(T_base_grasp)
+    x, y, _ = torch.linalg.solve(T[:3, :3], torch.from_numpy(np.asarray(middle)) - T[:3, 3])
+    return 1000.0 * y.abs(), 1000.0 * x.abs()
 
 
 # ---------- points_in_fingers
@@ -207,7 +181,6 @@ def points_float32(P, T_base_grasp, *boxes):
 
 
 ALTERNATIVES = {
-    "centroid_and_covariance": (centroid_loops, centroid_einsum, centroid_torch, centroid_float32, centroid_numpy_cov),
     "closing_yaw": (
         closing_yaw_formula,
         closing_yaw_svd,
@@ -216,15 +189,15 @@ ALTERNATIVES = {
         closing_yaw_torch,
         closing_yaw_float32,
     ),
-    "width_across": (width_loops, width_einsum, width_torch, width_float32),
     "grasp_height": (height_with, height_loops, height_torch, height_float32),
     "grasp_pose": (
-        grasp_pose_cross,
+        grasp_pose_crossed,
         grasp_pose_other_way_round,
-        grasp_pose_product,
-        grasp_pose_loops,
+        grasp_pose_qr,
         grasp_pose_torch,
         grasp_pose_float32,
     ),
+    "pad_slice": (slice_by_inverse, slice_loops, slice_float32),
+    "slip_across": (slip_by_inverse, slip_by_products, slip_torch),
     "points_in_fingers": (points_by_inverse, points_loops, points_einsum, points_float32),
 }

@@ -4,8 +4,8 @@ import struct
 
 import numpy as np
 
-from labkit.course.questions.t08_node.lag_error import place
 from labkit.course.questions.t08_node.pack_cloud import finite
+from labkit.course.questions.t08_node.pose_at import neighbours, outside
 from labkit.course.questions.t08_node.quaternion import from_trace, right_quaternion
 
 # ---------- decode_depth
@@ -49,25 +49,29 @@ def depth_torch(data, height, width, step, is_bigendian):
 
 
 def pairs_loops(a, b, slop):
+    def nearest(stamp, others):
+        return min(range(len(others)), key=lambda k: abs(int(stamp) - int(others[k])), default=-1)
+
     found = []
-    for stamp in a:
-        best = -1
-        for j, other in enumerate(b):
-            apart = abs(int(stamp) - int(other))
-            if apart <= slop and (best < 0 or apart < abs(int(stamp) - int(b[best]))):
-                best = j
-        found.append(best)
+    for i, stamp in enumerate(a):
+        j = nearest(stamp, b)
+        mutual = j >= 0 and nearest(b[j], a) == i and abs(int(stamp) - int(b[j])) <= slop
+        found.append(j if mutual else -1)
     return np.array(found, int)
 
 
 def pairs_sorted(a, b, slop):
+    def nearest(of, among):
+        after = np.searchsorted(among, of).clip(0, len(among) - 1)
+        before = (after - 1).clip(0)
+        best = np.where(np.abs(of - among[before]) <= np.abs(among[after] - of), before, after)
+        return np.searchsorted(among, among[best])  # the first of equal stamps
+
     if len(b) == 0:
         return np.full(len(a), -1)
-    after = np.searchsorted(b, a).clip(0, len(b) - 1)
-    before = (after - 1).clip(0)
-    best = np.where(np.abs(a - b[before]) <= np.abs(b[after] - a), before, after)
-    best = np.searchsorted(b, b[best])  # the first of equal stamps
-    return np.where(np.abs(a - b[best]) <= slop, best, -1)
+    best = nearest(a, b)
+    mutual = nearest(b, a)[best] == np.arange(len(a))
+    return np.where(mutual & (np.abs(a - b[best]) <= slop), best, -1)
 
 
 def pairs_torch(a, b, slop):
@@ -76,35 +80,54 @@ def pairs_torch(a, b, slop):
     if len(b) == 0:
         return torch.full((len(a),), -1)
     apart = (torch.from_numpy(a.copy())[:, None] - torch.from_numpy(b.copy())[None, :]).abs()
-    least, best = apart.min(dim=1)
-    best = (apart == least[:, None]).to(torch.int8).argmax(dim=1)
-    return torch.where(least <= slop, best, -1)
+    of_a = (apart == apart.amin(dim=1, keepdim=True)).to(torch.int8).argmax(dim=1)
+    of_b = (apart == apart.amin(dim=0, keepdim=True)).to(torch.int8).argmax(dim=0)
+    kept = (of_b[of_a] == torch.arange(len(a))) & (apart.amin(dim=1) <= slop)
+    return torch.where(kept, of_a, -1)
 
 
-# ---------- lag_error
+# ---------- pose_at
 
 
-def lag_loops(stamps, positions, taken, used):
-    found = []
-    for when in (taken, used):
-        when = min(max(when, stamps[0]), stamps[-1])
-        i = max(j for j in range(len(stamps) - 1) if stamps[j] <= when)
-        share = (when - stamps[i]) / (stamps[i + 1] - stamps[i])
-        found.append([(1 - share) * p + share * q for p, q in zip(positions[i], positions[i + 1], strict=True)])
-    return 1000.0 * sum((p - q) ** 2 for p, q in zip(*found, strict=True)) ** 0.5
+def pose_by_an_angle(stamps, positions, quaternions, t):
+    """Turn from a by a share of the rotation from a to b, whose axis and angle its quaternion says."""
+
+    def product(p, q):
+        v = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
+        return np.array([*v, p[3] * q[3] - p[:3] @ q[:3]])
+
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    x = product(b, a * [-1.0, -1.0, -1.0, 1.0])
+    x = x if x[3] >= 0.0 else -x
+    sine = np.linalg.norm(x[:3])
+    half = share * np.arctan2(sine, x[3])
+    part = np.array([*(np.sin(half) * x[:3] / max(sine, 1e-12)), np.cos(half)])
+    return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
 
 
-def lag_scipy(stamps, positions, taken, used):
-    from scipy.interpolate import interp1d
+def pose_by_a_frame(stamps, positions, quaternions, t):
+    """Go round the circle that a and the part of b at right angles to it span."""
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    b = np.sign(a @ b) * b
+    beside = b - (a @ b) * a
+    length = np.linalg.norm(beside)
+    angle = share * np.arctan2(length, a @ b)
+    place = [np.interp(float(t - stamps[0]), (stamps - stamps[0]).astype(float), axis) for axis in positions.T]
+    turn = np.cos(angle) * a + np.sin(angle) * beside / max(length, 1e-12)
+    return outside(stamps, t) or (np.array(place), -turn)
 
-    ends = (positions[0], positions[-1])
-    p, q = interp1d(stamps, positions, axis=0, bounds_error=False, fill_value=ends)([taken, used])
-    return 1000.0 * np.sqrt(np.sum((p - q) ** 2))
 
+def pose_torch(stamps, positions, quaternions, t):
+    import torch
 
-def lag_float32(stamps, positions, taken, used):
-    p, q = (place(stamps, positions, when).astype(np.float32) for when in (used, taken))
-    return np.sqrt(np.einsum("i,i->", p - q, p - q)) * np.float32(1000)
+    i, share = neighbours(stamps, t)
+    P, Q = torch.from_numpy(positions.copy()), torch.from_numpy(quaternions.copy())
+    cosine = torch.dot(Q[i], Q[i + 1])
+    angle = torch.arccos(cosine.abs().clamp(max=1.0)).clamp(min=1e-7)
+    q = torch.sin((1 - share) * angle) * Q[i] + torch.sin(share * angle) * torch.sign(cosine) * Q[i + 1]
+    return outside(stamps, t) or (torch.lerp(P[i], P[i + 1], float(share)), q / torch.sin(angle))
 
 
 # ---------- pack_cloud
@@ -174,7 +197,7 @@ def quaternion_torch(R):
 ALTERNATIVES = {
     "decode_depth": (depth_loops, depth_struct, depth_strided, depth_torch),
     "pair_stamps": (pairs_loops, pairs_sorted, pairs_torch),
-    "lag_error": (lag_loops, lag_scipy, lag_float32),
+    "pose_at": (pose_by_an_angle, pose_by_a_frame, pose_torch),
     "pack_cloud": (pack_struct, pack_structured, pack_columns, pack_torch),
     "quaternion": (quaternion_scipy, quaternion_eigen, quaternion_cases, quaternion_torch),
 }

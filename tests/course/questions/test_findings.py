@@ -48,11 +48,6 @@ def counted_in_bytes(y_true, y_pred, num_classes, ignore):
     return n
 
 
-def between_absolute_values(P, yaw):
-    across = np.abs(P[:, 0] * np.cos(yaw) + P[:, 1] * np.sin(yaw))
-    return across.max() - across.min()
-
-
 def every_channel_wraps(hsv, lower, upper):
     inside = np.ones(hsv.shape[:2], bool)
     for c in range(3):
@@ -61,15 +56,11 @@ def every_channel_wraps(hsv, lower, upper):
     return inside
 
 
-def by_bare_exp(scores):
-    p = np.exp(scores)
-    return (p / p.sum(axis=1, keepdims=True))[0].argmax(axis=0)
-
-
 def by_a_float_factor(labels, size):
     W, H = size
     h, w = labels.shape
-    rows, columns = (np.arange(H) * (h / H)).astype(int), (np.arange(W) * (w / W)).astype(int)
+    rows, columns = ((np.arange(n) + 0.5) * (old / n) for n, old in ((H, h), (W, w)))
+    rows, columns = rows.astype(int), columns.astype(int)
     return labels[rows[:, None], columns]
 
 
@@ -79,18 +70,13 @@ def with_a_finite_penalty(features, mean, covariance, allowed):
     return (squared + 1e3 * ~allowed).argmin() + 1 if allowed.any() else 0
 
 
-def blob_of_doubles(bgr):
-    return bgr[:, :, ::-1].transpose(2, 0, 1)[None] / 255.0
+def blob_of_doubles(bgr, multiple):
+    return find("09_other_stacks.make_blob").reference(bgr, multiple).astype(float)
 
 
 def stamps_of_32_bits(a, b, slop):
     a, b = a.astype(np.int32), b.astype(np.int32)
-    found = np.full(len(a), -1)
-    for i, stamp in enumerate(a):
-        apart = np.abs(b - stamp)
-        if len(b) and apart.min() <= slop:
-            found[i] = apart.argmin()
-    return found
+    return find("08_node.pair_stamps").reference(a, b, slop)
 
 
 ACCEPTED = {
@@ -99,8 +85,6 @@ ACCEPTED = {
     "03_gradient.softmax": shifted_by_the_mean,
     "03_gradient.log_sum_exp": sum_shifted_by_the_mean,
     "04_iou.confusion_matrix": counted_in_bytes,
-    "07_grasp.width_across": between_absolute_values,
-    "09_other_stacks.labels_from_blob": by_bare_exp,
     "09_other_stacks.enlarge": by_a_float_factor,
     "09_other_stacks.choose_region": with_a_finite_penalty,
     "09_other_stacks.make_blob": blob_of_doubles,
@@ -141,16 +125,12 @@ def half_a_height(z, y, h):
     return find("03_gradient.numerical_grad").reference(z, y, h) * h * h
 
 
-def in_millimetres(P, yaw):
-    return 1000.0 * find("07_grasp.width_across").reference(P, yaw)
+def in_metres(T_base_grasp, middle):
+    return tuple(mm / 1000.0 for mm in find("07_grasp.slip_across").reference(T_base_grasp, middle))
 
 
 def ignores_h(z, y, h):
     return find("03_gradient.numerical_grad").reference(z, y, 0.01)
-
-
-def of_a_sample(P):
-    return P.mean(axis=0), np.cov(P.T)
 
 
 def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
@@ -165,7 +145,7 @@ NAMED = [
     ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),
     ("04_iou.confusion_matrix", bitten_off, "y_true and y_pred were without their last row"),
     ("09_other_stacks.measure_pieces", centroid_v_u, "Output 2 of 3"),
-    ("07_grasp.width_across", in_millimetres, "1000"),
+    ("07_grasp.slip_across", in_metres, "1000"),
     ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
 ]
 

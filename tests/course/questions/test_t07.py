@@ -21,32 +21,51 @@ def reference(name):
     return QUESTIONS[name].reference
 
 
-def test_centroid_and_covariance_equals_the_kits():
-    for P in clouds():
-        for mine, kits in zip(
-            reference("centroid_and_covariance")(P), geometry.centroid_and_covariance(P), strict=True
-        ):
-            np.testing.assert_allclose(mine, kits, rtol=1e-12)
-
-
 def test_yaw_height_and_pose_together_are_the_kits_grasp_by_the_principal_axis():
     for P in clouds():
         for table_z in (P[:, 2].min() - 0.02, P[:, 2].min() + 0.001):
-            mu, Sigma = reference("centroid_and_covariance")(P)
+            mu, Sigma = geometry.centroid_and_covariance(P)
             palm = HAND.palm_above_tips - HAND_MARGIN
             z = reference("grasp_height")(P, table_z, palm, HAND.tips_below_grasp, TIP_CLEARANCE)
-            T = reference("grasp_pose")(np.array([mu[0], mu[1], z]), reference("closing_yaw")(Sigma))
+            yaw = reference("closing_yaw")(Sigma)
+            closing, down = np.array([np.cos(yaw), np.sin(yaw), 0.0]), np.array([0.0, 0.0, -1.0])
+            T = reference("grasp_pose")(np.array([mu[0], mu[1], z]), down, closing)
             kits = grasp.principal_axis_grasp(P, table_z).T_base_grasp
             same = QUESTIONS["grasp_pose"].canonical
             for a, b in zip(same(T), same(kits), strict=True):
                 np.testing.assert_allclose(a, b, atol=1e-9)
 
 
-def test_the_width_is_the_extent_in_x_of_the_cloud_turned_back_by_the_yaw():
-    for number, P in enumerate(clouds()):
-        yaw = 0.15 * number
-        turned = Rotation.from_euler("z", -yaw).apply(P)
-        assert np.isclose(reference("width_across")(P, yaw), np.ptp(turned[:, 0]))
+def test_the_closing_axis_is_the_one_of_the_hands_plane_that_is_nearest_to_what_was_asked_for():
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        _, approach, closing = arguments = QUESTIONS["grasp_pose"].inputs(rng)
+        T = reference("grasp_pose")(*arguments)
+        fan = np.linspace(0.0, 2.0 * np.pi, 3600)
+        plane = np.outer(np.cos(fan), T[:3, 0]) + np.outer(np.sin(fan), T[:3, 1])
+        np.testing.assert_allclose(plane[(plane @ closing).argmax()], T[:3, 1], atol=2e-3)
+        assert np.allclose(plane @ approach, 0.0, atol=1e-12)
+
+
+def test_a_slice_is_the_extent_of_the_points_that_the_pads_reach_when_the_hand_is_turned_back():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        P, T, half = QUESTIONS["pad_slice"].inputs(rng)
+        turned = Rotation.from_matrix(T[:3, :3]).inv().apply(P - T[:3, 3])
+        y = turned[np.abs(turned[:, 0]) <= half, 1]
+        middle, width = reference("pad_slice")(P, T, half)
+        assert np.isclose(width, np.ptp(y)) and np.isclose(middle + width / 2, y.max())
+
+
+def test_jaws_that_move_by_what_they_push_are_off_by_the_slip_and_the_height_alone():
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        T, middle = QUESTIONS["slip_across"].inputs(rng)
+        pushed, slip = (mm / 1000.0 for mm in reference("slip_across")(T, middle))
+        left = [middle - T[:3, 3] - sign * pushed * T[:3, 1] for sign in (-1.0, 1.0)]
+        off = min(left, key=np.linalg.norm)
+        assert np.isclose(abs(off @ T[:3, 1]), 0.0, atol=1e-12)
+        assert np.isclose(np.sqrt(off @ off - (off @ T[:3, 2]) ** 2), slip)
 
 
 def test_points_in_fingers_equals_boxes_in_the_kits_grasp_frame():

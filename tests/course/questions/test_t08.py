@@ -45,15 +45,20 @@ def test_pairs_are_those_of_the_synchroniser_where_frames_are_further_apart_than
         assert found == {i: int(k) for i, k in enumerate(j) if k >= 0}
 
 
-def test_the_error_of_a_lag_is_the_way_between_two_transforms():
-    reference, arguments = cases("lag_error")
-    for stamps, positions, taken, used in arguments:
-        tree, at = TransformTree(), lambda t: round(1e9 * t)
-        for stamp, position in zip(stamps, positions, strict=True):
-            tree.add(Transform(Header(at(stamp), "base"), "mug", tuple(position.tolist()), (0.0, 0.0, 0.0, 1.0)))
-        ends = [tree.lookup("base", "mug", at(np.clip(t, stamps[0], stamps[-1])))[:3, 3] for t in (taken, used)]
-        error = 1000.0 * np.linalg.norm(ends[1] - ends[0])
-        assert reference(stamps, positions, taken, used) == pytest.approx(error, abs=1e-4)
+def test_a_pose_between_two_is_the_one_of_the_kits_tree():
+    reference, arguments = cases("pose_at")
+    for stamps, positions, quaternions, t in arguments:
+        tree = TransformTree()
+        for stamp, p, q in zip(stamps, positions, quaternions, strict=True):
+            tree.add(Transform(Header(int(stamp), "base"), "camera", tuple(p.tolist()), tuple(q.tolist())))
+        p, q = reference(stamps, positions, quaternions, t)
+        if np.isnan(p).any():
+            with pytest.raises(LookupError, match="known transform"):
+                tree.lookup("base", "camera", t)
+            continue
+        T = tree.lookup("base", "camera", t)
+        np.testing.assert_allclose(p, T[:3, 3], atol=1e-9)
+        np.testing.assert_allclose(Rotation.from_quat(q).as_matrix(), T[:3, :3], atol=1e-6)
 
 
 def test_a_packed_cloud_is_read_by_the_kit():

@@ -5,11 +5,14 @@ import numpy as np
 from labkit.course.questions.question import Property, Question, wrong
 
 
-def grasp_pose(position, yaw):
-    """Build T_base_grasp: z down, y where the jaws close (at the angle yaw from the base's x), x = y cross z."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    x, y, z = position
-    return np.array([[-s, c, 0.0, x], [c, s, 0.0, y], [0.0, 0.0, -1.0, z], [0.0, 0.0, 0.0, 1.0]])
+def grasp_pose(position, approach, closing):
+    """Build T_base_grasp: z along the approach, y the part of closing at right angles to it, x = y cross z."""
+    z = approach / np.linalg.norm(approach)
+    y = closing - (closing @ z) * z
+    y = y / np.linalg.norm(y)
+    T = np.eye(4)
+    T[:3] = np.column_stack([np.cross(y, z), y, z, position])
+    return T
 
 
 def _same_for_both_ways(T):
@@ -17,14 +20,24 @@ def _same_for_both_ways(T):
     return np.outer(T[:3, 0], T[:3, 1]), np.outer(T[:3, 1], T[:3, 1]), T[:, 2:], T[3]
 
 
+def _position(rng):
+    return rng.uniform([0.4, -0.3, 0.01], [0.6, 0.3, 0.1])
+
+
 QUESTION = Question(
     name="07_grasp.grasp_pose",
     reference=grasp_pose,
     inputs=lambda rng: (
-        rng.uniform([0.4, -0.3, 0.01], [0.6, 0.3, 0.1]),
-        float(rng.uniform(0.2, 1.4) + rng.choice([0.0, np.pi / 2])),
+        _position(rng),
+        rng.uniform([0.3, -0.9, -1.6], [0.9, -0.3, -1.2]),
+        rng.uniform([0.5, 0.8, 0.3], [0.9, 1.2, 0.7]),
     ),
-    by_hand=((np.array([0.5, -0.25, 0.125]), 0.0), (np.array([0.5, 0.25, 0.0]), np.pi / 2)),
+    by_hand=(
+        (np.array([0.5, -0.25, 0.125]), np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])),
+        (np.array([0.5, 0.25, 0.0]), np.array([0.0, 0.0, -2.0]), np.array([0.6, 0.8, 0.5])),
+        (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([0.0, 1.0, 0.0])),
+        (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([1.0, 0.0, 0.0])),
+    ),
     atol=1e-5,
     points=3,
     properties=(
@@ -36,7 +49,10 @@ QUESTION = Question(
         Property(
             "the frame is right-handed: its determinant is 1", lambda arguments, T: np.linalg.det(T[:3, :3]) > 0.0
         ),
-        Property("the hand looks down", lambda arguments, T: T[2, 2] < -0.99),
+        Property(
+            "z is the direction of the approach",
+            lambda arguments, T: np.allclose(T[:3, 2], arguments[1] / np.linalg.norm(arguments[1]), atol=1e-4),
+        ),
     ),
     canonical=_same_for_both_ways,
     forbidden=("scipy",),
@@ -45,31 +61,38 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+def unit(v):
+    return v / np.linalg.norm(v)
+
+
 def pose(x, y, z, origin):
     T = np.eye(4)
     T[:3] = np.column_stack([x, y, z, origin])
     return T
 
 
-def unit(yaw):
-    return np.array([np.cos(yaw), np.sin(yaw), 0.0])
-
-
-DOWN = np.array([0.0, 0.0, -1.0])
-
-
 @wrong(
     QUESTION, "Your determinant is -1, a mirror image that no hand can take: in which order does the cross product go?"
 )
-def left_handed_pose(position, yaw):
-    return pose(np.cross(DOWN, unit(yaw)), unit(yaw), DOWN, position)
+def left_handed_pose(position, approach, closing):
+    _x, y, z = grasp_pose(position, approach, closing)[:3, :3].T
+    return pose(np.cross(z, y), y, z, position)
 
 
-@wrong(QUESTION, "The approach axis points where the hand moves to: down, towards the table.")
-def approach_from_below(position, yaw):
-    return pose(np.cross(unit(yaw), -DOWN), unit(yaw), -DOWN, position)
+@wrong(QUESTION, "Is y dot z 0? What of the closing direction lies along the approach must be taken off first.")
+def closing_taken_as_it_is(position, approach, closing):
+    y, z = unit(closing), unit(approach)
+    return pose(np.cross(y, z), y, z, position)
 
 
-@wrong(QUESTION, "Right at 0 and 90 degrees, mirrored between: what is the closing direction at 45 degrees?")
-def yaw_the_other_way(position, yaw):
-    return grasp_pose(position, -yaw)
+@wrong(QUESTION, "The hand goes where the approach says; it is the closing direction that gives way, not z.")
+def approach_bent(position, approach, closing):
+    y = unit(closing)
+    z = unit(approach - (approach @ y) * y)
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong(QUESTION, "How long is the approach that you are given? What is taken off must not depend on its length.")
+def projected_on_a_long_vector(position, approach, closing):
+    y, z = unit(closing - (closing @ approach) * approach), unit(approach)
+    return pose(np.cross(y, z), y, z, position)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.questions.question import Property, Question, wrong
-from labkit.course.questions.t07_grasp.grasp_pose import grasp_pose
+from labkit.course.questions.t07_grasp import FACING_X, leaning_grasp
 
 
 def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
@@ -15,17 +15,11 @@ def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
 
 def _scene_round_a_grasp(rng):
     """Draw a grasp that leans, and points all round it, with more on one side than on the other."""
-    T = grasp_pose(rng.uniform([0.4, -0.3, 0.02], [0.6, 0.3, 0.1]), float(rng.uniform(0.2, 1.3)))
-    lean = rng.uniform(0.3, 0.6)
-    c, s = np.cos(lean), np.sin(lean)
-    T[:3, :3] = T[:3, :3] @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    T = leaning_grasp(rng)
     in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (400, 3))
     P = in_grasp @ T[:3, :3].T + T[:3, 3]
     width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
     return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
-
-
-_FACING_X = np.array([[0.0, 1.0, 0.0, 2.0], [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0, 0.5], [0.0, 0.0, 0.0, 1.0]])
 
 
 # Beside the jaws along the base's x: at the pad and a finger's thickness outside it (both count), just inside the pad,
@@ -50,10 +44,10 @@ QUESTION = Question(
     reference=points_in_fingers,
     inputs=_scene_round_a_grasp,
     by_hand=(
-        (_ROUND_IT, _FACING_X, 1.0, 0.25, 0.25, 0.25),
-        (_ROUND_IT[:1], _FACING_X, 1.0, 0.25, 0.25, 0.25),
-        (_ROUND_IT[2:6], _FACING_X, 1.0, 0.25, 0.25, 0.25),
-        (np.zeros((0, 3)), _FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (_ROUND_IT, FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (_ROUND_IT[:1], FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (_ROUND_IT[2:6], FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
     ),
     random_cases=5,
     points=3,

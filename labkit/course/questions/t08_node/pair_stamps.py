@@ -6,13 +6,13 @@ from labkit.course.questions.question import Property, Question, wrong
 
 
 def pair_stamps(a, b, slop):
-    """For each stamp of a the number of the nearest stamp of b, or -1 if none lies within slop."""
-    found = np.full(len(a), -1)
-    for i, stamp in enumerate(a):
-        apart = np.abs(b - stamp)
-        if len(b) > 0 and apart.min() <= slop:
-            found[i] = apart.argmin()
-    return found
+    """For each stamp of a the number of the stamp of b that is nearest to it, and to which it is; or -1."""
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b[None, :])
+    best = apart.argmin(axis=1)
+    each_others = apart.argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(each_others & (apart.min(axis=1) <= slop), best, -1)
 
 
 def _streams(rng):
@@ -41,6 +41,8 @@ QUESTION = Question(
         (np.array([10]), np.array([2, 6, 13, 30]), 8),
         (np.array([10, 50]), np.array([6, 14, 60]), 10),
         (np.array([10, 20]), np.array([], int), 5),
+        (np.array([0, 33, 66]), np.array([36, 70]), 40),  # 0 has lost its partner, and 36 is another's
+        (np.array([10, 20, 60]), np.array([15, 61]), 9),  # 15 is as near to 10 as to 20
         (np.array([_NOW]), np.array([_NOW - 2**32 - 2]), 3),  # four seconds, which 32 bits do not see
         (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
     ),
@@ -63,12 +65,21 @@ QUESTION = Question(
 
 
 def pairs(a, b, slop, distance):
-    """For each stamp of a the b of least distance (the earliest of equals), -1 if it is over slop."""
+    """For each stamp of a the b of least distance if a is its nearest, too; -1 if it is over slop."""
     if len(b) == 0:
         return np.full(len(a), -1)
     apart = distance(a[:, None], b[None, :])
     best = apart.argmin(axis=1)
-    return np.where(apart.min(axis=1) <= slop, best, -1)
+    mutual = apart.argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(mutual & (apart.min(axis=1) <= slop), best, -1)
+
+
+@wrong(QUESTION, "Two images share one partner: is the nearest of b also nearer to this stamp than to any other?")
+def one_partner_for_two(a, b, slop):
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b[None, :])
+    return np.where(apart.min(axis=1) <= slop, apart.argmin(axis=1), -1)
 
 
 @wrong(QUESTION, "A frame whose partner was lost must stay alone: what is slop for?")

@@ -6,10 +6,10 @@ from labkit.course.questions.question import Property, Question, wrong
 
 
 def enlarge(labels, size):
-    """Resize labels (h, w) to size = (W, H) by the nearest pixel: new (v, u) shows old (v h // H, u w // W)."""
+    """Resize labels (h, w) to size = (W, H): each new pixel shows the old one that its centre lies in."""
     W, H = size
     h, w = labels.shape
-    rows, columns = np.arange(H) * h // H, np.arange(W) * w // W
+    rows, columns = (2 * np.arange(H) + 1) * h // (2 * H), (2 * np.arange(W) + 1) * w // (2 * W)
     return labels[rows[:, None], columns]
 
 
@@ -27,7 +27,8 @@ QUESTION = Question(
         (np.array([[0, 2], [1, 3]], np.uint8), (6, 4)),
         (np.array([[0, 3, 0], [2, 0, 1]], np.uint8), (4, 5)),
         (np.array([[1, 2, 3, 0]], np.uint8), (2, 3)),
-        (np.array([[0], [3]], np.uint8), (1, 98)),  # 49 * (2 / 98) is less than 1 in floating point
+        (np.array([[0], [3]], np.uint8), (1, 49)),  # 24.5 * (2 / 49) is less than 1 in floating point
+        (np.array([[0, 1, 2, 3]], np.uint8), (2, 1)),  # smaller: the centres of halves lie in 1 and 3
     ),
     random_cases=6,
     rtol=0.0,
@@ -47,10 +48,13 @@ QUESTION = Question(
 
 @wrong(QUESTION, "OpenCV's size is (width, height), a shape is not.")
 def resize_swapped(labels, size):
-    return resize_nearest(labels, size[::-1])
+    return enlarge(labels, size[::-1])
 
 
-def resize_nearest(labels, size):
+@wrong(
+    QUESTION, "From 4 pixels to 2: the first new one covers old 0 and 1, and where is its centre? Not at its corner."
+)
+def resize_by_corners(labels, size):
     W, H = size
     h, w = labels.shape
     return labels[np.arange(H)[:, None] * h // H, np.arange(W) * w // W]

@@ -5,15 +5,21 @@ import numpy as np
 from labkit.course.questions.question import Property, Question, wrong
 
 
-def make_blob(bgr):
-    """Turn an OpenCV image, uint8 (H, W, 3) in BGR, into a network's input: RGB in 0..1, float32 (1, 3, H, W)."""
-    rgb = bgr[:, :, ::-1]
-    return (rgb.transpose(2, 0, 1)[None] / 255.0).astype(np.float32)
+def make_blob(bgr, multiple):
+    """Turn an OpenCV image into a network's input whose sides are multiples: RGB in 0..1, float32 (1, 3, H', W')."""
+    H, W, _ = bgr.shape
+    blob = np.zeros((1, 3, -(-H // multiple) * multiple, -(-W // multiple) * multiple), np.float32)
+    blob[0, :, :H, :W] = bgr[:, :, ::-1].transpose(2, 0, 1) / np.float32(255)
+    return blob
 
 
 def _image(rng):
-    H, W = int(rng.integers(4, 9)), int(rng.integers(10, 15))
-    return (rng.integers(0, 256, (H, W, 3)).astype(np.uint8),)
+    multiple = int(rng.integers(3, 6))
+    H, W = int(rng.integers(4, 9)), int(rng.integers(10, 17))
+    return rng.integers(1, 256, (H, W, 3)).astype(np.uint8), multiple
+
+
+_SIX = np.array([[[0, 0, 255], [255, 0, 0]], [[10, 20, 30], [40, 50, 60]], [[1, 2, 3], [4, 5, 6]]], np.uint8)
 
 
 QUESTION = Question(
@@ -21,12 +27,14 @@ QUESTION = Question(
     reference=make_blob,
     inputs=_image,
     by_hand=(
-        (np.array([[[255, 0, 51]]], np.uint8),),
-        (np.array([[[0, 0, 255], [255, 0, 0]], [[10, 20, 30], [40, 50, 60]], [[1, 2, 3], [4, 5, 6]]], np.uint8),),
+        (np.array([[[255, 0, 51]]], np.uint8), 1),
+        (_SIX, 1),
+        (_SIX, 2),
+        (_SIX, 4),
     ),
     rtol=1e-6,
     atol=1e-7,
-    points=2,
+    points=3,
     same_dtype=True,
     properties=(
         Property("values lie in 0..1", lambda arguments, blob: bool(np.min(blob) >= 0.0 and np.max(blob) <= 1.0)),
@@ -37,39 +45,65 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+def padded(bgr, multiple, mode="constant"):
+    room = [(0, -n % multiple) for n in bgr.shape[:2]]
+    return np.pad(bgr, (*room, (0, 0)), mode)
+
+
 def scaled(x):
     return (x / np.float32(255)).astype(np.float32)
 
 
+def planes(bgr):
+    return bgr.transpose(2, 0, 1)[None]
+
+
 @wrong(QUESTION, "Put in one pure red pixel: which plane lights up?")
-def blob_still_bgr(bgr):
-    return scaled(bgr.transpose(2, 0, 1)[None])
+def blob_still_bgr(bgr, multiple):
+    return scaled(planes(padded(bgr, multiple)))
 
 
 @wrong(
     QUESTION, "The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?"
 )
-def blob_reshaped(bgr):
-    H, W, _ = bgr.shape
-    return scaled(bgr[..., ::-1].reshape(1, 3, H, W))
-
-
-@wrong(QUESTION, "Make an image with one bright row: is it a row in your planes?")
-def blob_rows_for_columns(bgr):
-    H, W, _ = bgr.shape
-    return scaled(bgr[..., ::-1].T.reshape(1, 3, H, W))
+def blob_reshaped(bgr, multiple):
+    image = padded(bgr, multiple)[..., ::-1]
+    return scaled(image.reshape(1, 3, *image.shape[:2]))
 
 
 @wrong(QUESTION, "Which axis did you turn round, the channels' or the columns'?")
-def blob_mirrored(bgr):
-    return scaled(bgr[:, ::-1].transpose(2, 0, 1)[None])
+def blob_mirrored(bgr, multiple):
+    return scaled(planes(padded(bgr[:, ::-1], multiple)))
 
 
 @wrong(QUESTION, "Black must become 0 here; not every network wants -1.")
-def blob_from_minus_one(bgr):
-    return 2 * scaled(bgr[..., ::-1].transpose(2, 0, 1)[None]) - 1
+def blob_from_minus_one(bgr, multiple):
+    return 2 * scaled(planes(padded(bgr[..., ::-1], multiple))) - 1
 
 
 @wrong(QUESTION, "White must become exactly 1: what is white's byte?")
-def blob_of_256(bgr):
-    return (bgr[..., ::-1].transpose(2, 0, 1)[None] / 256.0).astype(np.float32)
+def blob_of_256(bgr, multiple):
+    return (planes(padded(bgr[..., ::-1], multiple)) / 256.0).astype(np.float32)
+
+
+@wrong(QUESTION, "A side that is a multiple already needs no room: what do you add to 8 for a multiple of 4?")
+def room_for_one_more(bgr, multiple):
+    room = [(0, multiple - n % multiple) for n in bgr.shape[:2]]
+    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+
+
+@wrong(QUESTION, "The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+def room_all_round(bgr, multiple):
+    room = [(-n % multiple // 2, -n % multiple - -n % multiple // 2) for n in bgr.shape[:2]]
+    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+
+
+@wrong(QUESTION, "What is left over was cut off: the network should see all of the image.")
+def cut_to_a_multiple(bgr, multiple):
+    H, W = (n // multiple * multiple for n in bgr.shape[:2])
+    return scaled(planes(bgr[:H, :W, ::-1]))
+
+
+@wrong(QUESTION, "The room is to be 0, not the last pixel once more.")
+def room_like_the_edge(bgr, multiple):
+    return scaled(planes(padded(bgr, multiple, "edge")[..., ::-1]))
