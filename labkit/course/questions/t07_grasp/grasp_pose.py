@@ -39,7 +39,7 @@ QUESTION = Question(
         (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([1.0, 0.0, 0.0])),
     ),
     atol=1e-5,
-    points=3,
+    points=4,
     properties=(
         Property("the last row is 0 0 0 1", lambda arguments, T: np.allclose(T[3], (0.0, 0.0, 0.0, 1.0))),
         Property(

@@ -39,7 +39,7 @@ QUESTION = Question(
         (_L[3:4], FACING_X, 0.25),  # nothing between the pads
     ),
     random_cases=6,
-    points=3,
+    points=4,
     properties=(Property("a width is not negative", lambda arguments, out: bool(out[1] >= 0.0)),),
     forbidden=("scipy", "cv2"),
 )
