@@ -6,7 +6,7 @@ from style import COLD, HOT, INK, LEAF, SMALL, SOFT, TINTS, arrow, line, schemat
 
 @schematic("07_hand", width=16.5, height=8.2)
 def hand(axes) -> None:
-    """From the side: palm, fingers, tips, table, and where they touch; from above: what the jaws push and what slips."""
+    """From the side: palm, fingers, tips, table and contacts; from above: what the jaws push and what slips."""
     from_the_side(axes)
     from_above(axes)
 
@@ -60,7 +60,7 @@ def from_above(axes) -> None:
     word(axes, (13.0, 6.8), "x", colour=HOT)
     axes.add_patch(Circle((12.7, 4.85), 0.13, facecolor=INK, zorder=6))
     word(axes, (12.05, 5.15), "origin", size=SMALL)
-    word(axes, (13.2, 3.5), "×", size=18)
+    word(axes, (13.2, 3.5), r"$\times$", size=18)
     word(axes, (13.2, 2.95), "true middle", size=SMALL)
     line(axes, (12.7, 4.85), (12.7, 3.5), dashed=True, colour=INK, width=2.0)
     line(axes, (12.7, 3.5), (13.1, 3.5), dashed=True, colour=LEAF, width=2.0)

@@ -41,7 +41,7 @@ def times(axes) -> None:
         axes.text(x, 4.4, "●", color=COLD, size=13, **mark)
     for x in (4.5, 7.3, 14.7):
         axes.text(x, 3.5, "■", color=COLD, size=12, **mark)
-    axes.text(11.3, 3.5, "×", color=INK, size=15, **mark)
+    axes.text(11.3, 3.5, r"$\times$", color=INK, size=15, **mark)
     word(axes, (11.5, 3.82), "lost", size=SMALL, ha="left")
     for x in (3.7, 5.4, 7.1, 8.8, 10.5, 12.2, 13.9):
         axes.text(x, 2.6, "▲", color=LEAF, size=11, **mark)

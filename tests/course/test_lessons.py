@@ -25,8 +25,6 @@ PENDING = {
     "01": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
     "03": {"minutes", "lab minutes", "new steps", "marks", "ending", "schematic", "words"},
     "06": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
-    "08": {"minutes", "marks", "ending", "schematic", "words"},
-    "09": {"minutes", "marks", "ending", "schematic"},
 }
 MOST_MINUTES, MOST_LAB_MINUTES, WORDS_PER_MINUTE, NEW = 50, 105, 200, 0.6
 

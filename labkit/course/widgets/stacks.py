@@ -74,10 +74,10 @@ def colour_range(rgb: UInt8[np.ndarray, "H W 3"], table: Bool[np.ndarray, "H W"]
         hues.legend(fontsize=8)
 
     controls = {
-        "first": ipywidgets.IntSlider(5, min=0, max=179, description="first hue"),
-        "last": ipywidgets.IntSlider(20, min=0, max=179, description="last hue"),
+        "first": ipywidgets.IntSlider(150, min=0, max=179, description="first hue"),
+        "last": ipywidgets.IntSlider(179, min=0, max=179, description="last hue"),
         "saturation": ipywidgets.IntSlider(50, min=0, max=255, description="saturation ≥"),
-        "value": ipywidgets.IntRangeSlider(value=(50, 255), min=0, max=255, description="value"),
+        "value": ipywidgets.IntRangeSlider(value=(190, 255), min=0, max=255, description="value"),
     }
     return Explorer(draw, controls, size=(8.5, 3.1))
 
@@ -123,6 +123,6 @@ def memory(scores: Float[np.ndarray, "C H W"]) -> Explorer:
     controls = {
         "v": ipywidgets.IntSlider(0, min=0, max=H - 1, description="row v"),
         "u": ipywidgets.IntSlider(1, min=0, max=W - 1, description="column u"),
-        "layout": ipywidgets.ToggleButtons(options=["NCHW", "NHWC"], description="read as"),
+        "layout": ipywidgets.ToggleButtons(options=["NCHW", "NHWC"], value="NHWC", description="read as"),
     }
     return Explorer(draw, controls, size=(8.5, 2.2))
