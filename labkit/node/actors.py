@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -90,14 +89,6 @@ class Camera:
         return count
 
 
-@dataclass(frozen=True, eq=False)
-class GraspTarget:
-    """What the arm asks of a grasp: T_base_grasp, (4, 4), and the jaws' opening in metres."""
-
-    T_base_grasp: np.ndarray
-    width: float
-
-
 class Arm:
     """Subscribe to grasps, openings and the scene's points, and execute the first grasp in a World with its Panda.
 
@@ -124,12 +115,13 @@ class Arm:
 
     def act(self, timeout: float = 10.0):
         """Wait for a grasp, execute it and lift; a LiftResult, whose reason is "no grasp" if none came in time."""
-        from labkit.sim.panda import LiftResult, Panda  # PyBullet, for who has an arm
+        from labkit.grasp import Grasp  # numba
+        from labkit.sim.panda import LiftResult, Panda  # PyBullet, for whoever has an arm
 
         with self._news:
             self._news.wait_for(lambda: self._together is not None, timeout)
             together, self._together = self._together, None
         if together is None:
             return LiftResult(False, "no grasp")
-        grasp = GraspTarget(convert.decode_pose(together["grasp"]), sum(together["gripper"].position))
+        grasp = Grasp(convert.decode_pose(together["grasp"]), sum(together["gripper"].position))
         return Panda(self.world).lift(grasp, convert.decode_cloud(together["scene"]))

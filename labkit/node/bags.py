@@ -5,7 +5,7 @@ MCAP or of SQLite; either file is read on its own, too (topic 08).
 """
 
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
 
 from rosbags import rosbag1, rosbag2
@@ -23,17 +23,8 @@ from labkit.pipeline import Pipeline
 
 STORAGES = {"mcap": rosbag2.StoragePlugin.MCAP, "sqlite3": rosbag2.StoragePlugin.SQLITE3}
 FOREVER = QosTime(0, 0)
-RELIABLE = Qos(
-    history=QosHistory.KEEP_LAST,
-    depth=10,
-    reliability=QosReliability.RELIABLE,
-    durability=QosDurability.VOLATILE,
-    deadline=FOREVER,
-    lifespan=FOREVER,
-    liveliness=QosLiveliness.AUTOMATIC,
-    liveliness_lease_duration=FOREVER,
-    avoid_ros_namespace_conventions=False,
-)
+KEPT = (QosHistory.KEEP_LAST, 10, QosReliability.RELIABLE)
+ALWAYS = (FOREVER, FOREVER, QosLiveliness.AUTOMATIC, FOREVER, False)  # deadline, lifespan, liveliness and its lease
 
 
 class BagWriter(Transport):
@@ -55,13 +46,11 @@ class BagWriter(Transport):
         self._wire = Wire(ros1)
         newest = {"version": 9, "storage_plugin": STORAGES[storage]}
         self._writer = rosbag1.Writer(self.path) if ros1 else rosbag2.Writer(self.path, **newest)
-        self._connections = {}
-
-    def __enter__(self) -> "BagWriter":
+        self._connections, self.callbacks = {}, {}
         self._writer.open()
-        return self
 
-    def __exit__(self, *_):
+    def close(self) -> None:
+        """Finish the bag."""
         self._writer.close()
 
     def advertise(self, topic: str, kind: type) -> None:
@@ -69,7 +58,7 @@ class BagWriter(Transport):
         if topic not in self._connections:
             # What `ros2 bag play` shall offer: static transforms also to those who come late.
             durability = QosDurability.TRANSIENT_LOCAL if topic.endswith("/tf_static") else QosDurability.VOLATILE
-            qos = {} if self._wire.ros1 else {"offered_qos_profiles": [RELIABLE._replace(durability=durability)]}
+            qos = {} if self._wire.ros1 else {"offered_qos_profiles": [Qos(*KEPT, durability, *ALWAYS)]}
             self._connections[topic] = self._writer.add_connection(
                 topic, TYPES[kind], typestore=self._wire.store, **qos
             )
@@ -81,22 +70,12 @@ class BagWriter(Transport):
         self._writer.write(self._connections[topic], first.header.stamp, self._wire.encode(message))
 
     def subscribe(self, topic: str, kind: type, callback: Callable[[Message | ValueError], None]) -> None:
-        """Nothing comes out of a bag that is written."""
+        """Keep the callback for `process`; nothing comes out of a bag that is written."""
+        self.callbacks[topic] = callback
 
     def wanted(self, topic: str) -> bool:
         """Whether a topic that is made only on demand is to be written."""
         return topic in self.wants
-
-
-class _Between(BagWriter):
-    """A transport between two bags: messages of the one are delivered, those of the node written to the other."""
-
-    def __init__(self, path, wants=(), storage="mcap"):
-        super().__init__(path, wants, storage)
-        self.callbacks = {}
-
-    def subscribe(self, topic, kind, callback):
-        self.callbacks[topic] = callback
 
 
 def process(
@@ -117,48 +96,40 @@ def process(
     FileExistsError, or ValueError if the bag cannot be read or lacks one of the camera's topics.
     """
     needed = [topics.rgb, topics.depth, topics.info]
-    with _reader(Path(source)) as reader:
+    with closing(_open(Path(source))) as reader:
         there = {connection.topic for connection in reader.connections}
         if missing := [topic for topic in needed if topic not in there]:
             found = ", ".join(sorted(there)) or "none"
             raise ValueError(f"topics: expected {', '.join(missing)} in {source}, got {found}")
-        with _Between(out, {topics.probabilities} if probabilities else (), storage) as between:
+        with BagWriter(out, {topics.probabilities} if probabilities else (), storage) as writer:
             # All transforms come first, for an image may ask for one that was recorded after it; then none will come.
             tree = TransformTree(seconds=float("inf"))
-            node = SegmentationNode(pipeline, between, topics=topics, tree=tree, patience=0.0, **options)
+            node = SegmentationNode(pipeline, writer, topics=topics, tree=tree, patience=0.0, **options)
             for wanted in ([topics.tf, topics.tf_static], needed):
-                chosen = [c for c in reader.connections if c.topic in wanted and c.topic in between.callbacks]
+                chosen = [c for c in reader.connections if c.topic in wanted and c.topic in writer.callbacks]
                 total = sum(c.msgcount for c in chosen)
                 with tqdm(_messages(reader, chosen), total=total, unit="message", disable=not progress) as bar:
                     for topic, message in bar:
-                        between.callbacks[topic](message)
+                        writer.callbacks[topic](message)
                         node.spin_once()
             node.flush()
         return node.counts
 
 
-@contextmanager
-def _reader(source: Path):
+def _open(source: Path) -> AnyReader:
     if not source.exists():
         raise FileNotFoundError(2, "no such bag", str(source))
     try:
         reader = AnyReader([source], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
+        return reader
     except Exception as error:  # rosbags raises a dozen types for files that are damaged, or no bags
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise ValueError(f"bag: {source} cannot be read (truncated, or not a bag?): {reason}") from error
-    try:
-        yield reader
-    finally:
-        reader.close()
 
 
 def _messages(reader: AnyReader, connections):
     """Topic and message, in the order of recording; the error in place of a message that cannot be read."""
     wire = Wire(ros1=not reader.is2)
     for connection, _, data in reader.messages(connections) if connections else ():
-        try:
-            message = wire.decode(connection.msgtype, data)
-        except ValueError as error:
-            message = error
-        yield connection.topic, message
+        yield connection.topic, wire.decode_or_error(connection.msgtype, data)

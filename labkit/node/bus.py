@@ -38,6 +38,16 @@ class Transport(ABC):
         """What the middleware knows to go wrong, in words, by topic; by default nothing."""
         return {}
 
+    def close(self) -> None:
+        """Leave; at the end of a `with`, too."""
+        return None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
 
 class Bus(Transport):
     """A transport within one process, which delivers at once, in the publisher's thread.

@@ -12,7 +12,7 @@ def camera_to_lift(spec, pipeline: Pipeline, size: tuple[int, int] = (320, 240))
 
     spec: a SceneSpec. pipeline: with the height of the spec's table. Nothing but messages goes from one to the next.
     """
-    from labkit.sim.world import World  # PyBullet, for who has a scene
+    from labkit.sim.world import World  # PyBullet, for whoever has a scene
 
     bus, topics, heard = Bus(), Topics(), {}
     for topic, kind in ((topics.cloud, PointCloud2), (topics.diagnostics, Diagnostics)):

@@ -69,12 +69,6 @@ class Ros1Transport(Transport):
         ros("rospy").on_shutdown(stop.set)  # `rosnode kill`, or another node took this one's name
         return transport
 
-    def __enter__(self) -> "Ros1Transport":
-        return self
-
-    def __exit__(self, *_):
-        self.close()
-
     def close(self) -> None:
         """Leave ROS."""
         self._closing.set()
@@ -98,11 +92,7 @@ class Ros1Transport(Transport):
         name = TYPES[kind]
 
         def receive(raw) -> None:
-            try:
-                message = self._wire.decode(name, raw._buff)
-            except ValueError as error:
-                message = error
-            callback(message)
+            callback(self._wire.decode_or_error(name, raw._buff))
 
         cls = self._message_class(name)
         self._subscribers[topic] = self._rospy.Subscriber(topic, cls, receive, buff_size=BUFFER, tcp_nodelay=True)

@@ -60,12 +60,6 @@ class Ros2Transport(Transport):
         transport._context.on_shutdown(stop.set)
         return transport
 
-    def __enter__(self) -> "Ros2Transport":
-        return self
-
-    def __exit__(self, *_):
-        self.close()
-
     def close(self) -> None:
         """Leave ROS."""
         with self._publishing:
@@ -123,11 +117,7 @@ class Ros2Transport(Transport):
 
         def receive(data: bytes, info: dict) -> None:
             self._count_lost(topic, info)
-            try:
-                message = self._wire.decode(name, data)
-            except ValueError as error:
-                message = error
-            callback(message)
+            callback(self._wire.decode_or_error(name, data))
 
         events = ros("rclpy.event_handler").SubscriptionEventCallbacks(
             incompatible_qos=self._refuse(topic, "publisher")

@@ -5,6 +5,7 @@ import threading
 import time
 from collections import Counter
 from dataclasses import dataclass, field, fields
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -118,34 +119,35 @@ class SegmentationNode:
         for output, kind in OUTPUTS.items():
             transport.advertise(getattr(topics, output), kind)
         for stream, (kind, check) in checks.items():
-            transport.subscribe(getattr(topics, stream), kind, self._receiver(stream, check))
-        if self.T_base_cam is None:
-            transport.subscribe(topics.tf, Transforms, lambda message: self._take_transforms(message, False))
-            transport.subscribe(topics.tf_static, Transforms, lambda message: self._take_transforms(message, True))
+            self._listen(stream, kind, partial(self._take, stream, check))
+        for stream in ("tf", "tf_static") if self.T_base_cam is None else ():
+            self._listen(stream, Transforms, partial(self._take_transforms, stream))
 
     # ------------------------------------------------------------------------- what comes in, in any thread
 
-    def _receiver(self, stream: str, check):
+    def _listen(self, stream: str, kind: type, take) -> None:
+        """Subscribe; a message that cannot be read, or that `take` refuses, is skipped."""
         topic = getattr(self.topics, stream)
 
         def receive(message: Message | ValueError) -> None:
             try:
                 if isinstance(message, ValueError):
                     raise message
-                check(message)
-                stamp = _stamp(message)
+                take(message)
             except ValueError as error:
                 self._skip(topic, error)
-                return
-            with self._news:
-                together = self._sync.add(stream, stamp, message)
-                if together is None:
-                    return
+
+        self.transport.subscribe(topic, kind, receive)
+
+    def _take(self, stream: str, check, message: Message) -> None:
+        check(message)
+        stamp = _stamp(message)
+        with self._news:
+            together = self._sync.add(stream, stamp, message)
+            if together is not None:
                 self.counts.dropped += self._pending is not None
                 self._pending = (together, time.monotonic())
                 self._news.notify_all()
-
-        return receive
 
     def _check_info(self, message: CameraInfo) -> None:
         convert.camera_matrix(message)
@@ -153,18 +155,14 @@ class SegmentationNode:
             self._distortion_said = True
             logger.warning("%s: distortion is not undone; publish rectified images", self.topics.info)
 
-    def _take_transforms(self, message: Transforms | ValueError, static: bool) -> None:
-        topic = self.topics.tf_static if static else self.topics.tf
+    def _take_transforms(self, stream: str, message: Transforms) -> None:
         if not isinstance(message, Transforms):
-            unread = isinstance(message, ValueError)
-            error = message if unread else ValueError(f"message: expected Transforms, got {type(message).__name__}")
-            self._skip(topic, error)
-            return
+            raise ValueError(f"message: expected Transforms, got {type(message).__name__}")
         for transform in message.transforms:
             try:
-                self.tree.add(transform, static)
+                self.tree.add(transform, static=stream == "tf_static")
             except ValueError as error:
-                self._skip(topic, error)
+                self._skip(getattr(self.topics, stream), error)
         with self._news:
             self._news.notify_all()
 

@@ -4,6 +4,8 @@
 middlewares, and no edge needs message classes of its own.
 """
 
+from dataclasses import fields
+
 import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -71,6 +73,13 @@ class Wire:
         except Exception as error:  # rosbags raises a dozen types for bytes that are damaged
             raise ValueError(f"message: expected a {name}: {type(error).__name__}: {error}") from error
 
+    def decode_or_error(self, name: str, data) -> Message | ValueError:
+        """Read as `decode` does; the error in place of a message that cannot be read, as a Transport delivers it."""
+        try:
+            return self.decode(name, data)
+        except ValueError as error:
+            return error
+
     def _build(self, name: str, given):
         """Make a message of rosbags' class; a field that is not given is 0 or empty."""
         if isinstance(given, tuple):
@@ -119,42 +128,40 @@ def _by_ros_names(message: Message) -> dict:
             return vars(message)
 
 
-def _read(kind: type, raw) -> Message:
+def _read(kind: type, raw):
     """Translate a message of rosbags' class to one of the kit's."""
     if kind is Transforms:
         return Transforms(tuple(_read_transform(one) for one in raw.transforms))
-    header = _read_header(raw.header)
-    match kind.__name__:
-        case "Image":
-            return Image(header, raw.height, raw.width, raw.encoding, raw.is_bigendian, raw.step, memoryview(raw.data))
-        case "CameraInfo":
-            K, D = (raw.K, raw.D) if hasattr(raw, "K") else (raw.k, raw.d)
-            return CameraInfo(header, raw.height, raw.width, tuple(K.tolist()), tuple(D.tolist()))
-        case "PointCloud2":
-            fields = tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in raw.fields)
-            shape = (raw.height, raw.width, fields, bool(raw.is_bigendian), raw.point_step, raw.row_step)
-            return PointCloud2(header, *shape, memoryview(raw.data), bool(raw.is_dense))
-        case "Pose":
-            return Pose(header, _read_vector(raw.pose.position, "xyz"), _read_vector(raw.pose.orientation, "xyzw"))
-        case "JointState":
-            return JointState(header, tuple(raw.name), tuple(raw.position.tolist()))
-        case _:
-            if len(raw.status) != 1:
-                raise ValueError(f"status: expected the diagnostics of one node, got {len(raw.status)}")
-            status = raw.status[0]
-            values = {pair.key: pair.value for pair in status.values}
-            return Diagnostics(header, status.name, int(status.level), status.message, values)
-
-
-def _read_header(raw) -> Header:
-    return Header(raw.stamp.sec * NANOSECONDS + raw.stamp.nanosec, raw.frame_id)
+    if kind is Pose:
+        return Pose(_plain(raw.header), _plain(raw.pose.position), _plain(raw.pose.orientation))
+    if kind is Diagnostics:
+        if len(raw.status) != 1:
+            raise ValueError(f"status: expected the diagnostics of one node, got {len(raw.status)}")
+        status = raw.status[0]
+        values = {pair.key: pair.value for pair in status.values}
+        return Diagnostics(_plain(raw.header), status.name, int(status.level), status.message, values)
+    return kind(*(_plain(getattr(raw, f.name, getattr(raw, f.name.lower(), None))) for f in fields(kind)))
 
 
 def _read_transform(raw) -> Transform:
     moved = raw.transform
-    translation, rotation = _read_vector(moved.translation, "xyz"), _read_vector(moved.rotation, "xyzw")
-    return Transform(_read_header(raw.header), raw.child_frame_id, translation, rotation)
+    return Transform(_plain(raw.header), raw.child_frame_id, _plain(moved.translation), _plain(moved.rotation))
 
 
-def _read_vector(raw, names: str) -> tuple[float, ...]:
-    return tuple(float(getattr(raw, name)) for name in names)
+def _plain(value):
+    """What the kit's dataclasses hold in place of a field of rosbags' messages."""
+    if isinstance(value, np.ndarray):
+        return memoryview(value) if value.dtype == np.uint8 else tuple(value.tolist())
+    if isinstance(value, list):
+        return tuple(map(_plain, value))
+    match getattr(value, "__msgtype__", "").rpartition("/")[2]:
+        case "Header":
+            return Header(value.stamp.sec * NANOSECONDS + value.stamp.nanosec, value.frame_id)
+        case "PointField":
+            return PointField(value.name, value.offset, value.datatype, value.count)
+        case "Point" | "Vector3":
+            return float(value.x), float(value.y), float(value.z)
+        case "Quaternion":
+            return float(value.x), float(value.y), float(value.z), float(value.w)
+        case _:
+            return value

@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[2]
 PATIENCE = 200.0  # seconds; the first frame may have to wait for numba
 SIZE, REPEATS, SECONDS, RATE = (640, 480), 60, 60, 30.0
 DEPTH = 100  # messages that wait for a busy reader: three seconds of the camera
-NODE = ("-m", "labkit.apps.cli", "node", "--ros", "--engine", "onnxruntime", "--no-mirror")
+NODE = ("-m", "labkit.apps.cli", "node", "--ros", "--model", "unet", "--engine", "onnxruntime", "--no-crf")
 
 
 def main() -> str:

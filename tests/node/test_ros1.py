@@ -26,7 +26,7 @@ from labkit.node.wire import TYPES, Wire
 from labkit.sim.world import World
 
 pytestmark = pytest.mark.debian("python3-rospy", "python3-rosmaster")
-NODE = ("-m", "labkit.apps.cli", "node", "--ros1", "--model", "smallsegnet")
+NODE = ("-m", "labkit.apps.cli", "node", "--ros1", "--model", "smallsegnet", "--no-crf")
 MASTER = """
 import sys, time
 sys.path.append("/usr/lib/python3/dist-packages")

@@ -32,7 +32,7 @@ from labkit.sim.world import World
 if importlib.util.find_spec("rclpy") is None:
     pytest.skip("needs ROS 2: make test-ros2, or a sourced ROS 2", allow_module_level=True)
 
-NODE = ("-m", "labkit.apps.cli", "node", "--ros", "--model", "smallsegnet")
+NODE = ("-m", "labkit.apps.cli", "node", "--ros", "--model", "smallsegnet", "--no-crf")
 
 
 def published(transport, topic: str) -> bool:
