@@ -3,7 +3,8 @@
 A sourced ROS 2 has every package of messages; the wheels from PyPI lack tf2_msgs. rclpy asks a message class for its
 "type support": a C structure that says what the type is called, and how a C message becomes bytes. The kit sends and
 receives bytes, so the name and the checksum suffice, and the structure of any other type serves with these replaced.
-That works with Fast DDS, the middleware of the wheels.
+That works with Fast DDS of Kilted, the middleware of the wheels. Jazzy's Fast DDS asks for a description of the fields
+besides and refuses such a type: there tf2_msgs must be installed.
 """
 
 import ctypes

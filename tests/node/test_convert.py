@@ -108,10 +108,8 @@ def test_clouds_are_read_wherever_their_fields_stand():
     """A cloud as other drivers lay it out: organised, in doubles, big-endian, with other fields and padding."""
     rng = np.random.default_rng(2)
     P = rng.normal(size=(2, 3, 3))
-    kind = np.dtype({"names": ["y", "i", "z", "x"], "formats": [">f8", "u1", ">f8", ">f4"], "offsets": [2, 0, 16, 10]})
-    kind = np.dtype(
-        {"names": kind.names, "formats": [">f8", "u1", ">f8", ">f4"], "offsets": [1, 0, 9, 17], "itemsize": 24}
-    )
+    layout = {"names": ["y", "i", "z", "x"], "formats": [">f8", "u1", ">f8", ">f4"], "offsets": [1, 0, 9, 17]}
+    kind = np.dtype(layout | {"itemsize": 24})
     table = np.zeros((2, 3), kind)
     for axis, name in enumerate("xyz"):
         table[name] = P[..., axis]

@@ -223,6 +223,13 @@ def test_a_peer_that_cannot_be_talked_to_is_reported_in_words(peer, caplog):
         )
 
 
+def test_a_listener_that_asks_for_more_is_reported_in_words(peer):
+    """The node offers only the newest mask, and this process asks for every one."""
+    with Inside(quality={"outputs": "best_effort"}) as inside:
+        said = wait_for(lambda: inside.transport.troubles().get(ROS_TOPICS.mask), "the report")
+    assert "a listener asks for more than this node offers: reliability, here best_effort (see qos_outputs)" in said
+
+
 def test_every_frame_is_answered_or_superseded(peer, frame):
     """A camera faster than the node, with reliable inputs: of 200 frames none is lost, and the last one is answered."""
 
