@@ -47,7 +47,7 @@ def journeys(rate: int | float, network_ms: int | float, seconds: float = 0.6) -
     for k in range(round(seconds * rate)):
         arrived = k * period + TRANSPORT_MS
         begin = max(arrived, free)
-        if arrived + period <= begin:  # a newer one is there
+        if arrived + period <= begin + 1e-6:  # a newer one is there; one that comes just then counts, rounded or not
             found.append(Journey(arrived - TRANSPORT_MS, arrived))
         else:
             free = begin + network_ms

@@ -20,7 +20,9 @@ def simulate(rate, network_ms, seconds=0.6):
     return [k for k in answered if k < taken]
 
 
-@pytest.mark.parametrize("rate, network_ms", [(10, 20), (10, 150), (30, 90), (25, 40), (50, 7), (15, 290), (20, 50)])
+@pytest.mark.parametrize(
+    "rate, network_ms", [(10, 20), (10, 150), (30, 90), (25, 40), (50, 7), (15, 290), (20, 50), (15, 200)]
+)
 def test_the_newest_frame_is_taken_whenever_the_node_is_free(rate, network_ms):
     found = widgets.journeys(rate, network_ms)
     assert [k for k, journey in enumerate(found) if journey.end is not None] == simulate(rate, network_ms)
