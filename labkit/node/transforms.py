@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation, Slerp
 
-from labkit.geometry import invert_transform
 from labkit.node.convert import rigid
 from labkit.node.messages import NANOSECONDS, Transform
 
@@ -79,7 +78,7 @@ class TransformTree:
                 raise LookupError(f"no transform between {target!r} and {source!r}")
             T_common_target = self._chain(up_target[: up_target.index(common)], stamp)
             T_common_source = self._chain(up_source[: up_source.index(common)], stamp)
-        return invert_transform(T_common_target) @ T_common_source
+        return np.linalg.solve(T_common_target, T_common_source)  # inv(T_common_target) @ T_common_source
 
     def _ancestors(self, frame: str) -> list[str]:
         """A frame, its parent, and so on up to the root, or until a loop closes."""

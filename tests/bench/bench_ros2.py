@@ -2,9 +2,10 @@
 
 Added latency: from the camera's call to the mask's arrival in another process, less what the pipeline took of it. A
 bare relay is thirty lines of rclpy that take the same three messages and send a mask of the same size; frames go to
-relay and node in turn. Then the camera keeps its rate for a minute. Each frame that the node receives is answered or
-superseded by a newer one; with best effort some never arrive, and diagnostics say how many. Memory is flat if the last
-tenth of the minute finds the node's within 2 % of the second tenth's. Runs with the wheels of `make ros2`.
+relay and node in turn. On a machine that others use as well, the least times say more than the medians. Then the camera
+keeps its rate for a minute. Each frame that the node receives is answered or superseded by a newer one; with best
+effort some never arrive, and diagnostics say how many. Memory is flat if the last tenth of the minute finds the node's
+within 2 % of the second tenth's. Runs with the wheels of `make ros2`.
 """
 
 import importlib.util
@@ -129,14 +130,16 @@ def latency(frame) -> str:
                 perceived.append(float(kit.told[stamp]["of these in the pipeline"]))
                 relayed.append(first)
                 added.append(second - perceived[-1])
-    a, b = np.median(relayed), np.median(added)
+    ratios = np.median(added) / np.median(relayed), min(added) / min(relayed)
     rows = [
-        f"| in the pipeline, median ms | {np.median(perceived):.1f} |",
-        f"| bare relay, median ms | {a:.1f} |",
-        f"| added by node and network, median ms | {b:.1f} |",
-        f"| ratio (to reach: at most 1.3) | {b / a:.2f} |",
+        "| ROS 2 on loopback, 640x480, UNet once on onnxruntime | median ms | least ms |",
+        "|---|---|---|",
+        f"| in the pipeline | {np.median(perceived):.1f} | {min(perceived):.1f} |",
+        f"| bare relay | {np.median(relayed):.1f} | {min(relayed):.1f} |",
+        f"| added by node and network | {np.median(added):.1f} | {min(added):.1f} |",
+        f"| ratio (to reach: at most 1.3) | {ratios[0]:.2f} | {ratios[1]:.2f} |",
     ]
-    return "| ROS 2 on loopback, 640x480, UNet once on onnxruntime | |\n|---|---|\n" + "\n".join(rows)
+    return "\n".join(rows)
 
 
 def endurance(frame) -> str:
