@@ -4,11 +4,14 @@ import ast
 import json
 import re
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import conftest
 import pytest
+import yaml
+from packaging.specifiers import SpecifierSet
 
 from labkit.apps import cli
 
@@ -119,6 +122,20 @@ def test_what_every_system_has_is_no_use():
     assert not list(
         uses(ast.parse(lines + "path.read_text(encoding='utf-8')\npath.read_bytes()\nget_context('spawn')"))
     )
+
+
+def test_the_workflow_tries_each_python_on_each_system_and_ignores_files_that_exist():
+    (job,) = yaml.safe_load((ROOT / ".github/workflows/laptops.yml").read_text(encoding="utf-8"))["jobs"].values()
+    matrix = job["strategy"]["matrix"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    fitting = [f"3.{n}" for n in range(30) if SpecifierSet(project["requires-python"]).contains(f"3.{n}")]
+    assert matrix["python"] == fitting
+    systems = {name.split("-")[0] for name in (*matrix["os"], *(more["os"] for more in matrix["include"]))}
+    assert systems == {"ubuntu", "macos", "windows"}
+    lines = [step["run"] for step in job["steps"] if "run" in step]
+    assert all((ROOT / path).exists() for path in re.findall(r"--ignore=(\S+)", " ".join(lines)))
+    extras = set(re.search(r"\.\[(.*)\]", " ".join(lines))[1].split(","))
+    assert extras == project["optional-dependencies"].keys() - {"bench"}
 
 
 def test_grading_elsewhere_says_in_one_line_that_it_needs_linux(monkeypatch, capsys):

@@ -152,6 +152,23 @@ def test_every_import_of_the_kit_is_required():
         assert not missing, f"{name} imports {missing}"
 
 
+def test_a_wheel_has_every_file_of_the_packages_and_runs_without_a_checkout(tmp_path):
+    """Built from what git knows, and installed into a folder of its own: weights and settings are there, too."""
+    packaged = {path.relative_to(ROOT) for path in tracked("labkit", "data_gen")}
+    for name in {*packaged, Path("pyproject.toml"), Path("README.md"), Path("LICENSE")}:
+        (tmp_path / "source" / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / "source" / name)
+    pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-compile"]
+    subprocess.run([*pip, "--target", tmp_path / "site", tmp_path / "source"], check=True, capture_output=True)
+    shutil.rmtree(tmp_path / "source")
+    roots = (tmp_path / "site" / name for name in ("labkit", "data_gen"))
+    assert {path.relative_to(tmp_path / "site") for root in roots for path in root.rglob("*.*")} == packaged
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
+    command = [sys.executable, "-m", "labkit.apps.cli", "doctor"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0 and "no constraints.txt beside the package" in done.stdout, done.stdout + done.stderr
+
+
 # ------------------------------------------------------------------------------------------------ make
 
 
