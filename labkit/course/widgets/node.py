@@ -73,7 +73,7 @@ def lag_explorer() -> Explorer:
         draw_grasp(above, speed * age / 1000.0)
 
     controls = {
-        "network": ipywidgets.IntSlider(90, min=5, max=300, step=5, description="network (ms)"),
+        "network": ipywidgets.IntSlider(200, min=5, max=300, step=5, description="network (ms)"),
         "rate": ipywidgets.IntSlider(15, min=5, max=60, description="rate (Hz)"),
         "speed": ipywidgets.IntSlider(100, min=0, max=300, step=10, description="belt (mm/s)"),
     }
