@@ -1,30 +1,34 @@
 """How many wrong answers that nobody wrote down get a sentence that is true of them and of few others, by lab.
 
-    python tests/measure_diagnosis.py [--sample N] [--held-out] [--unnamed] [TOPIC ...]
+    python tests/measure_diagnosis.py [--sample N] [--held-out] [--unnamed] [--survivors SECONDS] [TOPIC ...]
 
 Wrong answers are the mutants of references and alternatives (`mutants`); those of the same outputs count once.
 One is named by a sentence that is true of it and false for nine tenths of the question's others; where it is wrong does
 not count alone. "strictly" leaves out slips, which know the operators that are not held out, and properties; "at once"
-counts only the sentence that is said first.
+counts only the sentence that is said first. --survivors lists the mutants that are not refused, and on how many inputs
+each was compared with the reference: 10,000, random ones and such with ties and zeros, or fewer if time is up.
 """
 
 import argparse
 import random
 import sys
+import time
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from alternatives import alternatives
 from mutants import mutants
 
-from labkit.course.questions.comparison import Problem, compare, expected_cases, parts
+from labkit.course.questions.comparison import Problem, compare, expected_cases, parts, trusted
 from labkit.course.questions.diagnosis import Sentence, sentences
 from labkit.course.questions.question import TOPICS, Question, of_topic
 from labkit.course.questions.run import run
 
+SEEDS = (0, 1, 20_260_101)  # an answer that passes these is not refused
+INPUTS = 10_000
 SHARE = 0.1  # of the other mutants that a sentence may be true of
 
 
@@ -98,6 +102,42 @@ def measure(question: Question, held_out: bool | None = None, sample: int | None
     return result
 
 
+def survivors(question: Question, seconds: float) -> Iterator[str]:
+    """Each mutant that is not refused, and where it differs from the reference, or that it does not."""
+    cases = [case for seed in SEEDS for case in expected_cases(question, seed)]
+    right = [question.reference, *(a for a in alternatives(question) if "torch" not in a.__name__)]
+    for function in right:
+        for mutant in mutants(function):
+            outputs, _ = run(mutant.function, [case.args for case in cases], 1.0)
+            if not any(compare(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)):
+                found = searched(question, mutant.function, seconds)
+                yield f"{question.name}: {function.__name__}, {mutant.name}: {found}"
+
+
+def searched(question: Question, function: Callable, seconds: float) -> str:
+    """Compare a function with the reference on INPUTS inputs, or for some seconds of processor time."""
+    rng, end = np.random.default_rng(1), time.process_time() + seconds
+    for number in range(INPUTS):
+        args = question.inputs(rng)
+        args = args if number % 2 else tuple(spoilt(value, rng) for value in args)
+        try:
+            expected = trusted(question.reference, args)
+        except Exception:  # the task does not allow such arguments
+            continue
+        if (got := run(function, [args], 1.0)[0][0]) is not None and compare(question, expected, got):
+            return f"differs on input {number}{' (with ties and zeros)' if number % 2 == 0 else ''}"
+        if time.process_time() > end:
+            return f"equal on {number + 1} inputs, then time was up"
+    return f"equal on {INPUTS} inputs"
+
+
+def spoilt(value: object, rng: np.random.Generator) -> object:
+    """An array of numbers with ties, or with zeros; not a matrix, which may not stay what it is."""
+    if not isinstance(value, np.ndarray) or value.dtype.kind != "f" or value.shape in ((3, 3), (4, 4)):
+        return value
+    return np.round(value, 1) if rng.random() < 0.5 else np.where(rng.random(value.shape) < 0.1, 0, value)
+
+
 def first(found: Sequence[Sentence]) -> str:
     """What is said first."""
     return found[0].says if found else "nothing is said"
@@ -110,14 +150,21 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--sample", type=int, help="wrong answers to each question; all if not given")
     parser.add_argument("--held-out", action="store_true", help="only of the operators that slips do not know")
     parser.add_argument("--unnamed", action="store_true", help="list those that are not named")
+    parser.add_argument("--survivors", type=float, metavar="SECONDS", help="list those that are not refused, instead")
     given = parser.parse_args(arguments)
     total = Named()
     for topic in given.topics:
         questions = of_topic(topic).values()
+        if given.survivors:
+            for question in questions:
+                for found in survivors(question, given.survivors):
+                    print(found, flush=True)
+            continue
         found = sum((measure(q, True if given.held_out else None, given.sample) for q in questions), Named())
         print(f"{topic}: {found}", *(found.unnamed if given.unnamed else ()), sep="\n  ", flush=True)
         total += found
-    print(f"all: {total}")
+    if not given.survivors:
+        print(f"all: {total}")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,8 @@ def always_the_same(view: View) -> str:
     if view.same(e, np.full(e.shape, e[0])) and not np.isnan(e[0]):
         return ""  # then it is an offset
     first = next(a.flat[0] for a in view.got if a.size)
-    return f"Yours is always {first if first.dtype.kind == 'b' else f'{first:.4g}'}, whatever the arguments are."
+    said = first if first.dtype.kind == "b" else f"{0 if abs(first) < 1e-7 else first:.4g}"
+    return f"Yours is always {said}, whatever the arguments are."
 
 
 @relation(NUMBERS)
@@ -35,7 +36,7 @@ def values_taken_for_others(view: View) -> str:
     if not e.size:
         return ""
     values = np.unique(e)
-    if values.size > 8:
+    if values.size > 8 or e.size < 3 * values.size or np.isin([*values, *g], (0, 1)).all():  # too few to see a rule
         return ""
     taken = {}
     for value in values:

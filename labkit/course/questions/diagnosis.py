@@ -17,7 +17,7 @@ from labkit.course.questions import forms, made_of  # noqa: F401  they enter the
 from labkit.course.questions.by_number import DIRECTIONS, NUMBERS
 from labkit.course.questions.comparison import Case, Problem, alike, parts, trusted
 from labkit.course.questions.errors import explain
-from labkit.course.questions.inputs import ARRAYS, changes
+from labkit.course.questions.inputs import changes
 from labkit.course.questions.places import places
 from labkit.course.questions.question import Misconception, Property, Question
 from labkit.course.questions.relations import ARRANGED, COMBINED, LOOSE, Relation, View, attempt
@@ -58,7 +58,7 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
             yield Sentence("input", says)
     for name, view in views:
         yield from local(name, view)
-    for says, function in changed_steps(question.reference, ARRAYS):
+    for says, function in changed_steps(question.reference):
         if tried.explains(function):
             yield Sentence("step", says)
     for slip in slips_of(question.reference):
@@ -163,10 +163,11 @@ def directed(name: str, view: View) -> Iterator[Sentence]:
 
 
 def wherever_wrong(view: View) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """The places that are wrong, if there are several and some are right."""
+    """The places that are wrong, if there are several, some are right, and there is more to say than no for yes."""
     wrong = view.wrong() if view.shaped else []
     count = sum(int(w.sum()) for w in wrong)
-    if 2 < count < sum(w.size for w in wrong):
+    truths = all(np.isin(a, (0, 1)).all() for a in (*view.expected, *view.got))
+    if 2 < count < sum(w.size for w in wrong) and not truths:
         yield "in some numbers", wrong
 
 
