@@ -29,14 +29,7 @@ LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should lo
 ONLY_HIDDEN = (
     "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
 )
-NAMES_THE_MISTAKE = (
-    "misconception",
-    "exception",
-    "relation",
-    "input",
-    "step",
-    "slip",
-)  # kinds of hints; others say where
+NAMES_THE_MISTAKE = ("misconception", "exception", "relation", "input", "step", "slip")  # kinds of hints
 WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 
 
@@ -44,6 +37,7 @@ WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 class Result:
     """What a question earned. says: what was right or wrong, and hint: why it may be so, from public cases.
 
+    shown: a wrong public case, with what came and what was expected.
     flag: what the instructor should look at, "" if nothing. behaviour: of wrong answers whose hint does not name the
     mistake, the same for those that give the same outputs. program: what was run.
     """
@@ -56,6 +50,7 @@ class Result:
     flag: str = ""
     behaviour: str = ""
     program: str = ""
+    shown: str = ""
 
 
 def grade_submission(
@@ -130,8 +125,11 @@ class Grading:
         if problem.kind in ("unanswered", "missing"):
             return replace(base, says=problem.says, behaviour="")
         says = f"{problem.says} ({public.where})"
+        shown = "\n".join(public.shown)
         named = public.sentence is not None and public.sentence.kind in NAMES_THE_MISTAKE
-        return replace(base, says=says, hint=public.hint or "", behaviour="" if named else behaviour_of(outputs))
+        return replace(
+            base, says=says, hint=public.hint or "", shown=shown, behaviour="" if named else behaviour_of(outputs)
+        )
 
 
 def not_gradable(lab: Lab, name: str, problem: str) -> Result:

@@ -110,7 +110,7 @@ def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
     said = result.says[:1].upper() + result.says[1:] + "."
     hint = [f"Hint: {result.hint}"] if result.hint else []
     comment = comments.get(group_of(result), "")
-    return [said, *hint, *([f"Comment: {comment}"] if comment else [])]
+    return [said, *result.shown.splitlines(), *hint, *([f"Comment: {comment}"] if comment else [])]
 
 
 def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:

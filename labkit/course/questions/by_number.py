@@ -24,7 +24,7 @@ def always_the_same(view: View) -> str:
         return ""  # then it is an offset
     first = next(a.flat[0] for a in view.got if a.size)
     said = first if first.dtype.kind == "b" else f"{0 if abs(first) < 1e-7 else first:.4g}"
-    return f"Yours is always {said}, whatever the arguments are."
+    return f"Yours is always {said}, in all cases."
 
 
 @relation(NUMBERS)
@@ -78,6 +78,8 @@ FUNCTIONS = {
 @relation(NUMBERS)
 def function_of_the_right_value(view: View) -> str:
     """A function of the right value, one of FUNCTIONS."""
+    if view.shaped and np.unique(view.numbers()[0]).size < 2:  # one number: any function of it would do
+        return ""
     return next((says for says, function in FUNCTIONS.items() if view.gives(function)), "")
 
 
@@ -114,6 +116,8 @@ def factor(view: View) -> str:
         return ""
     if np.allclose(told, told[0], rtol=max(1e-4, view.rtol), atol=0.0):
         k = told[0]
+        if np.isclose(k, -1.0):
+            return "The sign is the other one."
         sign = " and the sign is the other one" if k < 0 else ""
         for value, name in CONSTANTS.items():
             for size, words in ((value, "large"), (1.0 / value, "small")):
@@ -221,7 +225,7 @@ def straight_line(view: View) -> str:
     return f"Each of yours is {k:.4g} times the right value {'plus' if c > 0 else 'minus'} {abs(c):.4g}."
 
 
-@relation(DIRECTIONS)
+@relation(LOOSE)
 def no_number(view: View) -> str:
     """All that is wrong is NaN, or infinite."""
     _, g, wrong = wrong_numbers(view)

@@ -29,9 +29,11 @@ MOST_TRIES = 1500  # functions that are tried for one answer: a number, so that 
 
 @dataclass(frozen=True)
 class Sentence:
-    """Something true of a wrong answer. kind: "misconception", "exception", "relation", "input",
+    """Something true of a wrong answer.
 
-    "property", "slip" or "place"."""
+    kind: "misconception", "exception", "relation", "input", "step" or "slip" name a mistake; "loose", "property" and
+    "place" are true of more mistakes than one.
+    """
 
     kind: str
     says: str
@@ -65,12 +67,12 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
         if tried.explains(lambda args, slip=slip: slip.function(*args)):
             yield Sentence("slip", str(slip))
     for name, view in views:
-        yield from related(name, view, LOOSE)
+        yield from related(name, view, LOOSE, "loose")
     yield from broken_properties(question, cases, outputs)
     for name, view in views:
         yield from directed(name, view)
     for name, view in views:
-        yield from (Sentence("place", f"{name}It is wrong only {where}.") for where, _ in places(view))
+        yield from (Sentence("place", f"{name}It is wrong only {where}.") for where in narrow_places(view))
 
 
 # ------------------------------------------------------------------------------------------ misconceptions
@@ -115,8 +117,9 @@ def explained(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     failed = tuple(np.array(float(r)) for r in raised)
     args = tuple(case.args for case in cases)
     view = View(tuple(np.array(0.0) for _ in cases), failed, args, question.parameters, 0.0, 0.0)
-    where = next((where for where, _ in places(view) if where.startswith("in cases")), "") if says else ""
-    if where:
+    several = 1 < sum(raised) < len(raised) - 1  # else it may be an accident
+    where = next((where for where, _ in places(view) if where.startswith("in cases")), "")
+    if says and where and (several or "is 255" in where):
         yield Sentence("exception", f"{says} It fails only {where}.")
     if says:
         yield Sentence("exception", says)
@@ -142,11 +145,11 @@ def views_of(question: Question, cases: Sequence[Case], outputs: Sequence[object
             yield f"Output {k + 1} of {count}: " if count > 1 else "", view
 
 
-def related(name: str, view: View, relations: Sequence[Relation]) -> Iterator[Sentence]:
+def related(name: str, view: View, relations: Sequence[Relation], kind: str = "relation") -> Iterator[Sentence]:
     """Those of some relations that hold everywhere."""
     for relation in relations:
         if said := relation(view):
-            yield Sentence("relation", name + said)
+            yield Sentence(kind, name + said)
 
 
 def local(name: str, view: View) -> Iterator[Sentence]:
@@ -157,9 +160,15 @@ def local(name: str, view: View) -> Iterator[Sentence]:
 
 
 def directed(name: str, view: View) -> Iterator[Sentence]:
-    """How it is wrong at the narrowest place outside of which all is right, or wherever it is wrong."""
-    where = next((f"It is wrong only {where}. " for where, _ in places(view)), "")
-    yield from related(name + where, view, DIRECTIONS)
+    """How it is wrong, at the narrowest place outside of which all is right, or wherever it is wrong."""
+    where = next((f"It is wrong only {where}. " for where in narrow_places(view)), "")
+    yield from related(name + where, view, DIRECTIONS, "place")
+
+
+def narrow_places(view: View) -> Iterator[str]:
+    """Places outside of which all is right, that are less than half of everything."""
+    half = sum(e.size for e in view.expected) / 2
+    return (where for where, masks in places(view) if sum(int(m.sum()) for m in masks) <= half)
 
 
 def wherever_wrong(view: View) -> Iterator[tuple[str, list[np.ndarray]]]:
@@ -230,8 +239,13 @@ class Tried:
             new = attempted(function, case.args)
             if not alike(self.question, case.expected if new is None else new, got):
                 return False
-            shown += new is not None and not alike(self.question, new, case.expected)
+            shown += new is not None and not alike(self.question, new, case.expected) and not all_nan(got)
         return shown > 0
+
+
+def all_nan(output: object) -> bool:
+    """Whether an output is NaN throughout, as many mistakes make it."""
+    return all(np.isnan(np.asarray(part, float)).all() for part in parts(output))
 
 
 def with_outputs(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[tuple[Case, object]]:
@@ -251,12 +265,17 @@ def attempted(function: Callable, args: tuple) -> object | None:
 
 def broken_properties(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
     """The properties of right answers that a wrong one does not have."""
-    pairs = [(case, got) for case, got in with_outputs(question, cases, outputs)]
+    pairs = [(c, got) for c, got in with_outputs(question, cases, outputs) if finite(got) or not finite(c.expected)]
     for prop in question.properties:
         for case, got in pairs:
             if not fulfilled(prop, case, got):
                 yield Sentence("property", f"It should hold, but does not: {prop.says}.")
                 break
+
+
+def finite(output: object) -> bool:
+    """Whether no number of an output is NaN or infinite."""
+    return all(np.isfinite(part).all() for part in parts(output))
 
 
 def fulfilled(prop: Property, case: Case, got: object) -> bool:

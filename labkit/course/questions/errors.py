@@ -122,7 +122,8 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
     if found[1] == "NoneType":
         return "Something is None there: a function without `return`, or one that works in place, gives None."
     near = difflib.get_close_matches(found[2], dir(np.ndarray), 1, 0.6) if found[1] == "ndarray" else []
-    return f"An {found[1]} has no {found[2]}" + (
+    article = "An" if found[1][0].lower() in "aeio" else "A"
+    return f"{article} {found[1]} has no {found[2]}" + (
         f": do you mean .{near[0]}?" if near else ": is it what you think it is?"
     )
 
@@ -161,7 +162,7 @@ TABLE = {
         "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
     ),
     r"ValueError: cannot reshape array of size (\d+) into shape \(([\d,-]*)": (
-        "{1} numbers do not fill the shape ({2}): is there padding that does not belong to it?"
+        "{1} numbers do not fill the shape ({2}): is a part of it longer than you think, padding perhaps?"
     ),
     r"ValueError: The truth value of an array|ValueError: The truth value of a": (
         "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: use np.where, &, | or np.minimum."

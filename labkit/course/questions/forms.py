@@ -28,6 +28,13 @@ def reduced(view: View) -> str:
     """A sum, mean or largest of the right values; or the right values are such of yours."""
     if view.shaped:
         return ""
+    for axis in range(max(g.ndim for g in view.got)):
+        once = [np.take(g, 0, axis) if axis < g.ndim and g.shape[axis] else g for g in view.got]
+        pairs = list(zip(view.got, once, view.expected, strict=True))
+        if all(
+            view.same(o, e) and view.same(np.broadcast_to(np.expand_dims(o, axis), g.shape), g) for g, o, e in pairs
+        ):
+            return f"Yours holds the right values again and again along axis {axis}: is that axis to be there?"
     turned = View(view.got, view.expected, view.args, view.names, view.rtol, view.atol)
     for words, function in REDUCED.items():
         for axis in (None, *range(max(e.ndim for e in (*view.expected, *view.got)))):
@@ -77,7 +84,7 @@ def another_length(view: View) -> str:
             continue
         names = [name for name, values in quantities(view) if values == came]
         if not names and len(set(came)) == 1 and len(came) > 1:
-            return f"Along axis {axis} your output always has length {came[0]:.0f}, whatever the arguments are."
+            return f"Along axis {axis} your output always has length {came[0]:.0f}."
         return f"Along axis {axis} your output is as long as {names[0]}, which is wrong there." if names else ""
     return ""
 

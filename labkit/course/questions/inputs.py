@@ -3,6 +3,7 @@
 If the reference with its argument lam set to 0 gives the student's outputs in every case, the student forgot lam.
 """
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -88,9 +89,7 @@ ARRAYS: dict[str, Callable] = {
     "held each of its rows once": lambda x: np.unique(x, axis=0) if x.ndim else None,
     "held 0 where it holds 255": integers(lambda x: np.where(x == 255, 0, x).astype(x.dtype)),
     "held 0 where it holds NaN": floats(np.nan_to_num),
-    "were cast to bytes, which wrap round": lambda x: (
-        None if x.dtype.kind == "b" else x.astype(np.int64).astype(np.uint8)
-    ),
+    "were cast to bytes, which wrap round": integers(lambda x: x.astype(np.uint8)),
     "were cast to whole numbers": floats(np.trunc),
     "were rounded": floats(np.round),
 }
@@ -135,6 +134,10 @@ def changes(question: Question, args: tuple) -> Iterator[tuple[str, Change]]:
         for says, change in ARRAYS.items():
             if says.startswith(("were without its", "were upside", "were mirrored", "were transposed", "were its")):
                 yield f"Your output is right as if {who} {says.replace(' its ', ' their ')}.", at_all(alike, change)
+    numbers = [i for i, value in enumerate(args) if isinstance(value, float)]
+    for i, j in itertools.combinations(numbers if len(numbers) <= 4 else (), 2):
+        for says, change in NUMBERS.items():
+            yield f"Your output is right as if {names[i]} and {names[j]} {says}.", at_all([i, j], change)
     for i in range(len(args)):
         for j in range(i):
             yield f"Your output is right as if the arguments {names[j]} and {names[i]} were exchanged.", swap(i, j)

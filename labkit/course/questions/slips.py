@@ -266,7 +266,8 @@ def constant(node: ast.Constant) -> Iterator[tuple[str, ast.AST]]:
     elif isinstance(value, float):
         for other in (2.0 * value, 0.5 * value):
             yield "a number were doubled or halved", but(node, value=other)
-        yield "a number had the other sign", but(node, value=-value if value else 1.0)
+        if value:
+            yield "a number had the other sign", but(node, value=-value)
         for other in (value + 1.0, value - 1.0):
             yield "a number were one off", but(node, value=other)
 

@@ -25,13 +25,12 @@ KINDS = {
     ast.Subscript: "the entry or part",
 }
 LOOPS = (ast.For, ast.While, ast.ListComp, ast.GeneratorExp, ast.SetComp, ast.DictComp, ast.Lambda)
-STRANGE = {  # of an argument that is only compared, such changes explain by accident
-    "were squared",
-    "were its roots",
-    "were 1 over what it is",
-    "were 1 minus what it is",
-    "were its logarithms",
-    "were its exponentials",
+STRANGE = ("were 1 over what it is", "were 1 minus what it is")  # of what is only compared, these explain by accident
+UNDONE = {  # of a function's result: that it was not taken
+    "were squared": "sqrt",
+    "were its roots": "square",
+    "were its logarithms": "exp",
+    "were its exponentials": "log",
 }
 Steps = list[tuple[str, list[np.ndarray | None]]]
 
@@ -60,7 +59,11 @@ def changed_steps(reference: Callable) -> Iterator[tuple[str, Callable]]:
         return
     for number, (step, _) in enumerate(words):
         for says, change in ARRAYS.items():
-            if "one of the places" in step and says in STRANGE:
+            if says in UNDONE:
+                if f"the result of {UNDONE[says]}," not in step:
+                    continue
+                says = "were not taken"
+            if says in STRANGE and "one of the places" in step:
                 continue
             yield (
                 f"Your output is right as if {step} {says}.",

@@ -28,35 +28,11 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def ignored_as_class(number):
-    """Make the answer that gives pixels without a class this number."""
-
-    def answer(Y):
-        return np.where(Y.any(axis=-1), Y.argmax(axis=-1), number)
-
-    return answer
-
-
 @wrong(QUESTION, "Over which axis of (H, W, C) is there exactly one 1?")
 def along_the_columns(Y):
     return np.where(Y.any(axis=1), Y.argmax(axis=1), 255)
 
 
-@wrong(QUESTION, "Which number has the first plane?")
-def numbered_from_one(Y):
-    return np.where(Y.any(axis=-1), Y.argmax(axis=-1) + 1, 255)
-
-
 @wrong(QUESTION, "You look for the smallest entry: where is the 1?")
 def first_zero(Y):
     return np.where(Y.any(axis=-1), Y.argmin(axis=-1), 255)
-
-
-@wrong(QUESTION, "argmax of a row of zeros is 0: how do you tell such a pixel from background?")
-def ignored_becomes_0(Y):
-    return ignored_as_class(0)(Y)
-
-
-@wrong(QUESTION, "Pixels without a class are 255 here; -1 is no uint8.")
-def ignored_becomes_1(Y):
-    return ignored_as_class(-1)(Y)

@@ -80,14 +80,3 @@ def link_for_body(segmentation, class_of_body):
 def body_for_class(segmentation, class_of_body):
     body, seen = numbers_and_seen(segmentation)
     return np.where(seen, body, 0)
-
-
-@wrong(QUESTION, "Bodies are counted from 0: which class has body 0 in your answer?")
-def one_body_further(segmentation, class_of_body):
-    body, seen = numbers_and_seen(segmentation)
-    return np.where(seen, class_of_body[np.where(seen, body, 0) - 1], 0)
-
-
-@wrong(QUESTION, "255 means that nobody judged a pixel; here the renderer is sure that nothing is there: background.")
-def nothing_is_ignored(segmentation, class_of_body):
-    return np.where(segmentation >= 0, labels_from_segmentation(segmentation, class_of_body), 255)

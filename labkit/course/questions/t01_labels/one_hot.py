@@ -31,24 +31,9 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "A pixel that is ignored has no class, not even 0: what should its C entries be?")
-def ignored_as_background(y, C):
-    return np.eye(C, dtype=np.uint8)[np.where(y == 255, 0, y)]
-
-
 @wrong(QUESTION, "255 was pressed into the range of classes: what should the C entries of such a pixel be?")
 def ignored_as_last_class(y, C):
     return np.eye(C, dtype=np.uint8)[np.minimum(y, C - 1)]
-
-
-@wrong(QUESTION, "A pixel that is ignored belongs to no class rather than to all: it must add nothing to any sum.")
-def ignored_as_every_class(y, C):
-    return one_hot(y, C) | (y == 255)[..., None].astype(np.uint8)
-
-
-@wrong(QUESTION, "In which plane do you find class 0?")
-def counted_from_one(y, C):
-    return (y[..., None] == np.arange(1, C + 1)).astype(np.uint8)
 
 
 @wrong(QUESTION, "A class that is not in this image has a plane too, of zeros: there are always C of them.")

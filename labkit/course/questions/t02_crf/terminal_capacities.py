@@ -49,32 +49,7 @@ def source_and_sink_exchanged(psi):
     return terminals(psi[..., 0] - lowest, psi[..., 1] - lowest, lowest.sum())
 
 
-def with_constant(constant):
-    """Right capacities, and a constant that is made of the pixels' least costs."""
-
-    def answer(psi):
-        lowest = psi.min(axis=2)
-        return terminals(psi[..., 1] - lowest, psi[..., 0] - lowest, constant(lowest))
-
-    return answer
-
-
 @wrong(QUESTION, "Subtract the minimum pixel by pixel, so that one of each pixel's two arcs vanishes.")
 def one_minimum_for_all(psi):
     """Right as a cut, but both arcs of a pixel stay."""
     return terminals(psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size)
-
-
-@wrong(QUESTION, "What a pixel pays in any case can be taken off both of its arcs, and must be kept in the constant.")
-def nothing_subtracted(psi):
-    return terminals(psi[..., 1], psi[..., 0], 0.0)
-
-
-@wrong(QUESTION, "The cut's value is the energy less what you subtracted: how much is that over all pixels?")
-def the_constant_forgotten(psi):
-    return with_constant(lambda lowest: 0.0)(psi)
-
-
-@wrong(QUESTION, "Energy = cut + constant: what must be added to the cut's value to have the energy back?")
-def the_constant_of_the_wrong_sign(psi):
-    return with_constant(lambda lowest: -lowest.sum())(psi)

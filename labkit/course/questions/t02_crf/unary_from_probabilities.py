@@ -44,25 +44,6 @@ def softmaxed_again(p, floor):
     return -np.log(np.maximum(e / e.sum(axis=-1, keepdims=True), floor))
 
 
-@wrong(
-    QUESTION, "An energy is small where a label is likely: without any pairwise term, which class would yours choose?"
-)
-def a_score_taken_for_a_cost(p, floor):
-    return np.log(np.maximum(p, floor))
-
-
-@wrong(QUESTION, "exp(-psi) should give the probability back: is its sum over the classes one at each pixel?")
-def the_negative_probability(p, floor):
-    return -np.maximum(p, floor)
-
-
-@wrong(
-    QUESTION, "What should a class of probability 0.001 cost, and one of 0.0001? In yours the two are nearly the same."
-)
-def one_minus_the_probability(p, floor):
-    return 1.0 - np.maximum(p, floor)
-
-
 @wrong(QUESTION, "Only probabilities below the floor are to change: look at a pixel where one class has probability 1.")
 def the_floor_added(p, floor):
     return -np.log(p + floor)

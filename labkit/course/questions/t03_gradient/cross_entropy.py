@@ -40,11 +40,6 @@ def true_log_probabilities(z, y):
     return log_p[np.arange(len(y)), y]
 
 
-@wrong(QUESTION, "A logarithm of a probability is below 0; a loss is above.")
-def cross_entropy_sign(z, y):
-    return float(true_log_probabilities(z, y).sum())
-
-
 @wrong(QUESTION, "log(p + epsilon) can never exceed 16 or so, however wrong the pixel: write log p without p.")
 def cross_entropy_epsilon(z, y):
     p = np.exp(true_log_probabilities(z, y))
@@ -60,11 +55,6 @@ def cross_entropy_softmax_twice(z, y):
 def cross_entropy_without_softmax(z, y):
     counted = y != 255
     return -float(np.take_along_axis(z[counted], y[counted][:, None], -1).sum())
-
-
-@wrong(QUESTION, "255 is no class: such a pixel adds nothing.")
-def cross_entropy_counts_ignored(z, y):
-    return cross_entropy(z, np.where(y == 255, 0, y))
 
 
 @wrong(QUESTION, "The loss is minus the logarithm, not one minus p.")

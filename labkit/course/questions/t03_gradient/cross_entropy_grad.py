@@ -42,16 +42,6 @@ def one_hot(z, y):
     return (y[..., None] == np.arange(z.shape[-1])).astype(float)
 
 
-@wrong(QUESTION, "Each pixel's gradient sums to zero; what does yours sum to?")
-def grad_without_one_hot(z, y):
-    return softmax(z) * (y != 255)[..., None]
-
-
-@wrong(QUESTION, "Descent goes against the gradient: must the true logit's derivative be negative?")
-def grad_sign(z, y):
-    return -cross_entropy_grad(z, y)
-
-
 @wrong(QUESTION, "A pixel that adds no loss has no gradient: look at 255.")
 def grad_counts_ignored(z, y):
     return softmax(z) - one_hot(z, y)
@@ -60,11 +50,6 @@ def grad_counts_ignored(z, y):
 @wrong(QUESTION, "Normalise over the classes, the last axis.")
 def grad_over_pixels(z, y):
     return (softmax_over_pixels(z) - one_hot(z, y)) * (y != 255)[..., None]
-
-
-@wrong(QUESTION, "The other logits raise the loss too: there are two cases, and c != y is not zero.")
-def grad_true_class_only(z, y):
-    return cross_entropy_grad(z, y) * one_hot(z, y)
 
 
 @wrong(QUESTION, "Compare probabilities with the one-hot, not logits.")

@@ -39,11 +39,6 @@ def log_sum_exp_that_overflows(z):
     return np.log(np.exp(z).sum(axis=-1))
 
 
-@wrong(QUESTION, "What you take off inside the logarithm has to come back outside it.")
-def log_sum_exp_without_the_largest(z):
-    return np.log(np.exp(z - z.max(axis=-1, keepdims=True)).sum(axis=-1))
-
-
 @wrong(QUESTION, "An epsilon changes the answer where all is small; a shift is exact.")
 def log_sum_exp_with_epsilon(z):
     return np.log(np.exp(z).sum(axis=-1) + 1e-8)
@@ -54,11 +49,6 @@ def log_sum_exp_over_pixels(z):
     axis = -2 if z.ndim > 1 else -1
     largest = z.max(axis=axis, keepdims=True)
     return (largest + np.log(np.exp(z - largest).sum(axis=axis, keepdims=True))).squeeze(axis)
-
-
-@wrong(QUESTION, "The largest logit is where it starts; the others add to it.")
-def largest_logit(z):
-    return z.max(axis=-1)
 
 
 @wrong(QUESTION, "A sum, not a mean: you are off by log C.")

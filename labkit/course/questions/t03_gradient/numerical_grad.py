@@ -50,24 +50,9 @@ def backward_difference(z, y, h):
     return np.array([(pixel_loss(z, y) - pixel_loss(z - step, y)) / h for step in h * np.eye(len(z))])
 
 
-@wrong(QUESTION, "How far apart are the two points that you compare?")
-def difference_over_h(z, y, h):
-    return 2.0 * numerical_grad(z, y, h)
-
-
-@wrong(QUESTION, "A difference becomes a slope when it is divided.")
-def difference_not_divided(z, y, h):
-    return 2.0 * h * numerical_grad(z, y, h)
-
-
 @wrong(QUESTION, "A check must not use what it checks: only values of the loss, at two points h away.")
 def formula_instead_of_differences(z, y, h):
     return softmax(z) - (np.arange(len(z)) == y)
-
-
-@wrong(QUESTION, "Move one logit at a time; all together change nothing.")
-def all_logits_at_once(z, y, h):
-    return np.full(len(z), (pixel_loss(z + h, y) - pixel_loss(z - h, y)) / (2 * h))
 
 
 @wrong(QUESTION, "Put the logit back before you move the next one.")

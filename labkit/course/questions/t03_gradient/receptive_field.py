@@ -36,21 +36,6 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "After a stride of 2, one step is two pixels.")
-def field_without_strides(kernels, strides):
-    return 1 + int(sum(kernel - 1 for kernel in kernels))
-
-
-@wrong(QUESTION, "Two 3x3 layers see 5 pixels, not 6: neighbours overlap.")
-def field_sum_of_kernels(kernels, strides):
-    return int(sum(kernels))
-
-
-@wrong(QUESTION, "Two 3x3 layers see 5 pixels, not 9: neighbours overlap.")
-def field_product(kernels, strides):
-    return int(np.prod(kernels))
-
-
 @wrong(QUESTION, "A layer's own stride widens the steps of those after it.")
 def field_stride_too_early(kernels, strides):
     size, jump = 1, 1
@@ -71,12 +56,3 @@ def field_last_stride_only(kernels, strides):
 @wrong(QUESTION, "The whole width is asked for, the pixel itself and both sides.")
 def field_radius(kernels, strides):
     return (receptive_field(kernels, strides) - 1) // 2
-
-
-@wrong(QUESTION, "A kernel of 1 sees no more than was seen before.")
-def field_whole_kernels(kernels, strides):
-    size, jump = 1, 1
-    for kernel, stride in zip(kernels, strides, strict=True):
-        size += int(kernel) * jump
-        jump *= int(stride)
-    return size

@@ -59,13 +59,6 @@ def pair_count(rows, columns, num_classes):
     return np.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, num_classes)
 
 
-@wrong(QUESTION, "No entry exceeds 1: with repeated indices, n[i, j] += 1 writes once. What adds up repeated indices?")
-def each_pair_once(y_true, y_pred, num_classes, ignore):
-    n = np.zeros((num_classes, num_classes), np.int64)
-    n[counted_pairs(y_true, y_pred, ignore)] += 1
-    return n
-
-
 @wrong(QUESTION, "Row 0 is too full: what became of the pixels whose true label is `ignore`?")
 def ignored_as_class_0(y_true, y_pred, num_classes, ignore):
     rows = np.where(y_true == ignore, 0, y_true).astype(int)

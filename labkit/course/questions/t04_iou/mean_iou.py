@@ -84,11 +84,6 @@ def weighted_by_frequency(n_frames):
     return np.nansum(iou_of(n) * n.sum(axis=1)) / n.sum()
 
 
-@wrong(QUESTION, "A class that no frame holds or predicts pulls your mean down: over how many classes do you average?")
-def absent_is_0(n_frames):
-    return np.nan_to_num(iou_of(n_frames.sum(axis=0))).mean()
-
-
 @wrong(QUESTION, "A class that no frame holds or predicts lifts your mean: over how many classes do you average?")
 def absent_is_1(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=1.0).mean()

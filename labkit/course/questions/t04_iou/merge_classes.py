@@ -53,8 +53,3 @@ def written_once(n, group):
 def mistakes_within_a_group_dropped(n, group):
     mistake = (group[:, None] == group) & ~np.eye(len(n), dtype=bool)
     return merge_classes(np.where(mistake, 0, n), group)
-
-
-@wrong(QUESTION, "Only the truth was renamed: the predictions of a group belong together as well.")
-def rows_alone(n, group):
-    return (np.arange(group.max() + 1)[:, None] == group).astype(np.int64) @ n

@@ -65,23 +65,7 @@ def weights_of_mean_one_over_classes(counts, power):
     return w
 
 
-@wrong(QUESTION, "For power 0 all weights are 1: does yours use the power?")
-def weights_always_inverse(counts, power):
-    return class_weights(counts, 1.0)
-
-
 @wrong(QUESTION, "A class without pixels gets 1, whatever the power.")
 def weights_of_absent_classes(counts, power):
     w = np.maximum(counts, 1) ** -power
     return w * counts.sum() / (counts @ w)
-
-
-@wrong(QUESTION, "What becomes of 0 to a negative power? Leave such classes out.")
-def weights_with_infinity(counts, power):
-    w = counts.astype(float) ** -power
-    return w * counts.sum() / np.nansum(counts * w)
-
-
-@wrong(QUESTION, "A weight must be above 0: a class without pixels gets 1, the mean.")
-def weights_zero_for_absent(counts, power):
-    return np.where(counts > 0, class_weights(counts, power), 0.0)

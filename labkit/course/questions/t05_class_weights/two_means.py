@@ -37,12 +37,6 @@ def losses_and_weights(z, y, w):
     return -log_p[np.arange(len(y)), y], w[y]
 
 
-@wrong(QUESTION, "Let one pixel of weight 10 be the whole batch: its second mean is as if it had no weight.")
-def means_the_same(z, y, w):
-    loss, weight = losses_and_weights(z, y, w)
-    return float((loss * weight).mean()), float((loss * weight).mean())
-
-
 @wrong(QUESTION, "A pixel that adds no loss is not one of those that you divide by.")
 def means_over_all_pixels(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
@@ -59,14 +53,3 @@ def means_over_weights_of_classes(z, y, w):
 def means_not_weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(loss.mean()), float(loss.sum() / weight.sum())
-
-
-@wrong(QUESTION, "The first is a mean too: by how many pixels?")
-def means_are_sums(z, y, w):
-    loss, weight = losses_and_weights(z, y, w)
-    return float((loss * weight).sum()), float((loss * weight).sum() / weight.sum())
-
-
-@wrong(QUESTION, "Leave out the pixels labelled 255.")
-def means_of_ignored_too(z, y, w):
-    return two_means(z, np.where(y == 255, 0, y), w)

@@ -37,7 +37,7 @@ QUESTION = Question(
     points=3,
     properties=(
         Property(
-            "the third coordinate, z, is the depth itself",
+            "the third coordinate, z, is the depth itself, and NaN where there is no reading",
             lambda arguments, P: np.allclose(
                 P[..., 2], np.where(arguments[0] > 0, arguments[0], np.nan), equal_nan=True
             ),
@@ -78,11 +78,6 @@ def length_of_the_ray(depth, K):
 @wrong(QUESTION, "You are off by half a pixel: in this kit the first pixel's centre is at u = v = 0.")
 def centres_at_halves(depth, K):
     return holes(depth) * rays(depth.shape, K, 0.5)
-
-
-@wrong(QUESTION, "0 and NaN mean that nothing was read: such a pixel has no point, and (0, 0, 0) is one.")
-def holes_at_the_camera(depth, K):
-    return np.nan_to_num(holes(depth)) * rays(depth.shape, K)
 
 
 @wrong(QUESTION, "x is right and y is not: which entry of K belongs to the rows?")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.questions.question import Property, Question, wrong
-from labkit.course.questions.t06_back_projection import K_SMALL, columns, pixel, straight_ahead
+from labkit.course.questions.t06_back_projection import K_SMALL, columns, pixel
 
 
 def back_projection_jacobian(u, v, d, K):
@@ -33,29 +33,7 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "The columns' order is u, v, d: which of yours is the ray?")
-def depth_first(u, v, d, K):
-    du, dv, dd = columns(u, v, d, K)
-    return np.stack([dd, du, dv], axis=1)
-
-
-@wrong(QUESTION, "One pixel to the right: is that the same step in metres at 0.5 m as at 2 m?")
-def without_depth(u, v, d, K):
-    return np.stack([*columns(u, v, 1.0, K)[:2], columns(u, v, d, K)[2]], axis=1)
-
-
-@wrong(QUESTION, "That is the point. P is linear in d: what stands beside d?")
-def depth_times_ray(u, v, d, K):
-    du, dv, dd = columns(u, v, d, K)
-    return np.stack([du, dv, d * dd], axis=1)
-
-
 @wrong(QUESTION, "Depth is measured along z: how much does z change when d grows by 1?")
 def unit_ray(u, v, d, K):
     du, dv, dd = columns(u, v, d, K)
     return np.stack([du, dv, dd / np.linalg.norm(dd)], axis=1)
-
-
-@wrong(QUESTION, "Only on the optical axis does depth move a point along z alone; where is this pixel?")
-def ray_straight_ahead(u, v, d, K):
-    return straight_ahead(u, v, d, K)

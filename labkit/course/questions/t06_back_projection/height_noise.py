@@ -49,11 +49,6 @@ def shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return T_base_cam[2, :3] @ J * np.array([sigma_pixel, sigma_pixel, sigma_depth])
 
 
-@wrong(QUESTION, "Check the unit: square metres, or metres?")
-def variance(*arguments):
-    return np.sum(shares(*arguments) ** 2)
-
-
 @wrong(QUESTION, "Independent errors rarely point the same way: what adds up is not the standard deviations.")
 def stds_added(*arguments):
     return np.sum(np.abs(shares(*arguments)))
@@ -62,11 +57,6 @@ def stds_added(*arguments):
 @wrong(QUESTION, "Two errors of independent signs do not cancel: square before you add.")
 def signed_stds_added(*arguments):
     return np.abs(np.sum(shares(*arguments)))
-
-
-@wrong(QUESTION, "Height is the base frame's z: turn the camera and it changes. Where does T_base_cam come in?")
-def along_the_camera(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    return shares(u, v, d, K, np.eye(4), sigma_pixel, sigma_depth)[2]
 
 
 @wrong(QUESTION, "An error of depth moves the point along its ray, and off the optical axis that is not the z axis.")

@@ -47,17 +47,6 @@ def two_focal_lengths(fov_y, width, height):
     return K_of(focal_length(fov_y, width), focal_length(fov_y, height), width / 2.0, height / 2.0 - 1.0)
 
 
-@wrong(QUESTION, "Draw the triangle from the camera to the image's upper half: which angle does it have at the camera?")
-def whole_angle(fov_y, width, height):
-    f = height / (2.0 * np.tan(fov_y))
-    return K_of(f, f, width / 2.0, height / 2.0 - 1.0)
-
-
-@wrong(QUESTION, "The angle comes in radians, and NumPy's functions take radians.")
-def degrees(fov_y, width, height):
-    return intrinsics(np.radians(fov_y), width, height)
-
-
 @wrong(
     QUESTION, "A good rule for many cameras, but this renderer was measured: read the principal point in the docstring."
 )

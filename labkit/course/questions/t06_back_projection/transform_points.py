@@ -45,16 +45,6 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Points in rows stand left of the matrix: compare one row of your result with R @ p for that point.")
-def rotation_transposed(T, P):
-    return P @ T[:3, :3] + T[:3, 3]
-
-
 @wrong(QUESTION, "Rotate first, then translate: what does T (0, 0, 0, 1) give?")
 def translated_first(T, P):
     return (P + T[:3, 3]) @ T[:3, :3].T
-
-
-@wrong(QUESTION, "Check the sign: (0, 0, 0) must land on t.")
-def translation_subtracted(T, P):
-    return P @ T[:3, :3].T - T[:3, 3]

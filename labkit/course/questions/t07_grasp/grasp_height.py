@@ -58,16 +58,6 @@ def height_of_centroid(P, table_z, palm, tips, clearance):
     return P[:, 2].mean()
 
 
-@wrong(QUESTION, "You give the height of the tips; the grasp's origin is the point between the pads, above them.")
-def height_of_tips(P, table_z, palm, tips, clearance):
-    return grasp_height(P, table_z, palm, 0.0, clearance)
-
-
-@wrong(QUESTION, "The tips are the lowest thing of the hand: does the grasp's origin lie above or below them?")
-def tips_taken_off(P, table_z, palm, tips, clearance):
-    return grasp_height(P, table_z, palm, -tips, clearance)
-
-
 @wrong(QUESTION, "A bottle is taller than the fingers are long: what does its top meet?")
 def palm_forgotten(P, table_z, palm, tips, clearance):
     return max(P[:, 2].min(), table_z + clearance) + tips

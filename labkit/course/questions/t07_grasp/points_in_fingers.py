@@ -76,11 +76,6 @@ def transform_not_inverted(P, T_base_grasp, *boxes):
     return in_boxes(*moved(P, T_base_grasp), *boxes)
 
 
-@wrong(QUESTION, "You moved the points but did not turn them: the fingers stand at a yaw.")
-def translated_only(P, T_base_grasp, *boxes):
-    return in_boxes(*(P - T_base_grasp[:3, 3]).T, *boxes)
-
-
 @wrong(QUESTION, "What lies lower than the tips is in nobody's way. The frame's z points down.")
 def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
@@ -103,9 +98,3 @@ def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     inside = (np.abs(x) <= half) & (np.abs(y) <= width / 2 + thickness) & (z <= tips)
     return int(inside.sum())
-
-
-@wrong(QUESTION, "The jaws close along the frame's y; along x they have the fingers' breadth.")
-def closing_axis_taken_for_x(P, T_base_grasp, width, half, thickness, tips):
-    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
-    return in_boxes(y, x, z, width, half, thickness, tips)

@@ -69,11 +69,6 @@ def padding_as_pixels(data, height, width, step, is_bigendian):
     return metres(numbers[: height * width].reshape(height, width))
 
 
-@wrong(QUESTION, "A 0 says that the sensor saw nothing there. As a distance it would be inside the lens.")
-def zero_is_a_distance(data, height, width, step, is_bigendian):
-    return units(data, height, width, step, ">" if is_bigendian else "<") * 0.001
-
-
 @wrong(QUESTION, "What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")
 def signed_numbers(data, height, width, step, is_bigendian):
     return metres(units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16))

@@ -72,11 +72,6 @@ def right_quaternion(R):
     return Rotation.from_matrix(R).as_quat()
 
 
-@wrong(QUESTION, "ROS writes x, y, z, w. Where does your 1 stand for the identity?")
-def scalar_first(R):
-    return np.roll(right_quaternion(R), 1)
-
-
 @wrong(QUESTION, "The axis and the angle say it, too, but what is the length?")
 def rotation_vector(R):
     q = right_quaternion(R)
@@ -90,8 +85,3 @@ def rotation_vector(R):
 def whole_angle(R):
     x, y, z, angle = rotation_vector(R)
     return np.array([*(np.sin(angle) * np.array([x, y, z])), np.cos(angle)])
-
-
-@wrong(QUESTION, "The diagonal of R gives the squares alone; the signs stand beside it.")
-def only_magnitudes(R):
-    return np.abs(right_quaternion(R))

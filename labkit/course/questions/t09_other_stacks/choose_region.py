@@ -73,11 +73,6 @@ def chosen_by_spread(features, mean, covariance, allowed):
     return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
 
 
-@wrong(QUESTION, "Pieces count from 1; 0 says that there is none.")
-def chosen_from_0(features, mean, covariance, allowed):
-    return chosen(distances(features, mean, covariance), allowed) - 1
-
-
 @wrong(QUESTION, "A piece at the image's edge may not be chosen.")
 def chosen_although_forbidden(features, mean, covariance, allowed):
     return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0

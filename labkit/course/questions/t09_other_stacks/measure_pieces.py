@@ -62,11 +62,6 @@ def measured(pieces, area=len, centroid=lambda vu: vu.mean(axis=0)[::-1], box=No
     )
 
 
-@wrong(QUESTION, "np.nonzero gives rows first: which of them is u?")
-def measured_rows_first(pieces):
-    return measured(pieces, centroid=lambda vu: vu.mean(axis=0), box=lambda vu: (*vu.min(axis=0), *vu.max(axis=0)))
-
-
 @wrong(QUESTION, "The last column and row of a box still belong to the piece here.")
 def measured_with_open_boxes(pieces):
     return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(vu.max(axis=0)[::-1] + 1)))
