@@ -141,7 +141,7 @@ def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
 
 NAMED = [
     ("06_back_projection.intrinsics", centre_at_half, "entry at [1, 2]. There: Yours are too large by 1"),
-    ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "gradient"),
+    ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "The sign is the other one"),
     ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),
     ("04_iou.confusion_matrix", bitten_off, "y_true and y_pred were without their last row"),
     ("09_other_stacks.measure_pieces", centroid_v_u, "Output 2 of 3"),
