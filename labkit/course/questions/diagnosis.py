@@ -8,6 +8,7 @@ is wrong.
 
 import copy
 import functools
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -148,7 +149,7 @@ def views_of(question: Question, cases: Sequence[Case], outputs: Sequence[object
 def related(name: str, view: View, relations: Sequence[Relation], kind: str = "relation") -> Iterator[Sentence]:
     """Those of some relations that hold everywhere."""
     for relation in relations:
-        if said := relation(view):
+        if said := attempted(lambda relation=relation: relation(view)):
             yield Sentence(kind, name + said)
 
 
@@ -236,11 +237,17 @@ class Tried:
             return False
         shown = 0
         for case, got in self.pairs:
-            new = attempted(function, case.args)
+            new = plain_of(function, case.args)
             if not alike(self.question, case.expected if new is None else new, got):
                 return False
             shown += new is not None and not alike(self.question, new, case.expected) and not all_nan(got)
         return shown > 0
+
+
+def plain_of(function: Callable, args: tuple) -> object | None:
+    """What a function gives for copies of arguments, as `plain` has it; None if it fails."""
+    output = attempted(trusted, lambda *given: function(given), args)
+    return None if isinstance(output, Problem) else output
 
 
 def all_nan(output: object) -> bool:
@@ -254,13 +261,14 @@ def with_outputs(question: Question, cases: Sequence[Case], outputs: Sequence[ob
     return sorted(pairs, key=lambda pair: alike(question, pair[0].expected, pair[1]))
 
 
-def attempted(function: Callable, args: tuple) -> object | None:
-    """What a function gives for arguments, as `plain` has it; None if it fails."""
+def attempted(function: Callable, *args: object) -> object | None:
+    """What a function gives, quietly; None if it fails, as it may on changed arguments and on the oddest outputs."""
     try:
-        output = trusted(lambda *given: function(given), args)
-    except Exception:  # the reference may fail on changed arguments
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return function(*args)
+    except Exception:
         return None
-    return None if isinstance(output, Problem) else output
 
 
 def broken_properties(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:

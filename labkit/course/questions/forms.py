@@ -28,12 +28,11 @@ def reduced(view: View) -> str:
     """A sum, mean or largest of the right values; or the right values are such of yours."""
     if view.shaped:
         return ""
-    for axis in range(max(g.ndim for g in view.got)):
-        once = [np.take(g, 0, axis) if axis < g.ndim and g.shape[axis] else g for g in view.got]
-        pairs = list(zip(view.got, once, view.expected, strict=True))
-        if all(
-            view.same(o, e) and view.same(np.broadcast_to(np.expand_dims(o, axis), g.shape), g) for g, o, e in pairs
-        ):
+    for axis in range(min(g.ndim for g in view.got)):
+        once = [g.take([0], axis) if g.shape[axis] else g for g in view.got]
+        alike = all(view.same(np.broadcast_to(o, g.shape), g) for o, g in zip(once, view.got, strict=True))
+        pairs = [(o.squeeze(axis), e) for o, e in zip(once, view.expected, strict=True) if o.size]
+        if alike and pairs and all(view.same(o, e) for o, e in pairs):
             return f"Yours holds the right values again and again along axis {axis}: is that axis to be there?"
     turned = View(view.got, view.expected, view.args, view.names, view.rtol, view.atol)
     for words, function in REDUCED.items():

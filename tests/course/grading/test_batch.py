@@ -1,6 +1,7 @@
 """A folder of submissions: what is written, what is graded again, what a killed run leaves, Dask, the gradebook."""
 
 import csv
+import html
 import json
 import os
 import shutil
@@ -77,6 +78,10 @@ def test_points_and_words_are_as_constructed(course):
     assert ben.points == 0.0
     for result, question in zip(ben.results, of_topic(TOPIC).values(), strict=True):
         assert result.hint == question.misconceptions[0].hint
+    page = (course / "grades" / TOPIC / "feedback" / "ben.html").read_text()
+    for result in ben.results:  # the call of a public case, and what came and was expected
+        assert result.shown.startswith(f"{result.question}(") and "expected" in result.shown
+        assert all(html.escape(line) in page for line in result.shown.splitlines())
     assert {result.question: result.points for result in eve.results} == POINTS | {"iou": 0.0} and eve.needs_a_look
     rows = list(csv.DictReader((course / "grades" / TOPIC / "grades.csv").open()))
     assert [(row["student"], row["question"], float(row["points"])) for row in rows] == [
