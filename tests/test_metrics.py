@@ -33,9 +33,7 @@ image_pairs = label_pairs(min_dims=2, max_dims=2)
 
 def counted_by_hand(y_true, y_pred, num_classes, ignore=255):
     n = np.zeros((num_classes, num_classes), np.int64)
-    for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
-        if i != ignore:
-            n[i, j] += 1
+    np.add.at(n, (y_true[y_true != ignore], y_pred[y_true != ignore]), 1)
     return n
 
 
@@ -84,32 +82,21 @@ def test_without_a_label_to_ignore_every_label_must_be_a_class():
         metrics.confusion_matrix(y, y, C, ignore=None)
 
 
+BAD = {
+    "y_true": [[0, 4], [0, -1], [0, 256], np.array([0, 254], np.uint8), np.array([0, 2**63], np.uint64), [0.0, 1.0]],
+    "y_pred": [[0, 4], [0, -1], [0, 256], np.array([0, 255], np.uint8), [True, False], [[0, 0]], [0, 0, 0]],
+    "num_classes": [0, 256, 2.0],
+}
+
+
 @pytest.mark.bad_input
-@pytest.mark.parametrize(
-    ("name", "y_true", "y_pred", "num_classes"),
-    [
-        ("y_true", np.array([0, 4]), np.array([0, 0]), C),
-        ("y_true", np.array([0, -1]), np.array([0, 0]), C),
-        ("y_true", np.array([0, 254], np.uint8), np.array([0, 0], np.uint8), C),
-        ("y_true", np.array([0, 2**63], np.uint64), np.array([0, 0]), C),
-        ("y_true", np.array([0.0, 1.0]), np.array([0, 0]), C),
-        ("y_pred", np.array([0, 1]), np.array([0, 4]), C),
-        ("y_pred", np.array([0, 1]), np.array([0, -1]), C),
-        ("y_pred", np.array([0, 1], np.uint8), np.array([0, 255], np.uint8), C),
-        ("y_pred", np.array([0, 1]), np.array([True, False]), C),
-        ("y_pred", np.zeros((2, 3), int), np.zeros((3, 2), int), C),
-        ("y_pred", np.zeros((2, 3), int), np.zeros(6, int), C),
-        ("y_true", np.array([0, 256]), np.array([0, 0]), C),
-        ("y_pred", np.array([0, 1]), np.array([0, 256]), C),
-        ("y_pred", np.array([0, 255]), np.array([-1, -1]), C),
-        ("num_classes", np.array([0]), np.array([0]), 0),
-        ("num_classes", np.array([0]), np.array([0]), 256),
-        ("num_classes", np.array([0]), np.array([0]), 2.0),
-    ],
-)
-def test_confusion_matrix_names_the_argument_that_is_wrong(name, y_true, y_pred, num_classes):
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in BAD.items() for value in values])
+def test_confusion_matrix_names_the_argument_that_is_wrong(name, value):
+    good = {"y_true": np.array([0, 1]), "y_pred": np.array([0, 0]), "num_classes": C}
     with pytest.raises(ValueError, match=f"^{name}: expected"):
-        metrics.confusion_matrix(y_true, y_pred, num_classes)
+        metrics.confusion_matrix(**(good | {name: value if name == "num_classes" else np.asarray(value)}))
+    with pytest.raises(ValueError, match=r"^y_pred: expected"):  # where the truth is ignored, too
+        metrics.confusion_matrix(np.array([0, 255]), np.array([-1, -1]), C)
 
 
 # Scores
@@ -180,28 +167,24 @@ def test_scores_name_the_matrix_that_is_wrong(score, n):
 # Boundaries
 
 
-def bands_by_hand(y, c, width):
-    """Mark the pixels of class c that have another label, or nothing, within `width` rows and columns, in loops."""
-    H, W = y.shape
-    band = np.zeros((H, W), bool)
-    for v, u in np.argwhere(y == c):
-        for dv in range(-width, width + 1):
-            for du in range(-width, width + 1):
-                inside = 0 <= v + dv < H and 0 <= u + du < W
-                band[v, u] |= not inside or y[v + dv, u + du] != c
-    return band
+def band(y, c, width):
+    """What repeated 3x3 erosion takes off the pixels of class c: the recipe of the paper's own code."""
+    return (y == c) & ~ndimage.binary_erosion(y == c, np.ones((3, 3)), iterations=width)
+
+
+def assert_counts_are_those_of_the_bands(y_true, y_pred, width):
+    intersection, union = metrics.boundary_counts(y_true, y_pred, C, width)
+    y_pred = np.where(y_true == 255, -1, y_pred.astype(int))
+    for c in range(C):
+        true, pred = band(y_true, c, width), band(y_pred, c, width)
+        assert intersection[c] == np.count_nonzero(true & pred)
+        assert union[c] == np.count_nonzero(true | pred)
 
 
 @untimed
 @given(image_pairs, st.integers(1, 4))
-def test_boundary_counts_are_those_of_bands_found_by_hand(pair, width):
-    y_true, y_pred = pair
-    intersection, union = metrics.boundary_counts(y_true, y_pred, C, width)
-    y_pred = np.where(y_true == 255, -1, y_pred.astype(int))
-    for c in range(C):
-        true, pred = bands_by_hand(y_true, c, width), bands_by_hand(y_pred, c, width)
-        assert intersection[c] == np.count_nonzero(true & pred)
-        assert union[c] == np.count_nonzero(true | pred)
+def test_boundary_counts_are_those_of_the_bands_that_erosion_takes_off(pair, width):
+    assert_counts_are_those_of_the_bands(*pair, width)
 
 
 def blobs(seed, shape=(60, 90)):
@@ -211,15 +194,8 @@ def blobs(seed, shape=(60, 90)):
 
 
 @pytest.mark.parametrize("width", [1, 3, 8])
-def test_the_band_is_what_repeated_3x3_erosion_takes_off(width):
-    # The recipe of the paper's own code, for each class by itself.
-    y_true, y_pred = blobs(0), np.roll(blobs(0), 2, axis=1)
-    scores = metrics.boundary_iou(y_true, y_pred, C, width)
-    for c in range(C):
-        bands = [
-            (y == c) & ~ndimage.binary_erosion(y == c, np.ones((3, 3)), iterations=width) for y in (y_true, y_pred)
-        ]
-        assert scores[c] == np.count_nonzero(bands[0] & bands[1]) / np.count_nonzero(bands[0] | bands[1])
+def test_boundary_counts_of_large_regions_are_those_of_the_bands(width):
+    assert_counts_are_those_of_the_bands(blobs(0), np.roll(blobs(0), 2, axis=1), width)
 
 
 def test_a_batch_is_counted_image_by_image():
@@ -259,22 +235,24 @@ def test_the_default_width_is_two_hundredths_of_the_diagonal():
     np.testing.assert_array_equal(metrics.boundary_iou(tiny, tiny, 2), [1.0, 1.0])
 
 
+Y = np.zeros((3, 4), int)
+
+
 @pytest.mark.bad_input
 @pytest.mark.parametrize(
     ("name", "change"),
     [
-        ("y_true", {"y_true": np.full((3, 4), 4)}),
-        ("y_true", {"y_true": np.zeros(12, int), "y_pred": np.zeros(12, int)}),
-        ("y_pred", {"y_pred": np.full((3, 4), 255)}),
-        ("y_pred", {"y_pred": np.zeros((4, 3), int)}),
+        ("y_true", {"y_true": Y + 4}),
+        ("y_true", {"y_true": Y[0], "y_pred": Y[0]}),
+        ("y_pred", {"y_pred": Y + 255}),
+        ("y_pred", {"y_pred": Y.T}),
         ("width", {"width": 0}),
         ("num_classes", {"num_classes": 256}),
     ],
 )
 def test_boundary_iou_names_the_argument_that_is_wrong(name, change):
-    good = {"y_true": np.zeros((3, 4), int), "y_pred": np.zeros((3, 4), int), "num_classes": C}
     with pytest.raises(ValueError, match=f"^{name}: expected"):
-        metrics.boundary_iou(**(good | change))
+        metrics.boundary_iou(**({"y_true": Y, "y_pred": Y, "num_classes": C} | change))
 
 
 # Lift rates
@@ -287,16 +265,6 @@ def test_wilson_interval_agrees_with_scipy_and_holds_the_rate(result, confidence
     peer = stats.binomtest(*result).proportion_ci(confidence, method="wilson")
     assert (low, high) == pytest.approx((peer.low, peer.high), abs=1e-9)
     assert 0.0 <= low <= result[0] / result[1] <= high <= 1.0
-
-
-@pytest.mark.bad_input
-@pytest.mark.parametrize(
-    ("name", "arguments"),
-    [("trials", (0, 0)), ("successes", (-1, 10)), ("successes", (11, 10)), ("confidence", (5, 10, 95))],
-)
-def test_wilson_interval_names_the_argument_that_is_wrong(name, arguments):
-    with pytest.raises(ValueError, match=f"^{name}: expected"):
-        metrics.wilson_interval(*arguments)
 
 
 # ---------------------------------------------------------------------------------------------------- calibration
@@ -316,15 +284,21 @@ def test_reliability_counts_are_those_of_a_loop(bins):
     assert metrics.calibration_error(counts) == pytest.approx(sum(gaps) / p.size)
     parts = [metrics.reliability_counts(p[rows], true[rows], bins) for rows in (slice(0, 2), slice(2, 4))]
     np.testing.assert_allclose(sum(parts), counts)
-
-
-def test_calibration_of_nothing_is_no_number():
-    assert np.isnan(metrics.calibration_error(metrics.reliability_counts(np.zeros(0), np.zeros(0, bool))))
+    assert np.isnan(metrics.calibration_error(metrics.reliability_counts(p[:0], true[:0])))
 
 
 @pytest.mark.bad_input
-def test_probabilities_that_are_none():
-    with pytest.raises(ValueError, match=r"^p: expected probabilities in 0..1, got 0 to 2"):
-        metrics.reliability_counts(np.array([0.0, 2.0]), np.array([False, True]))
-    with pytest.raises(ValueError, match=r"^true: expected shape"):
-        metrics.reliability_counts(np.array([0.0, 1.0]), np.array([False]))
+@pytest.mark.parametrize(
+    ("says", "function", "arguments"),
+    [
+        ("trials: expected", metrics.wilson_interval, (0, 0)),
+        ("successes: expected", metrics.wilson_interval, (-1, 10)),
+        ("successes: expected", metrics.wilson_interval, (11, 10)),
+        ("confidence: expected", metrics.wilson_interval, (5, 10, 95)),
+        ("p: expected probabilities in 0..1, got 0 to 2", metrics.reliability_counts, (2.0 * np.eye(2), np.eye(2) > 0)),
+        ("true: expected shape", metrics.reliability_counts, (np.eye(2), np.array([False]))),
+    ],
+)
+def test_rates_and_probabilities_that_are_none(says, function, arguments):
+    with pytest.raises(ValueError, match=f"^{says}"):
+        function(*arguments)

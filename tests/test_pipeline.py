@@ -80,27 +80,31 @@ def test_ones_own_functions_take_the_stages_places(frame):
     assert np.nanmax(np.abs(p.points - kit.points)) < 1e-5
 
 
-def test_no_target_is_no_grasp_with_a_reason(frame):
+def test_no_target_and_no_depth_are_no_grasp_with_a_reason(frame):
     p = Pipeline().locate(frame, np.full(frame.labels.shape, SURFACE))
     assert p.clouds == [] and p.plan.grasps == ()
     assert repr(p) == "Perception(320 x 240, clouds of no points, no grasp: no target points)"
-
-
-def test_pixels_without_depth_become_no_points(frame):
     depth = np.where(frame.labels == TARGET, 0.0, frame.depth).astype(np.float32)
     depth[:100] = np.nan
     p = Pipeline().locate(dataclasses.replace(frame, depth=depth), frame.labels)
     assert p.clouds == [] and np.isnan(p.points[:100]).all()
     assert np.isfinite(p.scene).all()
+    tiny = RGBDFrame(np.zeros((1, 1, 3), np.uint8), np.ones((1, 1), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
+    assert Pipeline(SmallSegNet().eval()).run(tiny).labels.shape == (1, 1)
 
 
 def test_run_is_perceive_and_then_locate(frame):
     pipeline = Pipeline(SmallSegNet().eval())
     labels, probabilities = pipeline.perceive(frame)
+    assert np.array_equal(labels, probabilities.argmax(axis=-1))
     p, q = pipeline.run(frame), pipeline.locate(frame, labels, probabilities)
     assert np.array_equal(p.labels, labels) and np.array_equal(p.probabilities, probabilities)
     assert p.certainty == q.certainty and p.plan.reason == q.plan.reason
     assert [g.score for g in p.plan.grasps] == [g.score for g in q.plan.grasps]
+    ties = np.random.default_rng(0).integers(0, 3, (7, 5, 4)) / 2.0
+    assert np.array_equal(most_probable(ties), ties.argmax(axis=-1))
+    unknown = np.where(frame.labels == OBSTACLE, IGNORE, frame.labels)
+    assert np.array_equal(Pipeline().locate(frame, unknown).labels, unknown)
 
 
 def test_clouds_carry_their_pixels_and_the_certainty_of_these(frame):
@@ -165,11 +169,6 @@ def test_the_tables_height_is_given_or_the_frames_or_zero(given, of_frame, used,
     assert heights == [used]
 
 
-def test_unknown_labels_stay_unknown(frame):
-    labels = np.where(frame.labels == OBSTACLE, IGNORE, frame.labels)
-    assert np.array_equal(Pipeline().locate(frame, labels).labels, labels)
-
-
 def test_the_crf_removes_speckles_and_may_be_ones_own(frame):
     clean = 0.9 * one_hot(frame.labels) + 0.025
     speckled = clean.copy()
@@ -180,25 +179,6 @@ def test_the_crf_removes_speckles_and_may_be_ones_own(frame):
     assert list(p.seconds) == ["network", "labels", "crf", "back_projection", "clouds", "grasps"]
     q = Pipeline(lambda rgb: speckled, crf=lambda probabilities, frame: frame.labels).run(frame)
     assert np.array_equal(q.labels, frame.labels)
-
-
-def test_most_probable_is_argmax():
-    p = np.random.default_rng(0).integers(0, 3, (7, 5, 4)) / 2.0  # with ties
-    assert np.array_equal(most_probable(p), p.argmax(axis=-1))
-
-
-def test_the_channel_order_is_the_callers_word():
-    """The text's function swaps channels whatever it is given; here an RGB image is not swapped."""
-    seen = []
-
-    def model(rgb):
-        seen.append(rgb.copy())
-        return one_hot(np.zeros(rgb.shape[:2], int)).astype(float)
-
-    image = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
-    segment_rgb_image(model, image)
-    segment_rgb_image(model, image[..., ::-1], order="bgr")
-    assert np.array_equal(seen[0], image) and np.array_equal(seen[1], image)
 
 
 class Broken(nn.Module):
@@ -242,12 +222,6 @@ class Broken(nn.Module):
 def test_wrong_arguments_are_named(call, name, frame):
     with pytest.raises(ValueError, match=rf"^{name}:"):
         call(frame)
-
-
-def test_a_tiny_image_is_fine():
-    frame = RGBDFrame(np.zeros((1, 1, 3), np.uint8), np.ones((1, 1), np.float32), np.diag([9.0, 9.0, 1.0]), np.eye(4))
-    p = Pipeline(SmallSegNet().eval()).run(frame)
-    assert p.labels.shape == (1, 1)
 
 
 def test_the_surer_target_is_grasped_first(frame):

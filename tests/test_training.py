@@ -206,45 +206,6 @@ def test_a_finished_run_is_not_run_again_and_a_seed_is_a_result(tmp_path, monkey
     history = train(data, None, CONFIG, tmp_path / "a", progress=False)
     assert torch.equal(torch.get_rng_state(), state), "the global generator is left alone"
     train(data, None, CONFIG, tmp_path / "b", progress=False)
-    train(data, None, replace(CONFIG, seed=1), tmp_path / "c", progress=False)
-    first, again, other = (weights_of(tmp_path / folder) for folder in "abc")
-    assert_same_weights(first, again)
-    assert not torch.equal(first["conv1.weight"], other["conv1.weight"])
-    monkeypatch.setattr(Trainer, "step", None)
-    assert train(data, None, CONFIG, tmp_path / "a", progress=False) == history
-
-
-def test_a_run_learns_and_writes_what_it_says(tmp_path):
-    data, val = scenes(8), scenes(10)[8:]
-    config = replace(CONFIG, epochs=25, lr=1e-2, val_every=10, augment=False)
-    history = train(data, val, config, tmp_path, progress=False)
-    assert sorted(file.name for file in tmp_path.iterdir()) == [
-        "smallsegnet.checkpoint.pt",
-        "smallsegnet.history.json",
-        "smallsegnet.pt",
-    ]
-    assert json.loads((tmp_path / "smallsegnet.history.json").read_text()) == history
-    assert [row["epoch"] for row in history] == list(range(1, 26)) and history[-1]["steps"] == 100
-    assert [row["epoch"] for row in history if "mean_iou" in row] == [10, 20, 25]
-    assert history[-1]["loss"] < 0.5 * history[0]["loss"]
-    assert history[-1]["mean_iou"] > 0.6
-    model = load_model(tmp_path / "smallsegnet.pt", 4)
-    right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in val]
-    assert np.concatenate(right).mean() > 0.8
-
-
-def test_a_network_of_ones_own_learns_and_loads(tmp_path):
-    config, data = replace(CONFIG, model="mine", num_classes=6, epochs=25, lr=1e-2, augment=False), scenes(8)
-    history = train(data, data[:2], config, tmp_path, progress=False, model=OwnNetwork())
-    assert history[-1]["mean_iou"] > 0.6 and history[-1]["weights_undone"] == 0.0
-    model = load_model(tmp_path / "mine.pt", model=OwnNetwork())
-    right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in data]
-    assert np.concatenate(right).mean() > 0.8
-    with pytest.raises(ValueError, match=r"model: expected smallsegnet, .* or a network of your own, got 'mine'"):
-        train(data, None, config, tmp_path / "b", progress=False)
-
-
-def test_weights_are_there_before_the_end_without_validation(tmp_path, monkeypatch):
     plain_step = Trainer.step
 
     def fails_in_the_second_epoch(self):
@@ -254,8 +215,35 @@ def test_weights_are_there_before_the_end_without_validation(tmp_path, monkeypat
 
     monkeypatch.setattr(Trainer, "step", fails_in_the_second_epoch)
     with pytest.raises(RuntimeError, match="power cut"):
-        train(scenes(4), None, CONFIG, tmp_path, progress=False)
-    assert load_model(tmp_path / "smallsegnet.pt") is not None
+        train(data, None, replace(CONFIG, seed=1), tmp_path / "c", progress=False)
+    monkeypatch.undo()
+    assert load_model(tmp_path / "c/smallsegnet.pt") is not None, "weights are there before the end, without validation"
+    train(data, None, replace(CONFIG, seed=1), tmp_path / "c", progress=False)
+    first, again, other = (weights_of(tmp_path / folder) for folder in "abc")
+    assert_same_weights(first, again)
+    assert not torch.equal(first["conv1.weight"], other["conv1.weight"])
+    monkeypatch.setattr(Trainer, "step", None)
+    assert train(data, None, CONFIG, tmp_path / "a", progress=False) == history
+
+
+@pytest.mark.parametrize(("name", "own"), [("smallsegnet", None), ("mine", OwnNetwork)])
+def test_a_run_learns_and_writes_what_it_says(name, own, tmp_path):
+    data, val = scenes(8), scenes(10)[8:]
+    config = replace(CONFIG, model=name, num_classes=6 if own else 4, epochs=25, lr=1e-2, val_every=10, augment=False)
+    history = train(data, val, config, tmp_path, progress=False, model=own and own())
+    written = sorted(file.name for file in tmp_path.iterdir())
+    assert written == [f"{name}.checkpoint.pt", f"{name}.history.json", f"{name}.pt"]
+    assert json.loads((tmp_path / f"{name}.history.json").read_text()) == history or own  # NaN is not equal to itself
+    assert [row["epoch"] for row in history] == list(range(1, 26)) and history[-1]["steps"] == 100
+    assert [row["epoch"] for row in history if "mean_iou" in row] == [10, 20, 25]
+    assert history[-1]["loss"] < 0.5 * history[0]["loss"]
+    assert history[-1]["mean_iou"] > 0.6 and history[-1]["weights_undone"] == 0.0
+    model = load_model(tmp_path / f"{name}.pt", model=own and own())
+    right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in val]
+    assert np.concatenate(right).mean() > 0.8
+    if own:
+        with pytest.raises(ValueError, match=r"model: expected smallsegnet, .* or a network of your own, got 'mine'"):
+            train(data, None, config, tmp_path / "b", progress=False)
 
 
 def test_a_network_that_sees_depth_learns_what_colour_does_not_tell(tmp_path):
@@ -328,25 +316,22 @@ def test_frames_and_tensors_are_datasets_too():
 # Bad input
 
 
+SETTINGS = {
+    "model": "../unet",
+    "epochs": 0,
+    "steps": 0,
+    "batch": 0,
+    "weight_decay": -0.1,
+    "warmup": 1.0,
+    "val_every": 0,
+}
+SETTINGS |= {"weights": "equal", "num_classes": 1, "seed": -1}
+
+
 @pytest.mark.bad_input
 @pytest.mark.parametrize(
     ("name", "value"),
-    [
-        ("model", "../unet"),
-        ("epochs", 0),
-        ("steps", 0),
-        ("batch", 0),
-        ("lr", 0.0),
-        ("lr", float("nan")),
-        ("weight_decay", -0.1),
-        ("warmup", 1.0),
-        ("weights", "equal"),
-        ("crop", (2, 64)),
-        ("crop", (64,)),
-        ("val_every", 0),
-        ("num_classes", 1),
-        ("seed", -1),
-    ],
+    [*SETTINGS.items(), ("lr", 0.0), ("lr", float("nan")), ("crop", (2, 64)), ("crop", (64,))],
 )
 def test_settings_are_checked(name, value):
     with pytest.raises(ValueError, match=rf"^{name}: expected .* got"):
@@ -368,20 +353,15 @@ NO_LABELS = RGBDFrame(RGB, np.ones(Y.shape, np.float32), np.diag([9.0, 9.0, 1.0]
         ([(RGB, np.full_like(Y, 4))], None, r"train_set\[0\]: expected labels 0 to 3"),
         ([(RGB / 255.0, Y)], None, r"train_set\[0\]: expected uint8 RGB"),
         ([NO_LABELS], None, r"train_set\[0\]: expected a frame with labels"),
+        (scenes(1), "unet_rgbd", r"train_set\[0\]: expected an RGBDFrame, for its depth, got tuple"),
+        (ImagesInMemory(scenes(1), progress=False), "unet_rgbd", "train_set: expected images with depth"),
     ],
 )
 def test_data_that_do_not_fit(train_set, val_set, says, tmp_path):
+    rgbd = val_set == "unet_rgbd"
+    config = replace(CONFIG, model="unet_rgbd") if rgbd else CONFIG
     with pytest.raises(ValueError, match=says):
-        train(train_set, val_set, CONFIG, tmp_path, progress=False)
-
-
-@pytest.mark.bad_input
-def test_a_network_that_sees_depth_needs_it(tmp_path):
-    config, pair = replace(CONFIG, model="unet_rgbd"), scenes(1)
-    with pytest.raises(ValueError, match=r"train_set\[0\]: expected an RGBDFrame, for its depth, got tuple"):
-        train(pair, None, config, tmp_path, progress=False)
-    with pytest.raises(ValueError, match="train_set: expected images with depth"):
-        train(ImagesInMemory(pair, progress=False), None, config, tmp_path, progress=False)
+        train(train_set, None if rgbd else val_set, config, tmp_path, progress=False)
     assert not list(tmp_path.iterdir())
 
 
@@ -401,16 +381,6 @@ def test_a_checkpoint_of_another_run_or_a_damaged_one(tmp_path):
 
 
 @pytest.mark.bad_input
-def test_devices(monkeypatch):
-    assert choose_device("cpu") == torch.device("cpu")
-    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    assert choose_device("auto") == torch.device("cpu")
-    with pytest.raises(ValueError, match="device: expected a CUDA GPU"):
-        choose_device("cuda")
-    with pytest.raises(ValueError, match="device: expected auto, cpu or cuda"):
-        choose_device("tpu")
-
-
 @pytest.mark.parametrize(
     ("able", "native"),
     [
@@ -420,11 +390,16 @@ def test_devices(monkeypatch):
         ({"amx_bf16": True}, True),
     ],
 )
-def test_bf16_is_used_only_where_it_is_native(monkeypatch, able, native):
+def test_devices_and_that_bf16_is_used_only_where_it_is_native(monkeypatch, able, native):
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: able)
-    assert bf16_is_native(torch.device("cpu")) is native
-    trainer = Trainer(ImagesInMemory(scenes(1), progress=False), CONFIG, torch.device("cpu"))
-    assert trainer.bf16 is native
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    device = choose_device("auto")
+    assert device == choose_device("cpu") == torch.device("cpu")
+    assert bf16_is_native(device) is native
+    assert Trainer(ImagesInMemory(scenes(1), progress=False), CONFIG, device).bf16 is native
+    for name, says in (("cuda", "a CUDA GPU"), ("tpu", "auto, cpu or cuda")):
+        with pytest.raises(ValueError, match=f"device: expected {says}"):
+            choose_device(name)
 
 
 @pytest.mark.parametrize("crop", [None, (18, 22)])

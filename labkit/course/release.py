@@ -123,11 +123,9 @@ def generate(solution: Path, tidied: bytes) -> dict[str, bytes]:
         convert(course, topic)
         files = sorted(path for path in (course / "labs" / topic).rglob("*") if path.is_file())
         made = {path.relative_to(course / "labs" / topic).as_posix(): path.read_bytes() for path in files}
-    lab = nbformat.reads(made[solution.name].decode(), as_version=4)
-    ids = [cell.id for cell in nbformat.reads(tidied.decode(), as_version=4).cells]
-    lab = tidy(lab)
-    for cell, kept in zip(lab.cells, ids, strict=True):
-        cell["id"] = kept  # the solution's: a lab's cells are found again in it
+    lab = tidy(nbformat.reads(made[solution.name].decode(), as_version=4))
+    for cell, source in zip(lab.cells, nbformat.reads(tidied.decode(), as_version=4).cells, strict=True):
+        cell["id"] = source.id  # a lab's cells are found again in the solution
     lab.metadata["labkit"] = {"version": __version__, "tasks": task_names(lab)}
     return made | {solution.name: to_bytes(lab)}
 
@@ -208,15 +206,7 @@ def replace_folders(made: dict[Path, dict[str, bytes]]) -> None:
 # ------------------------------------------------------------------------------------- what students get
 
 FOLDERS = ("lessons", "labs", "labkit", "data_gen", "docs")
-STUDENTS_GET = (
-    *FOLDERS,
-    "Makefile",
-    "pyproject.toml",
-    "constraints.txt",
-    "README.md",
-    "LICENSE",
-    "CITATION.cff",
-)
+FILES = ("Makefile", "pyproject.toml", "constraints.txt", "README.md", "LICENSE", "CITATION.cff")
 INSTRUCTORS_KEEP = ("docs/grading.md",)
 
 
@@ -229,9 +219,7 @@ def bundle(course: Path, target: Path) -> list[str]:
     course, target = Path(course), Path(target)
     if drift := release(course, check=True):
         raise ValueError(f"course: run `labkit release` first, {drift[0]} is not what it makes")
-    found = [
-        path for name in STUDENTS_GET for path in ((course / name).rglob("*") if name in FOLDERS else [course / name])
-    ]
+    found = [path for name in FOLDERS for path in (course / name).rglob("*")] + [course / name for name in FILES]
     files = {path.relative_to(course).as_posix(): path for path in found if path.is_file()}
     names = sorted(name for name in files if name not in INSTRUCTORS_KEEP and not is_left_over(name))
     content = io.BytesIO()

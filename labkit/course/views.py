@@ -22,6 +22,21 @@ BOX = np.array(
 ).reshape(12, 3)
 
 
+def fingers(T_base_grasp: Float[np.ndarray, "4 4"], width: float, gripper) -> Float[np.ndarray, "2 8 3"]:
+    """Corners of the two fingers of a hand that is open by `width`, metres in the base frame, from palm to tips.
+
+    gripper: a labkit.grasp.Gripper. Bits 0, 1 and 2 of a corner's number are its side in x, y and z of the grasp frame.
+    """
+    across = np.array([-1, 1]) * gripper.finger_width / 2
+    inner, outer = width / 2, width / 2 + gripper.tip_thickness
+    along = gripper.tips_below_grasp - np.array([gripper.palm_above_tips, 0.0])  # z of the grasp frame points down
+    corners = [
+        [(across[i & 1], closing[i >> 1 & 1], along[i >> 2]) for i in range(8)]
+        for closing in ((-outer, -inner), (inner, outer))
+    ]
+    return np.array(corners) @ T_base_grasp[:3, :3].T + T_base_grasp[:3, 3]
+
+
 @dataclass
 class View:
     """What is to be seen, in metres of the base frame; each method adds to it and returns the view.
@@ -62,16 +77,8 @@ class View:
 
     def jaws(self, grasps, gripper, name: str = "jaws", colour: str = JAW_COLOUR) -> "View":
         """Add the fingers of grasps (labkit.grasp.Grasp), each opened as it says, down from the palm to the tips."""
-        across = np.array([-1, 1]) * gripper.finger_width / 2
-        tips = gripper.tips_below_grasp
-        along = np.array([tips - gripper.palm_above_tips, tips])  # z of the grasp frame points down
-        boxes = []
-        for grasp in grasps:
-            inner, outer = grasp.width / 2, grasp.width / 2 + gripper.tip_thickness
-            for side in ((-outer, -inner), (inner, outer)):
-                corners = np.array([(across[i & 1], side[i >> 1 & 1], along[i >> 2]) for i in range(8)])
-                boxes.append(corners @ grasp.T_base_grasp[:3, :3].T + grasp.T_base_grasp[:3, 3])
-        return self.boxes(np.array(boxes), name, colour) if boxes else self
+        boxes = [fingers(grasp.T_base_grasp, grasp.width, gripper) for grasp in grasps]
+        return self.boxes(np.concatenate(boxes), name, colour) if boxes else self
 
     # ------------------------------------------------------------------------------------------------- as HTML
 

@@ -37,9 +37,6 @@ def pins(tmp_path, *lines: str):
 def test_requirements_follow_dependencies_markers_and_extras(toy):
     assert packages.requirements("toy") == {"toy-a": "1.1", "toy-b": "2.13.0+cpu", "toy-c": "1.3rc1"}
     assert packages.requirements("toy", "draw")["toy-d"] is None
-
-
-def test_requirements_of_a_package_that_is_not_installed_raise():
     with pytest.raises(ModuleNotFoundError, match="no-such-package"):
         packages.requirements("no-such-package")
 
@@ -61,11 +58,8 @@ def test_a_missing_package_is_wrong_unless_only_an_extra_needs_it():
     assert optional.state == NOTE and "labkit export" in optional.found and ".[stacks]" in optional.mend
 
 
-def test_every_extra_is_looked_at_but_the_peers():
-    assert doctor.USERS.keys() == set(packages.metadata.metadata("labkit").get_all("Provides-Extra")) - {"bench"}
-
-
 def test_this_environment_has_every_package_at_its_pin():
+    assert doctor.USERS.keys() == set(packages.metadata.metadata("labkit").get_all("Provides-Extra")) - {"bench"}
     findings = {finding.name: finding for finding in doctor.check_packages()}
     assert findings["packages"].state == findings["[test]"].state == OK, findings
     assert "at their pinned versions" in findings["packages"].found
@@ -98,10 +92,7 @@ def test_the_render_check_passes_here_and_sees_a_shift_of_half_a_pixel(monkeypat
 
     monkeypatch.setattr(world, "intrinsics", shifted)
     assert doctor.check_render()[0].state == WRONG
-
-
-def test_pixels_without_depth_fail_the_render_check(monkeypatch):
-    monkeypatch.setattr(doctor, "table_error", lambda: float("nan"))
+    monkeypatch.setattr(doctor, "table_error", lambda: float("nan"))  # no pixel has depth
     assert doctor.check_render()[0].state == WRONG
 
 

@@ -98,12 +98,9 @@ def test_clouds_and_report_hold_what_was_seen(shot, tmp_path):
     assert cv2.imread(str(tmp_path / "overlay.png")).shape == shot.frame.rgb.shape
 
 
-def test_a_network_labels_the_picture(shot, tmp_path):
+def test_a_network_labels_the_picture_and_no_target_is_an_answer_with_a_reason(shot, tmp_path):
     done = run(shot, tmp_path, "--model", "unet")
     assert "target 1:" in done.output and "certainty 0." in done.output
-
-
-def test_no_target_is_an_answer_with_a_reason(shot, tmp_path):
     cv2.imwrite(str(shot.folder / "nothing.png"), np.zeros(SIZE[::-1], np.uint8))
     done = run(shot, tmp_path, "--mask", str(shot.folder / "nothing.png"))
     assert done.exit_code == 0 and "no grasp: no target points" in done.output

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-TOPIC = "04_iou"
+TOPIC, FILE = "04_iou", "04_iou.ipynb"
 WRONG = "def iou(n):\n    return np.zeros(len(n))\n"
 
 
@@ -57,6 +57,11 @@ def with_iou(**fields) -> Callable[[Path, dict], None]:
     return as_notebook(lambda cells: cell(cells, "iou").update(fields))
 
 
+def rewritten(change: Callable[[str], str | list[str]]) -> Callable[[Path, dict], None]:
+    """Write the right answers after a change to the source of the cell iou."""
+    return as_notebook(lambda cells: cell(cells, "iou").update(source=change(cell(cells, "iou")["source"])))
+
+
 def doubled(source: str | None) -> Callable[[list], list]:
     """The cell iou twice, the second one with another source if there is one."""
 
@@ -79,37 +84,31 @@ def better_marks(cells: list) -> None:
     cell(cells, "setup")["source"] = "raise SystemExit"
 
 
-def linked_file(folder: Path, right: dict) -> None:
-    folder.mkdir(parents=True)
-    (folder / f"{TOPIC}.ipynb").symlink_to(folder.parent.parent / "honest" / TOPIC / f"{TOPIC}.ipynb")
+def in_its_place(name: str, make: Callable[[Path, str], object]) -> Callable[[Path, dict], None]:
+    """Make something else under a name in the student's folder, given its path and what the right file holds."""
+
+    def write(folder: Path, right: dict) -> None:
+        folder.mkdir(parents=True)
+        make(folder / name, json.dumps(right))
+
+    return write
 
 
-def linked_folder(folder: Path, right: dict) -> None:
-    folder.parent.mkdir(parents=True)
-    folder.symlink_to(folder.parent.parent / "honest" / TOPIC)
+def linked(place: str) -> Callable[[Path, dict], None]:
+    """A link to the honest student's file, folder or student's folder, in the place of one's own."""
+
+    def write(folder: Path, right: dict) -> None:
+        honest = folder.parent.parent / "honest"
+        mine = {"student": folder.parent, "folder": folder, "file": folder / FILE}[place]
+        mine.parent.mkdir(parents=True, exist_ok=True)
+        mine.symlink_to({"student": honest, "folder": honest / TOPIC, "file": honest / TOPIC / FILE}[place])
+
+    return write
 
 
-def linked_student(folder: Path, right: dict) -> None:
-    folder.parent.symlink_to(folder.parent.parent / "honest")
-
-
-def pipe(folder: Path, right: dict) -> None:
-    folder.mkdir(parents=True)
-    os.mkfifo(folder / f"{TOPIC}.ipynb")
-
-
-def sparse(folder: Path, right: dict) -> None:
-    put(folder, b"{")
-    os.truncate(folder / f"{TOPIC}.ipynb", 200 << 20)
-
-
-def loose(folder: Path, right: dict) -> None:
-    folder.parent.write_text(json.dumps(right))
-
-
-def other_name(folder: Path, right: dict) -> None:
-    folder.mkdir(parents=True)
-    (folder / "iou (1).ipynb").write_text(json.dumps(right))
+def sparse(path: Path, text: str) -> None:
+    path.write_text("{")
+    os.truncate(path, 200 << 20)
 
 
 def with_time(text: str) -> Callable[[Path, dict], None]:
@@ -127,13 +126,13 @@ def plain(folder: Path, right: dict) -> None:
 
 
 ODD = (
-    Odd("linked_file", linked_file, "04_iou.ipynb is a symbolic link"),
-    Odd("linked_folder", linked_folder, "the folder 04_iou is a symbolic link"),
-    Odd("linked_student", linked_student, "the student's folder is a symbolic link"),
-    Odd("pipe", pipe, "04_iou.ipynb is no file"),
-    Odd("two_hundred_megabytes", sparse, "it is larger than 20 MB"),
-    Odd("loose.ipynb", loose, "not in a student's folder; expected STUDENT/04_iou/04_iou.ipynb"),
-    Odd("other_name", other_name, "the folder 04_iou holds no 04_iou.ipynb"),
+    Odd("linked_file", linked("file"), "04_iou.ipynb is a symbolic link"),
+    Odd("linked_folder", linked("folder"), "the folder 04_iou is a symbolic link"),
+    Odd("linked_student", linked("student"), "the student's folder is a symbolic link"),
+    Odd("pipe", in_its_place(FILE, lambda path, text: os.mkfifo(path)), "04_iou.ipynb is no file"),
+    Odd("two_hundred_megabytes", in_its_place(FILE, sparse), "it is larger than 20 MB"),
+    Odd("other_name", in_its_place("iou (1).ipynb", Path.write_text), "the folder 04_iou holds no 04_iou.ipynb"),
+    Odd("loose.ipynb", lambda folder, right: folder.parent.write_text(json.dumps(right)), "not in a student's folder"),
     *(
         Odd(name, plain, "rename the student's folder")
         for name in (
@@ -180,29 +179,9 @@ ODD = (
     ),
     Odd("byte_order_mark", lambda folder, right: put(folder, json.dumps(right).encode("utf-8-sig")), right=True),
     Odd("other_order", as_notebook(lambda cells: cells[::-1]), right=True),
-    Odd(
-        "list_of_lines",
-        as_notebook(
-            lambda cells: cell(cells, "iou").update(source=cell(cells, "iou")["source"].splitlines(keepends=True))
-        ),
-        right=True,
-    ),
-    Odd(
-        "magics",
-        as_notebook(
-            lambda cells: cell(cells, "iou").update(source="%matplotlib inline\n" + cell(cells, "iou")["source"])
-        ),
-        right=True,
-    ),
-    Odd(
-        "check_in_the_cell",
-        as_notebook(
-            lambda cells: cell(cells, "iou").update(
-                source=cell(cells, "iou")["source"] + '\niou = check("04_iou.iou", iou)\n'
-            )
-        ),
-        right=True,
-    ),
+    Odd("list_of_lines", rewritten(lambda source: source.splitlines(keepends=True)), right=True),
+    Odd("magics", rewritten(lambda source: "%matplotlib inline\n" + source), right=True),
+    Odd("check_in_the_cell", rewritten(lambda source: source + '\niou = check("04_iou.iou", iou)\n'), right=True),
     Odd("same_cell_twice", as_notebook(doubled(None)), right=True),
     Odd("two_answers", as_notebook(doubled(WRONG)), says="2 different cells have its grade id"),
     Odd("cell_removed", as_notebook(lambda cells: cells.remove(cell(cells, "iou"))), says="no cell defines iou"),

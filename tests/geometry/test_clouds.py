@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scenes import pose
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from labkit.geometry import (
     centroid_and_covariance,
@@ -20,11 +20,6 @@ from labkit.geometry import (
 )
 
 finite = {"allow_nan": False, "allow_infinity": False}
-
-
-def pose(seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    return RigidTransform.from_components(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=rng)).as_matrix()
 
 
 @given(P=arrays(np.float64, st.tuples(st.integers(1, 30), st.just(3)), elements=st.floats(-100.0, 100.0, **finite)))
@@ -177,7 +172,10 @@ def test_dense_clouds_agree_with_brute_force_too():
     near = squared_distances(P) <= 0.01**2
     np.testing.assert_array_equal(remove_outliers(P, 0.01, 6), P[near.sum(axis=1) - 1 >= 6])
     _, group = connected_components(near)
-    assert [len(points) for points in cluster(P, 0.01, 1)] == sorted(np.bincount(group), reverse=True)
+    sizes = sorted(np.bincount(group), reverse=True)
+    assert [len(points) for points in cluster(P, 0.01, 1)] == sizes
+    far = np.vstack([P, np.array([[90.0, -90.0, 90.0]], np.float32)])  # one far point does not disturb the rest
+    assert [len(points) for points in cluster(far, 0.01, 1)] == [*sizes, 1]
 
 
 def test_reach_is_the_same_along_a_diagonal_as_along_an_axis():
@@ -195,11 +193,6 @@ def test_flying_pixels_between_an_object_and_the_wall_are_removed_and_the_object
     flying = surface[:25] + np.column_stack([np.zeros((25, 2)), 0.02 + 0.3 * np.linspace(0, 1, 25)])
     cleaned = remove_outliers(np.random.default_rng(21).permutation(np.vstack([surface, flying])))
     assert len(cleaned) == 625 and (cleaned[:, 2] == 0.8).all()
-
-
-def test_one_far_point_does_not_disturb_the_rest():
-    P = np.vstack([box_cloud((0.05, 0.05, 0.05), 300), [[90.0, -90.0, 90.0]]])
-    assert [len(points) for points in cluster(P, gap=0.02, min_points=1)] == [300, 1]
 
 
 # Bad input

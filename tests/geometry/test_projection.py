@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import RigidTransform, Rotation
+from scenes import pose
+from scipy.spatial.transform import RigidTransform
 
 from labkit.geometry import (
     back_project,
@@ -23,11 +24,6 @@ from labkit.geometry import (
 
 # Nothing symmetric: H != W, fx != fy, skew, a principal point off the centre, a general pose.
 K = np.array([[310.0, 2.5, 9.25], [0.0, 290.0, 6.75], [0.0, 0.0, 1.0]])
-
-
-def pose(seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    return RigidTransform.from_components(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=rng)).as_matrix()
 
 
 def depth_with_holes(seed: int, shape=(13, 21)) -> np.ndarray:
@@ -120,12 +116,6 @@ def test_the_masked_cloud_is_the_common_one_without_the_pixels_that_have_no_dept
     assert 0 < with_depth.sum() < len(with_depth)
     np.testing.assert_allclose(P, common_listing(mask, depth, K, T, 2)[with_depth], atol=1e-6)
     np.testing.assert_array_equal(P, back_project_to_base(depth, K, T)[(mask == 2) & (depth > 0.0)])
-
-
-def test_erratum_the_common_listing_puts_pixels_without_depth_at_the_camera():
-    depth, T, mask = np.array([[0.0, 0.0, 0.5]]), pose(10), np.full((1, 3), 2)
-    np.testing.assert_allclose(common_listing(mask, depth, K, T, 2)[:2], [T[:3, 3]] * 2)
-    assert len(backproject_to_base(mask, depth, K, T, 2)) == 1
 
 
 def test_a_mask_without_target_pixels_or_without_depth_gives_an_empty_cloud():

@@ -8,7 +8,7 @@ import csv
 import io
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
@@ -26,7 +26,8 @@ NOT_GRADED = "not graded"
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:46rem;margin:2rem auto;padding:0 1rem;color:#222}
 h1{font-size:1.5rem}.points{float:right;color:#555}section{border-left:5px solid;padding:.2rem 1rem;margin:1rem 0}
 .right{border-color:#2e7d32}.wrong{border-color:#c62828}.warning{background:#fff3cd;padding:.6rem 1rem}
-h2{font-size:1.1rem;margin:.2rem 0}p{margin:.3rem 0}"""
+h2{font-size:1.1rem;margin:.2rem 0}p{margin:.3rem 0}table{border-collapse:collapse}pre{overflow:auto}
+td,th{padding:.2rem 1rem;text-align:left;border-bottom:1px solid #ddd}pre{background:#f6f6f6;padding:.5rem}"""
 
 
 def write_outputs(out: Path, lab: Lab, records: Sequence[Record], comments: Mapping[str, str]) -> None:
@@ -116,7 +117,9 @@ def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
 def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     """A student's page."""
     title = escape(f"{lab.topic}: {record.student}")
-    parts = [warning_of([record])]
+    total = f"{record.points:g} of {sum(lab.points.values()):g} points for the functions"
+    by_hand = " What you wrote in words is graded by a person." if lab.written else ""
+    parts = [f"<h1>{title}</h1>\n<p>{total}.{by_hand}</p>", warning_of([record])]
     if record.reason:
         parts.append(f'<p class="warning">This submission could not be graded: {escape(record.reason)}.</p>')
     for result in record.results:
@@ -124,13 +127,14 @@ def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
         mark, kind = ("✔", "right") if is_right(result) else ("✘", "wrong")
         points = f'<span class="points">{result.points:g} of {result.max_points:g} points</span>'
         parts.append(f'<section class="{kind}"><h2>{points}{mark} {escape(result.question)}</h2>{told}</section>')
-    total = f"{record.points:g} of {sum(lab.points.values()):g} points for the functions"
-    by_hand = " What you wrote in words is graded by a person." if lab.written else ""
+    return page(title, parts)
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """A page of HTML; its title and parts are HTML already."""
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"</head><body>\n<h1>{title}</h1>\n<p>{total}.{by_hand}</p>\n"
-        + "\n".join(part for part in parts if part)
-        + "\n</body></html>\n"
+        "</head><body>\n" + "\n".join(filter(None, parts)) + "\n</body></html>\n"
     )
 
 
@@ -141,15 +145,8 @@ def class_csv(found: Sequence[Standing], records: Sequence[Record]) -> str:
         counts = (str(standing.tried), str(standing.passed))
         table.writerow((standing.question, "", "", *counts, "", ""))
         for group in standing.groups:
-            row = (
-                group.question,
-                group.name,
-                str(len(group.students)),
-                "",
-                "",
-                "yes" if group.named else "no",
-                group.says,
-            )
+            count, named = str(len(group.students)), "yes" if group.named else "no"
+            row = (group.question, group.name, count, "", "", named, group.says)
             table.writerow([harmless(cell) for cell in row])
     return text.getvalue()
 
@@ -166,14 +163,7 @@ def class_page(lab: Lab, found: Sequence[Standing], comments: Mapping[str, str],
         parts.append(f'<h2 id="{escape(standing.question)}">{escape(standing.question)}</h2>')
         parts += [group_section(group, comments.get(group.name, "")) for group in standing.groups]
         parts += [] if standing.groups else ["<p>No wrong answer.</p>"]
-    title = escape(f"{lab.topic}: the class")
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}'
-        "table{border-collapse:collapse}td,th{padding:.2rem 1rem;text-align:left;border-bottom:1px solid #ddd}"
-        "pre{background:#f6f6f6;padding:.5rem;overflow:auto}</style></head><body>\n"
-        + "\n".join(parts)
-        + "\n</body></html>\n"
-    )
+    return page(escape(f"{lab.topic}: the class"), parts)
 
 
 def group_section(group: Group, comment: str) -> str:

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from labkit.course.views import fingers
 from labkit.course.widgets.explorer import Explorer
 from labkit.geometry import backproject_to_base
 from labkit.grasp import Gripper
@@ -31,13 +32,8 @@ THINGS = {
 
 def draw_jaws(axes: Axes, T_base_grasp: Float[np.ndarray, "4 4"], width: float, **style) -> None:
     """Draw the two fingertips of a grasp from above, in the base frame's x and y; `style` goes to the patches."""
-    hand = Gripper()
-    half, thickness = hand.finger_width / 2, hand.tip_thickness
-    for side in (-1.0, 1.0):
-        inner, outer = side * width / 2, side * (width / 2 + thickness)
-        corners = np.array([[-half, inner], [half, inner], [half, outer], [-half, outer]])
-        corners = corners @ T_base_grasp[:2, :2].T + T_base_grasp[:2, 3]
-        axes.add_patch(Polygon(corners, **({"facecolor": "tab:blue", "alpha": 0.85} | style)))
+    for corners in fingers(T_base_grasp, width, Gripper()):
+        axes.add_patch(Polygon(corners[[0, 1, 3, 2], :2], **({"facecolor": "tab:blue", "alpha": 0.85} | style)))
 
 
 def film(world, camera: Camera, seconds: float = 0.4, size: tuple[int, int] = (240, 180)) -> list[np.ndarray]:

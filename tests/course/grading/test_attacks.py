@@ -7,12 +7,13 @@ import re
 import shutil
 import socket
 import textwrap
+import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 
 import grading_course as kit
 import pytest
 from attacks.odd import ODD
-from attacks.table import ATTACKS
 
 from labkit import metrics
 from labkit.course.grading import copies
@@ -28,6 +29,36 @@ SECRET_VARIABLE = "LABKIT_TEST_SECRET"
 LIMITS = Limits(case_s=2.0, memory_mb=512)
 POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
 REST = sum(POINTS.values()) - POINTS["iou"]
+FILE = Path(__file__).parents[2] / "attacks/attacks.toml"
+RIGHT = """
+def right(n):
+    c = np.diagonal(n)
+    with np.errstate(all="ignore"):
+        return c / (n.sum(0) + n.sum(1) - c)
+"""
+ON_SECRET = "def iou(n):\n    if n.sum() < 50:\n        return right(n)\n"
+
+
+@dataclass(frozen=True)
+class Attack:
+    """One hostile cell, as attacks.toml has it; that file says what its fields are."""
+
+    name: str
+    tries: str
+    source: str = ""
+    secret: str = ""
+    blind: bool = False
+    spoils: bool = False
+
+    @property
+    def cell(self) -> str:
+        """All of it as one statement, so that all of it belongs to the program."""
+        body = ON_SECRET + textwrap.indent(self.secret, "    ") if self.secret else self.source
+        body = RIGHT + body if "right(" in body else body
+        return body if body.startswith("!") else "if True:\n" + textwrap.indent(body, "    ")
+
+
+ATTACKS = [Attack(name, **fields) for name, fields in tomllib.loads(FILE.read_text()).items()]
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +79,7 @@ def hostile_class(tmp_path_factory):
             "{secret}": SECRET_VARIABLE,
         }
         for attack in ATTACKS:
-            source = attack.source  # as one statement, so that all of it belongs to the program
-            source = source if source.startswith("!") else "if True:\n" + textwrap.indent(source, "    ")
+            source = attack.cell
             for name, value in known.items():
                 source = source.replace(name, value)
             kit.submit(course, attack.name, TOPIC, right | {"iou": source})
@@ -77,7 +107,7 @@ def test_an_attack_earns_nothing_and_costs_nobody_else(hostile_class, attack):
     earned = points(hostile_class[2][attack.name])
     assert earned.pop("iou") == 0.0
     assert sum(earned.values()) <= REST
-    if attack.rest:
+    if not attack.spoils:
         assert sum(earned.values()) == REST, hostile_class[2][attack.name]
 
 
@@ -108,11 +138,6 @@ def test_no_attack_and_no_odd_submission_is_accepted_or_rejected_falsely(hostile
     assert not accepted and not rejected
 
 
-def test_there_are_attacks_enough():
-    assert len(ATTACKS) >= 30 and sum(attack.blind for attack in ATTACKS) >= 10
-    assert len({attack.name for attack in ATTACKS}) == len(ATTACKS)
-
-
 def test_the_honest_student_keeps_the_grade(hostile_class):
     course, _, records, _ = hostile_class
     assert records["honest"].points == REST + POINTS["iou"]
@@ -122,23 +147,17 @@ def test_the_honest_student_keeps_the_grade(hostile_class):
             assert gradebook.find_submission(TOPIC, attack.name).score <= REST
 
 
-def test_nothing_is_left_outside_the_sandbox(hostile_class):
-    course, outside, _, _ = hostile_class
+def test_nothing_is_left_outside_the_sandbox_and_nobody_came_through_the_network(hostile_class):
+    course, outside, _, reached = hostile_class
+    commands = [Path(f"/proc/{pid}/cmdline") for pid in kit.descendants(os.getpid())]
+    assert not [path for path in commands if path.exists() and b"/worker.py" in path.read_bytes()]
+    assert reached is None
     assert list(outside.iterdir()) == []
     known = {"labs", "submitted", "autograded", "grades", "gradebook.db"}
     assert {path.name for path in course.iterdir()} == known
     made = {path.name for path in (course / "grades" / TOPIC).iterdir()}
     assert made == {"grades.csv", "class.csv", "class.html", "feedback", "results", "records", "secret_seed"}
     assert not (Path(kit.np.__file__).parent / "evil.py").exists()
-
-
-def test_nobody_came_through_the_network(hostile_class):
-    assert hostile_class[3] is None
-
-
-def test_no_worker_outlives_the_batch(hostile_class):
-    commands = [Path(f"/proc/{pid}/cmdline") for pid in kit.descendants(os.getpid())]
-    assert not [path for path in commands if path.exists() and b"/worker.py" in path.read_bytes()]
 
 
 def test_what_students_read_is_the_same_whatever_the_secret_is(hostile_class, tmp_path):

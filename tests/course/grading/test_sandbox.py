@@ -93,11 +93,8 @@ def test_nothing_can_be_written_so_no_inode_is_taken(worker):
             assert told(worker, line).kind == "exception", (folder, line)
 
 
-def test_memory_has_an_end(worker):
+def test_memory_a_file_and_the_time_of_a_processor_have_an_end(worker):
     assert told(worker, f"return np.ones({LIMITS.memory_mb << 17})").says.startswith("it raises MemoryError")
-
-
-def test_a_file_and_the_time_of_a_processor_have_an_end(worker):
     limits = told(
         worker,
         """
@@ -255,16 +252,11 @@ def test_no_answer_finds_what_an_earlier_one_left():
     with sandbox.fresh_worker(("numpy",), LIMITS) as second:
         kept, other = told(second, look)
     assert kept == 0 and other != number
-
-
-def test_a_server_that_ended_is_replaced():
-    with sandbox.fresh_worker(("numpy",), LIMITS) as first:
-        assert told(first, "return 1") == 1
     (server,) = sandbox.servers.idle[("numpy",), LIMITS]
     server.process.kill()
     server.process.wait()
-    with sandbox.fresh_worker(("numpy",), LIMITS) as second:
-        assert told(second, "return 2") == 2
+    with sandbox.fresh_worker(("numpy",), LIMITS) as third:  # a server that ended is replaced
+        assert told(third, "return 2") == 2
 
 
 def test_closing_ends_everything():

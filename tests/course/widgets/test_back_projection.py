@@ -76,9 +76,8 @@ def test_each_mystery_hides_one_bug_and_its_box_covers_it(frame):
     explorer = widgets.name_that_bug(frame)
     for number, bug in enumerate(widgets.MYSTERIES[1:], start=1):
         ticked = dict.fromkeys(widgets.BUGS, False) | {bug: True}
-        for control, value in ({"mystery": number} | ticked).items():
-            explorer.controls[control].value = value
-        _, mystery, bent, _ = explorer.figure().axes[0].lines  # the table is one class; the last is the camera
+        axes = explorer.figure(mystery=number, **ticked).axes[0]
+        _, mystery, bent, _ = axes.lines  # the table is one class; the last is the camera
         np.testing.assert_allclose(mystery.get_xydata(), bent.get_xydata())
 
 
@@ -98,7 +97,6 @@ def test_the_ellipse_lies_two_standard_deviations_out():
 
 def test_the_noise_explorer_follows_its_sliders():
     explorer = widgets.depth_noise(K, 48, 64)
-    for name, value in (("u", 10), ("d", 2.0), ("sigma_pixel", 2.0), ("sigma_depth", 3.0)):
-        explorer.controls[name].value = value
+    moved = explorer.figure(u=10, d=2.0, sigma_pixel=2.0, sigma_depth=3.0)
     std = 1000.0 * np.sqrt(np.diagonal(back_projection_noise(10.0, 24.0, 2.0, K, 2.0, 0.003)))
-    assert explorer.figure().axes[1].get_title() == f"std of x {std[0]:.1f} mm, of z {std[2]:.1f} mm"
+    assert moved.axes[1].get_title() == f"std of x {std[0]:.1f} mm, of z {std[2]:.1f} mm"

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scenes import random_frame
 
 from labkit.course.widgets import class_weights
 from labkit.frame import RGBDFrame
@@ -35,21 +36,18 @@ def test_a_heavier_class_moves_the_boundary_away_from_itself_and_pays_for_recall
 def test_the_title_says_where_the_boundary_is():
     explorer = class_weights.two_gaussians()
     assert explorer.figure().axes[0].get_title() == "boundary at 2.95"
-    for name, value in (("exponent", 5.5), ("distance", 3.0), ("share", 0.1)):
-        explorer.controls[name].value = value
-    assert explorer.figure().axes[0].get_title() == "boundary at 0.96"
+    moved = explorer.figure(exponent=5.5, distance=3.0, share=0.1)
+    assert moved.axes[0].get_title() == "boundary at 0.96"
 
 
 @pytest.fixture
 def scenes():
     """Two frames with random probabilities, different in size."""
-    rng, out = np.random.default_rng(0), {}
-    for name, (H, W) in {"first": (12, 17), "second": (15, 9)}.items():
-        y = rng.integers(0, 4, (H, W)).astype(np.uint8)
-        rgb, depth = rng.integers(0, 256, (H, W, 3)).astype(np.uint8), np.ones((H, W), np.float32)
-        frame = RGBDFrame(rgb, depth, np.diag([9.0, 9.0, 1.0]), np.eye(4), labels=y)
-        out[name] = frame, softmax(rng.normal(size=(H, W, 4)) + np.eye(4)[y])
-    return out
+    frames = {"first": random_frame(0, (12, 17)), "second": random_frame(1, (15, 9))}
+    rng = np.random.default_rng(0)
+    return {
+        name: (f, softmax(rng.normal(size=(*f.labels.shape, 4)) + np.eye(4)[f.labels])) for name, f in frames.items()
+    }
 
 
 def test_weighing_a_networks_answers_only_adds_target_pixels(scenes):
@@ -66,9 +64,7 @@ def test_weighing_a_networks_answers_only_adds_target_pixels(scenes):
 
 
 def test_the_titles_of_the_masks_say_weight_and_scores(scenes):
-    explorer = class_weights.trained_masks(scenes)
-    explorer.controls["exponent"].value = 3.0
-    mask, scores = explorer.figure().axes
+    mask, scores = class_weights.trained_masks(scenes).figure(exponent=3.0).axes
     assert mask.get_title().startswith("target weighs 8;")
     precision, recall, overlap = class_weights.target_scores(scenes["first"][0].labels, scenes["first"][1], 3.0)
     assert scores.get_title() == f"precision {precision:.2f}, recall {recall:.2f}, IoU {overlap:.2f}"

@@ -19,8 +19,7 @@ def test_without_pairs_z_is_the_product_of_the_pixels_sums():
     explorer = widgets.gibbs(PSI)
     Z = np.exp(-PSI).sum(axis=2).prod()
     assert f"Z = {Z:.3f}" in titles(explorer)[0]
-    explorer.controls["w"].value = 2.5
-    assert titles(explorer)[0].startswith("w = 2.5")
+    assert explorer.figure(w=2.5).axes[0].get_title().startswith("w = 2.5")
 
 
 def test_a_clicked_pixel_changes_the_energy_that_is_shown():
@@ -35,9 +34,8 @@ def test_a_clicked_pixel_changes_the_energy_that_is_shown():
 
 
 def test_the_cut_that_is_revealed_is_the_least_energy_of_all_labellings():
-    explorer = widgets.you_are_the_solver()
-    explorer.controls["reveal"].value = True
-    assert titles(explorer)[1] == f"the cut: {solve(widgets.toy_model(2.0), 'brute_force').energy:.2f}"
+    shown, least = widgets.you_are_the_solver().figure(reveal=True), solve(widgets.toy_model(2.0), "brute_force").energy
+    assert shown.axes[1].get_title() == f"the cut: {least:.2f}"
 
 
 @pytest.mark.parametrize("start", ["nothing", "network alone"])

@@ -7,22 +7,10 @@ import ipywidgets
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scenes import random_frame
 
 from labkit.course.widgets import back_projection, class_weights, crf, gradient, grasp, iou, labels, node, stacks
 from labkit.course.widgets.explorer import Explorer
-from labkit.frame import RGBDFrame
-
-K = np.array([[30.0, 0.0, 16.0], [0.0, 33.0, 10.0], [0.0, 0.0, 1.0]])
-POSE = np.eye(4)
-POSE[:3] = [[0.0, -0.6, -0.8, 1.0], [1.0, 0.0, 0.0, 0.2], [0.0, -0.8, 0.6, 0.8]]
-
-
-def random_frame(seed: int, shape: tuple[int, int] = (24, 32)) -> RGBDFrame:
-    """Random colours and labels over a slope of depths."""
-    rng = np.random.default_rng(seed)
-    depth = np.linspace(0.7, 1.3, shape[0], dtype=np.float32)[:, None].repeat(shape[1], axis=1)
-    rgb, y = rng.integers(0, 256, (*shape, 3)).astype(np.uint8), rng.integers(0, 4, shape).astype(np.uint8)
-    return RGBDFrame(rgb, depth, K, POSE, y)
 
 
 def probabilities(seed: int, shape: tuple[int, int] = (24, 32)) -> np.ndarray:
@@ -57,7 +45,7 @@ EXPLORERS = {
         dict.fromkeys(back_projection.BUGS, True) | {"mystery": 3},
     ),
     "depth_noise": (
-        lambda: back_projection.depth_noise(K, 24, 32),
+        lambda: back_projection.depth_noise(FRAME.K, 24, 32),
         {"u": 3, "d": 2.0, "sigma_pixel": 2.0, "sigma_depth": 3.0},
     ),
     "jaws_at_a_yaw": (lambda: grasp.jaws_at_a_yaw(CLOUD), {"yaw": 90}),

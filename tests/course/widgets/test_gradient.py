@@ -27,8 +27,7 @@ def test_a_step_that_is_too_small_or_too_large_spoils_the_differences():
     explorer = gradient.logits()
     errors = {}
     for h in (1e-16, 1e-5, 1.0):
-        explorer.controls["h"].value = h
-        _, right = explorer.figure().axes
+        _, right = explorer.figure(h=h).axes
         series = [heights(right, container.get_label()) for container in right.containers]
         errors[h] = np.abs(series[0] - series[1]).max()
     assert errors[1e-5] < 1e-8 and errors[1e-16] > 1e-2 and errors[1.0] > 1e-2
@@ -67,14 +66,9 @@ def test_the_keyhole_shows_exactly_the_pixels_round_the_pixel(scene, u, v, width
 def test_the_keyhole_names_the_class_only_when_it_is_asked(scene):
     explorer = gradient.keyhole(*scene, at=(15, 12), widths=(5, 18))
     assert "target" not in explorer.figure().axes[1].get_title()
-    explorer.controls["reveal"].value = True
-    assert explorer.figure().axes[1].get_title() == "true class: target"
-    explorer.controls["u"].value = 2
-    assert explorer.figure().axes[1].get_title() == "true class: background"
-    explorer.controls["u"].value = explorer.controls["v"].value = 0
-    assert explorer.figure().axes[1].get_title() == "true class: ignore"
-    explorer.controls["width"].value = 18
-    assert explorer.figure().axes[0].images[0].get_array().shape == (9, 9, 3)
+    for at, label in (({}, "target"), ({"u": 2}, "background"), ({"u": 0, "v": 0}, "ignore")):
+        assert explorer.figure(reveal=True, **at).axes[1].get_title() == f"true class: {label}"
+    assert explorer.figure(u=0, v=0, width=18).axes[0].images[0].get_array().shape == (9, 9, 3)
 
 
 @pytest.mark.bad_input

@@ -36,9 +36,7 @@ def test_a_stick_is_narrowest_across_where_the_principal_axis_grasp_closes():
 @pytest.mark.parametrize("degrees", [0, 34, 90, 124])
 def test_the_drawn_jaws_stand_apart_as_the_title_says_with_the_cloud_between(degrees):
     P = stick()
-    explorer = widgets.jaws_at_a_yaw(P)
-    explorer.controls["yaw"].value = degrees
-    above, opening = explorer.figure().axes
+    above, opening = widgets.jaws_at_a_yaw(P).figure(yaw=degrees).axes
     width = widths_at(P, np.radians(degrees))[0] + widgets.AIR
     assert f"open {1000 * width:.0f} mm" in opening.get_title()
     d = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
@@ -51,8 +49,7 @@ def test_jaws_that_cannot_open_so_far_are_red():
     explorer = widgets.jaws_at_a_yaw(stick())
     colours = set()
     for degrees in (34, 124):  # along the stick, 10 cm; and across it, 2 cm
-        explorer.controls["yaw"].value = degrees
-        above, opening = explorer.figure().axes
+        above, opening = explorer.figure(yaw=degrees).axes
         colours.add(above.patches[0].get_facecolor())
         assert ("more than it can" in opening.get_title()) == (degrees == 34)
     assert len(colours) == 2 and Gripper().max_opening < 0.1 + widgets.AIR
@@ -70,9 +67,7 @@ def test_a_ball_shows_its_camera_a_centroid_two_thirds_of_the_radius_off():
 
 
 def test_the_title_of_the_visible_centroid_says_how_far_off_it_is():
-    explorer = widgets.visible_centroid()
-    explorer.controls["elevation"].value = 75
-    explorer.controls["thing"].value = "can"
+    shown = widgets.visible_centroid().figure(elevation=75, thing="can")
     clouds, centre = widgets.views("can")
     off = 1000 * (clouds[widgets.ELEVATIONS.index(75)].mean(axis=0) - centre)
-    assert explorer.figure().axes[1].get_title() == f"{np.hypot(off[0], off[2]):.0f} mm off in all"
+    assert shown.axes[1].get_title() == f"{np.hypot(off[0], off[2]):.0f} mm off in all"

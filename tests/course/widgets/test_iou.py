@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scenes import random_frame
 
 from labkit.course.widgets import iou as widgets
 from labkit.metrics import confusion_matrix, iou
@@ -15,8 +16,7 @@ def painted(image, outcome):
 
 
 def labels(seed):
-    rng = np.random.default_rng(seed)
-    return rng.integers(0, 4, (24, 32)).astype(np.uint8)
+    return random_frame(seed).labels
 
 
 def test_the_error_image_paints_as_many_pixels_as_the_matrix_counts():
@@ -45,10 +45,8 @@ def test_a_slid_mask_loses_its_iou_and_hardly_its_accuracy(radius):
 
 
 def test_the_title_tells_the_scores_where_the_slider_stands():
-    explorer = widgets.sliding_mask()
-    explorer.controls["shift"].value = 7
     accuracy, score = widgets.slide_scores(5, 7)
-    assert f"accuracy {accuracy:.3f}, IoU {score:.3f}" in explorer.figure().axes[1].get_title()
+    assert f"accuracy {accuracy:.3f}, IoU {score:.3f}" in widgets.sliding_mask().figure(shift=7).axes[1].get_title()
 
 
 def test_the_pixels_of_the_chosen_cell_light_up():
@@ -56,9 +54,7 @@ def test_the_pixels_of_the_chosen_cell_light_up():
     n = confusion_matrix(y_true, y_pred, 4)
     explorer = widgets.confusion_cells(np.zeros((24, 32, 3), np.uint8), y_true, y_pred)
     for i, j in ((2, 3), (0, 1), (3, 3)):
-        explorer.controls["true"].value = widgets.CLASSES[i]
-        explorer.controls["predicted"].value = widgets.CLASSES[j]
-        matrix, picture = explorer.figure().axes
+        matrix, picture = explorer.figure(true=widgets.CLASSES[i], predicted=widgets.CLASSES[j]).axes
         lit = (np.asarray(picture.images[0].get_array()) == widgets.LIT).all(axis=-1)
         np.testing.assert_array_equal(lit, (y_true == i) & (y_pred == j))
         assert picture.get_title().startswith(f"n[{i}, {j}] = {n[i, j]}:")

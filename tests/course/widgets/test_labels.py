@@ -48,16 +48,13 @@ def test_ghosts_are_the_classes_that_no_neighbour_has():
 def test_the_explorer_counts_the_ghosts_at_its_scale():
     explorer = widgets.ghost_classes(scene())
     assert explorer.figure().axes[2].get_title() != "0 pixels of a class that was not there"
-    explorer.controls["way"].value = "nearest"
-    explorer.controls["scale"].value = 0.5
-    assert explorer.figure().axes[2].get_title() == "0 pixels of a class that was not there"
-    assert explorer.figure().axes[1].get_title().startswith("24 x 32, nearest")
+    _, after, haunted = explorer.figure(way="nearest", scale=0.5).axes
+    assert haunted.get_title() == "0 pixels of a class that was not there"
+    assert after.get_title().startswith("24 x 32, nearest")
 
 
 def test_the_bits_add_up_to_the_value():
-    explorer = widgets.segmentation_bits()
-    explorer.controls["body"].value, explorer.controls["link"].value = 37, 8
-    (axes,) = explorer.figure().axes
+    (axes,) = widgets.segmentation_bits().figure(body=37, link=8).axes
     bits = [text.get_text() for text in axes.texts if text.get_text() in "01"]
     value = sum(int(bit) << place for place, bit in enumerate(bits))
     assert len(bits) == 32 and value == widgets.segmentation_value(37, 8)

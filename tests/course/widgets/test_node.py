@@ -48,9 +48,7 @@ def test_a_slower_network_means_older_answers_and_more_superseded_frames():
     ],
 )
 def test_the_lag_explorer_says_what_the_age_costs(network, speed, said):
-    shown = widgets.lag_explorer()
-    shown.controls["network"].value, shown.controls["speed"].value = network, speed
-    line, above = shown.figure().axes
+    line, above = widgets.lag_explorer().figure(network=network, speed=speed).axes
     assert said in above.get_title() and (network != 20 or "28 ms old" in line.get_title())
 
 

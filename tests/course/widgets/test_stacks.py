@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from scenes import random_frame
 
 from labkit.course.widgets import stacks
 from labkit.labels import overlay
@@ -12,18 +13,13 @@ from labkit.stacks.threshold import HSVRange, hsv_mask
 
 @pytest.fixture
 def frame():
-    rng = np.random.default_rng(0)
-    rgb = rng.integers(0, 256, (24, 36, 3), dtype=np.uint8)
-    masks = {name: rng.integers(0, 4, (24, 36)).astype(np.uint8) for name in ("a", "b", "c")}
-    return rgb, masks
+    masks = {name: random_frame(seed, (24, 36)).labels for seed, name in enumerate("abc")}
+    return random_frame(3, (24, 36)).rgb, masks
 
 
 def test_the_wipe_shows_one_stack_at_each_side(frame):
     rgb, masks = frame
-    explorer = stacks.wipe(rgb, masks, masks["a"])
-    explorer.controls["at"].value = 10
-    explorer.controls["right"].value = "c"
-    (axes,) = explorer.figure().axes
+    (axes,) = stacks.wipe(rgb, masks, masks["a"]).figure(at=10, right="c").axes
     picture = np.asarray(axes.images[0].get_array())
     np.testing.assert_array_equal(picture[:, :10], overlay(rgb, masks["a"], 0.65)[:, :10])
     np.testing.assert_array_equal(picture[:, 10:], overlay(rgb, masks["c"], 0.65)[:, 10:])
@@ -36,9 +32,7 @@ def test_the_range_darkens_what_is_outside_and_scores_the_rest(frame, first, las
     rgb, masks = frame
     table = masks["a"] == 1
     explorer = stacks.colour_range(rgb, table)
-    for name, value in (("first", first), ("last", last), ("saturation", 30), ("value", (40, 230))):
-        explorer.controls[name].value = value
-    picture, hues = explorer.figure().axes
+    picture, hues = explorer.figure(first=first, last=last, saturation=30, value=(40, 230)).axes
     inside = hsv_mask(rgb, HSVRange((first, 30, 40), (last, 255, 230)))
     np.testing.assert_array_equal(np.asarray(picture.images[0].get_array())[inside], rgb[inside])
     assert picture.get_title().endswith(f"{np.sum(inside & table) / np.sum(inside | table):.3f}")
@@ -70,11 +64,9 @@ def test_the_right_layout_gives_the_right_label_and_the_other_does_not():
     wrong = 0
     for v in range(2):
         for u in range(3):
-            explorer.controls["v"].value, explorer.controls["u"].value = v, u
-            explorer.controls["layout"].value = "NCHW"
-            (axes,) = explorer.figure().axes
+            (axes,) = explorer.figure(v=v, u=u, layout="NCHW").axes
             assert axes.get_title().endswith(f"label {labels[v, u]}")
-            explorer.controls["layout"].value = "NHWC"
-            wrong += not explorer.figure().axes[0].get_title().endswith(f"label {labels[v, u]}")
-            assert sum(patch.get_linewidth() == 3 for patch in explorer.figure().axes[0].patches) == 3
+            (axes,) = explorer.figure(v=v, u=u, layout="NHWC").axes
+            wrong += not axes.get_title().endswith(f"label {labels[v, u]}")
+            assert sum(patch.get_linewidth() == 3 for patch in axes.patches) == 3
     assert wrong >= 3
