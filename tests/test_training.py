@@ -233,7 +233,7 @@ def test_a_run_learns_and_writes_what_it_says(name, own, tmp_path):
     history = train(data, val, config, tmp_path, progress=False, model=own and own())
     written = sorted(file.name for file in tmp_path.iterdir())
     assert written == [f"{name}.checkpoint.pt", f"{name}.history.json", f"{name}.pt"]
-    assert json.loads((tmp_path / f"{name}.history.json").read_text()) == history or own  # NaN is not equal to itself
+    assert str(json.loads((tmp_path / f"{name}.history.json").read_text())) == str(history)  # NaN != NaN
     assert [row["epoch"] for row in history] == list(range(1, 26)) and history[-1]["steps"] == 100
     assert [row["epoch"] for row in history if "mean_iou" in row] == [10, 20, 25]
     assert history[-1]["loss"] < 0.5 * history[0]["loss"]
@@ -316,23 +316,12 @@ def test_frames_and_tensors_are_datasets_too():
 # Bad input
 
 
-SETTINGS = {
-    "model": "../unet",
-    "epochs": 0,
-    "steps": 0,
-    "batch": 0,
-    "weight_decay": -0.1,
-    "warmup": 1.0,
-    "val_every": 0,
-}
-SETTINGS |= {"weights": "equal", "num_classes": 1, "seed": -1}
+OFF = {"model": "../unet", "weight_decay": -0.1, "warmup": 1.0, "weights": "equal", "num_classes": 1, "seed": -1}
+OFF |= dict.fromkeys(("epochs", "steps", "batch", "val_every", "lr"), 0)
 
 
 @pytest.mark.bad_input
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [*SETTINGS.items(), ("lr", 0.0), ("lr", float("nan")), ("crop", (2, 64)), ("crop", (64,))],
-)
+@pytest.mark.parametrize(("name", "value"), [*OFF.items(), ("lr", float("nan")), ("crop", (2, 64)), ("crop", (64,))])
 def test_settings_are_checked(name, value):
     with pytest.raises(ValueError, match=rf"^{name}: expected .* got"):
         TrainConfig(**{name: value})
