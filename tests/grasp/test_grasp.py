@@ -104,7 +104,6 @@ def test_gripper_has_the_measures_of_the_urdf_and_its_model_holds_the_whole_hand
     gripper, above_tips = Gripper(), finger[:, 2].max() - finger[:, 2]
     flat = finger[(abs(finger[:, 1]) < 2e-4) & (above_tips > 0.002)]
     measured = {
-        "max_opening": 2 * travel,
         "tips_below_grasp": finger[:, 2].max() - to_grasp[2],
         "finger_width": np.ptp(finger[:, 0]),
         "palm_above_tips": finger[:, 2].max() - hand[:, 2].max(),
@@ -118,6 +117,7 @@ def test_gripper_has_the_measures_of_the_urdf_and_its_model_holds_the_whole_hand
     low = finger[:, 2].max() - hand[:, 2] < gripper.body_above_tips
     assert (2 * abs(hand[:, 0]) <= np.where(low, gripper.palm_width, gripper.body_width) + 1e-4).all()
     assert gripper.palm_length >= 2 * abs(hand[:, 1]).max()
+    assert gripper.max_opening == pytest.approx(2 * travel, abs=1e-6)
 
 
 # What a good grasp is -----------------------------------------------------------------------------------------------
