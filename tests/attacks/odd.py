@@ -132,7 +132,11 @@ ODD = (
     Odd("pipe", in_its_place(FILE, lambda path, text: os.mkfifo(path)), "04_iou.ipynb is no file"),
     Odd("two_hundred_megabytes", in_its_place(FILE, sparse), "it is larger than 20 MB"),
     Odd("other_name", in_its_place("iou (1).ipynb", Path.write_text), "the folder 04_iou holds no 04_iou.ipynb"),
-    Odd("loose.ipynb", lambda folder, right: folder.parent.write_text(json.dumps(right)), "not in a student's folder"),
+    Odd(
+        "loose.ipynb",
+        lambda folder, right: folder.parent.write_text(json.dumps(right)),
+        "not in a student's folder; expected STUDENT/04_iou/04_iou.ipynb",
+    ),
     *(
         Odd(name, plain, "rename the student's folder")
         for name in (
