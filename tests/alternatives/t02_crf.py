@@ -3,15 +3,13 @@
 import numpy as np
 import torch
 
-# ---------- unary_from_probabilities
 
-
-def unary_torch(p, floor):
+def unary_from_probabilities__torch(p, floor):
     """Clamp, then take the logarithm, in torch."""
     return -torch.log(torch.clamp(torch.as_tensor(p), min=floor)).numpy()
 
 
-def unary_loops(p, floor):
+def unary_from_probabilities__loops(p, floor):
     """Probability by probability."""
     psi = np.zeros(p.shape)
     for index in np.ndindex(*p.shape):
@@ -19,17 +17,15 @@ def unary_loops(p, floor):
     return psi
 
 
-def unary_float32(p, floor):
+def unary_from_probabilities__float32(p, floor):
     """In single precision, and with the cost cut off instead of the probability."""
     return np.minimum(-np.log(np.maximum(p.astype(np.float32), 1e-30)), np.float32(-np.log(floor)))
 
 
-# ---------- pair_weights
-
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
-def weights_loops(image, lam, sigma_I, sigma_p):
+def pair_weights__loops(image, lam, sigma_I, sigma_p):
     """Pair by pair."""
     H, W, channels = image.shape
     w = np.zeros((4, H, W))
@@ -42,7 +38,7 @@ def weights_loops(image, lam, sigma_I, sigma_p):
     return w
 
 
-def weights_padded(image, lam, sigma_I, sigma_p):
+def pair_weights__padded(image, lam, sigma_I, sigma_p):
     """With a ring of pixels that are infinitely far from every colour."""
     far = np.pad(image / sigma_I, ((0, 1), (1, 1), (0, 0)), constant_values=np.inf)
     H, W, _ = image.shape
@@ -53,7 +49,7 @@ def weights_padded(image, lam, sigma_I, sigma_p):
     return np.array(w)
 
 
-def weights_torch(image, lam, sigma_I, sigma_p):
+def pair_weights__torch(image, lam, sigma_I, sigma_p):
     """In single precision."""
     x = torch.from_numpy(image.astype(np.float32))
     w = torch.zeros(4, *image.shape[:2])
@@ -70,10 +66,7 @@ def weights_torch(image, lam, sigma_I, sigma_p):
     return w.numpy()
 
 
-# ---------- energy
-
-
-def energy_loops(y, psi, weights):
+def energy__loops(y, psi, weights):
     """Pixel by pixel; each asks the neighbours whose pairs it owns."""
     total = 0.0
     for v, u in np.ndindex(*y.shape):
@@ -84,14 +77,14 @@ def energy_loops(y, psi, weights):
     return total
 
 
-def energy_einsum(y, psi, weights):
+def energy__einsum(y, psi, weights):
     """With one-hot labels: the product of two of them is 1 where they agree."""
     Y = np.eye(psi.shape[2])[y]
     near = np.stack([np.roll(Y, (-down, -right), (0, 1)) for down, right in STEPS])
     return (Y * psi).sum() + (weights * (1 - np.einsum("vuc,dvuc->dvu", Y, near))).sum()
 
 
-def energy_torch(y, psi, weights):
+def energy__torch(y, psi, weights):
     """In torch, with slices."""
     y, psi, w = torch.as_tensor(y.astype(np.int64)), torch.as_tensor(psi), torch.as_tensor(weights)
     total = psi.gather(2, y[..., None]).sum()
@@ -100,7 +93,7 @@ def energy_torch(y, psi, weights):
     return float(total)
 
 
-def energy_float32(y, psi, weights):
+def energy__float32(y, psi, weights):
     """In single precision."""
     unary = np.take_along_axis(psi.astype(np.float32), y[..., None].astype(int), axis=2).sum()
     labels = np.pad(y.astype(int), ((0, 1), (1, 1)), constant_values=-1)
@@ -109,10 +102,7 @@ def energy_float32(y, psi, weights):
     return unary + (weights.astype(np.float32) * (near != y)).sum()
 
 
-# ---------- icm_costs
-
-
-def icm_by_energies(y, psi, weights, v, u):
+def icm_costs__by_energies(y, psi, weights, v, u):
     """The whole energy with each class at the pixel, less what does not touch the pixel."""
     costs, rest = [], weights.copy()
     rest[:, v, u] = 0.0
@@ -122,11 +112,11 @@ def icm_by_energies(y, psi, weights, v, u):
     for c in range(psi.shape[2]):
         changed = y.copy()
         changed[v, u] = c
-        costs.append(energy_loops(changed, psi, weights))
-    return np.array(costs) - (energy_loops(y, psi, rest) - psi[v, u, y[v, u]])
+        costs.append(energy__loops(changed, psi, weights))
+    return np.array(costs) - (energy__loops(y, psi, rest) - psi[v, u, y[v, u]])
 
 
-def icm_loop(y, psi, weights, v, u):
+def icm_costs__loop(y, psi, weights, v, u):
     """Every pixel asked whether it is a neighbour, in single precision."""
     costs = psi[v, u].astype(np.float32)
     for b, a in np.ndindex(*y.shape):
@@ -139,7 +129,7 @@ def icm_loop(y, psi, weights, v, u):
     return costs
 
 
-def icm_padded(y, psi, weights, v, u):
+def icm_costs__padded(y, psi, weights, v, u):
     """With a ring of pixels around the image that cost nothing."""
     Y, w = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0))), np.pad(weights, ((0, 0), (1, 1), (1, 1)))
     v, u, costs = v + 1, u + 1, psi[v, u].copy()
@@ -149,16 +139,13 @@ def icm_padded(y, psi, weights, v, u):
     return torch.from_numpy(costs).numpy()
 
 
-# ---------- terminal_capacities
-
-
-def capacities_by_difference(psi):
+def terminal_capacities__by_difference(psi):
     """Only the difference of a pixel's two costs matters to a cut."""
     difference = psi[..., 1] - psi[..., 0]
     return np.maximum(difference, 0), np.maximum(-difference, 0), np.minimum(psi[..., 0], psi[..., 1]).sum()
 
 
-def capacities_loops(psi):
+def terminal_capacities__loops(psi):
     """Pixel by pixel, in single precision."""
     H, W, _ = psi.shape
     source, sink, constant = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32), 0.0
@@ -170,7 +157,7 @@ def capacities_loops(psi):
     return source, sink, constant
 
 
-def capacities_torch(psi):
+def terminal_capacities__torch(psi):
     """In torch."""
     psi = torch.as_tensor(psi)
     lowest = psi.amin(dim=2, keepdim=True)
@@ -178,10 +165,7 @@ def capacities_torch(psi):
     return excess[..., 1].numpy(), excess[..., 0].numpy(), float(lowest.sum())
 
 
-# ---------- row_labels
-
-
-def labels_enumerated(psi, w):
+def row_labels__enumerated(psi, w):
     """All C^n labellings of the row."""
     n, C = psi.shape
     y = np.indices((C,) * n, dtype=np.int8).reshape(n, -1)
@@ -189,7 +173,7 @@ def labels_enumerated(psi, w):
     return y[:, costs.argmin()]
 
 
-def labels_by_min_marginals(psi, w):
+def row_labels__by_min_marginals(psi, w):
     """Both walks, from the left and from the right: what each class at each pixel costs at least."""
 
     def forward(psi, w):
@@ -201,7 +185,7 @@ def labels_by_min_marginals(psi, w):
     return (forward(psi, w) + forward(psi[::-1], w[::-1])[::-1] - psi).argmin(axis=1)
 
 
-def labels_carried_along(psi, w):
+def row_labels__carried_along(psi, w):
     """The cheapest labels up to each pixel, one list per class."""
     ways = [(cost, [c]) for c, cost in enumerate(psi[0])]
     for costs, weight in zip(psi[1:], w, strict=True):
@@ -209,13 +193,3 @@ def labels_carried_along(psi, w):
             min((cost + weight * (way[-1] != c) + costs[c], [*way, c]) for cost, way in ways) for c in range(len(costs))
         ]
     return np.array(min(ways)[1])
-
-
-ALTERNATIVES = {
-    "unary_from_probabilities": (unary_torch, unary_loops, unary_float32),
-    "pair_weights": (weights_loops, weights_padded, weights_torch),
-    "energy": (energy_loops, energy_einsum, energy_torch, energy_float32),
-    "icm_costs": (icm_by_energies, icm_loop, icm_padded),
-    "terminal_capacities": (capacities_by_difference, capacities_loops, capacities_torch),
-    "row_labels": (labels_enumerated, labels_by_min_marginals, labels_carried_along),
-}

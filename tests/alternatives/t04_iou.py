@@ -5,10 +5,8 @@ import numpy as np
 from labkit.course.questions.t04_iou import iou_of
 from labkit.course.questions.t04_iou.confusion_matrix import counted_pairs, pair_count
 
-# ---------- confusion_matrix
 
-
-def confusion_loops(y_true, y_pred, num_classes, ignore):
+def confusion_matrix__loops(y_true, y_pred, num_classes, ignore):
     n = np.zeros((num_classes, num_classes), np.int64)
     for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
         if i != ignore:
@@ -16,27 +14,24 @@ def confusion_loops(y_true, y_pred, num_classes, ignore):
     return n
 
 
-def confusion_bincount(y_true, y_pred, num_classes, ignore):
+def confusion_matrix__bincount(y_true, y_pred, num_classes, ignore):
     return pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)
 
 
-def confusion_one_hot(y_true, y_pred, num_classes, ignore):
+def confusion_matrix__one_hot(y_true, y_pred, num_classes, ignore):
     rows, columns = counted_pairs(y_true, y_pred, ignore)
     Y = np.eye(num_classes, dtype=np.float32)
     return np.einsum("pi,pj->ij", Y[rows], Y[columns]).astype(np.int64)
 
 
-def confusion_torch(y_true, y_pred, num_classes, ignore):
+def confusion_matrix__torch(y_true, y_pred, num_classes, ignore):
     import torch
 
     rows, columns = (torch.from_numpy(y) for y in counted_pairs(y_true, y_pred, ignore))
     return torch.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, -1).numpy()
 
 
-# ---------- iou
-
-
-def iou_loops(n):
+def iou__loops(n):
     scores = []
     for c in range(len(n)):
         false_positive = sum(int(n[i, c]) for i in range(len(n)) if i != c)
@@ -46,27 +41,24 @@ def iou_loops(n):
     return np.array(scores)
 
 
-def iou_einsum(n):
+def iou__einsum(n):
     correct = np.einsum("ii->i", n)
     union = np.einsum("ij->j", n) + np.einsum("ij->i", n) - correct
     return np.divide(correct, union, out=np.full(len(n), np.nan), where=union > 0)
 
 
-def iou_torch(n):
+def iou__torch(n):
     import torch
 
     n = torch.as_tensor(n, dtype=torch.float32)
     return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).numpy()
 
 
-def iou_float32(n):
+def iou__float32(n):
     return iou_of(n.astype(np.float32)).astype(np.float32)
 
 
-# ---------- mean_iou
-
-
-def mean_iou_loops(n_frames):
+def mean_iou__loops(n_frames):
     C, scores = n_frames.shape[1], []
     for c in range(C):
         union = intersection = 0
@@ -78,23 +70,20 @@ def mean_iou_loops(n_frames):
     return sum(scores) / len(scores)
 
 
-def mean_iou_einsum(n_frames):
+def mean_iou__einsum(n_frames):
     correct = np.einsum("fii->i", n_frames)
     union = np.einsum("fij->i", n_frames) + np.einsum("fij->j", n_frames) - correct
     return (correct[union > 0] / union[union > 0]).mean()
 
 
-def mean_iou_torch(n_frames):
+def mean_iou__torch(n_frames):
     import torch
 
     n = torch.as_tensor(n_frames).sum(0).to(torch.float32)
     return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).nanmean().item()
 
 
-# ---------- merge_classes
-
-
-def merged_loops(n, group):
+def merge_classes__loops(n, group):
     G = max(group.tolist()) + 1
     merged = np.zeros((G, G), np.int64)
     for i in range(len(group)):
@@ -103,27 +92,24 @@ def merged_loops(n, group):
     return merged
 
 
-def merged_add_at(n, group):
+def merge_classes__add_at(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     np.add.at(merged, (group[:, None], group[None, :]), n)
     return merged
 
 
-def merged_blocks(n, group):
+def merge_classes__blocks(n, group):
     classes = [np.flatnonzero(group == g) for g in np.unique(group)]
     return np.array([[n[np.ix_(rows, columns)].sum() for columns in classes] for rows in classes])
 
 
-def merged_bincount(n, group):
+def merge_classes__bincount(n, group):
     G = group.max() + 1
     pairs = G * group[:, None] + group
     return np.bincount(pairs.ravel(), weights=n.ravel(), minlength=G * G).reshape(G, G).astype(int)
 
 
-# ---------- trimap_band
-
-
-def trimap_loops(y, width):
+def trimap_band__loops(y, width):
     band = np.zeros(y.shape, bool)
     for v, u in np.argwhere(y != 255):
         window = y[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
@@ -131,7 +117,7 @@ def trimap_loops(y, width):
     return band
 
 
-def trimap_extremes(y, width):
+def trimap_band__extremes(y, width):
     low, high = y.astype(int), np.where(y == 255, -1, y.astype(int))
     for _ in range(width):
         for axis in (0, 1):
@@ -143,7 +129,7 @@ def trimap_extremes(y, width):
     return (low < high) & (y < 255)
 
 
-def trimap_one_class_at_a_time(y, width):
+def trimap_band__one_class_at_a_time(y, width):
     window = (2 * width + 1, 2 * width + 1)
     near = []
     for c in np.unique(y[y != 255]):
@@ -152,19 +138,10 @@ def trimap_one_class_at_a_time(y, width):
     return (np.sum(near, axis=0) > 1) * (y != 255)
 
 
-def trimap_torch(y, width):
+def trimap_band__torch(y, width):
     import torch
 
     classes = torch.unique(torch.from_numpy(y[y != 255]))
     masks = (torch.from_numpy(y)[None] == classes[:, None, None]).float()
     near = torch.nn.functional.max_pool2d(masks, 2 * width + 1, stride=1, padding=width)
     return (near.sum(0) > 1).numpy() & (y != 255)
-
-
-ALTERNATIVES = {
-    "confusion_matrix": (confusion_loops, confusion_bincount, confusion_one_hot, confusion_torch),
-    "iou": (iou_loops, iou_einsum, iou_torch, iou_float32),
-    "mean_iou": (mean_iou_loops, mean_iou_einsum, mean_iou_torch),
-    "merge_classes": (merged_loops, merged_add_at, merged_blocks, merged_bincount),
-    "trimap_band": (trimap_loops, trimap_extremes, trimap_one_class_at_a_time, trimap_torch),
-}

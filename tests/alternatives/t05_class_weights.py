@@ -5,22 +5,20 @@ import numpy as np
 from labkit.course.questions.t05_class_weights.adjusted_grad import parts
 from labkit.course.questions.t05_class_weights.two_means import losses_and_weights
 
-# ---------- class_weights
 
-
-def weights_loops(counts, power):
+def class_weights__loops(counts, power):
     raw = [float(n) ** -power if n else 0.0 for n in counts]
     scale = sum(map(float, counts)) / sum(n * r for n, r in zip(counts, raw, strict=True))
     return np.array([scale * r if n else 1.0 for n, r in zip(counts, raw, strict=True)])
 
 
-def weights_einsum(counts, power):
+def class_weights__einsum(counts, power):
     share = counts / counts.sum()
     raw = np.where(share > 0, np.power(np.where(share > 0, share, 1.0), -power), 0.0)
     return np.where(share > 0, raw / np.einsum("c,c->", share, raw), 1.0)
 
 
-def weights_torch(counts, power):
+def class_weights__torch(counts, power):
     import torch
 
     n = torch.from_numpy(counts).double()
@@ -28,19 +26,16 @@ def weights_torch(counts, power):
     return torch.where(n > 0, raw * n.sum() / (n * raw).sum(), torch.ones_like(n)).numpy()
 
 
-def weights_float32(counts, power):
-    return weights_einsum(counts.astype(np.float32), np.float32(power))
+def class_weights__float32(counts, power):
+    return class_weights__einsum(counts.astype(np.float32), np.float32(power))
 
 
-# ---------- two_means
-
-
-def two_means_weighted(z, y, w):
+def two_means__weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(np.average(loss * weight)), float(np.average(loss, weights=weight))
 
 
-def two_means_loops(z, y, w):
+def two_means__loops(z, y, w):
     total, pixels, weights = 0.0, 0, 0.0
     for place in np.ndindex(y.shape):
         if y[place] != 255:
@@ -51,14 +46,11 @@ def two_means_loops(z, y, w):
     return total / pixels, total / weights
 
 
-def two_means_float32(z, y, w):
-    return two_means_weighted(z.astype(np.float32), y, w.astype(np.float32))
+def two_means__float32(z, y, w):
+    return two_means__weighted(z.astype(np.float32), y, w.astype(np.float32))
 
 
-# ---------- least_cost
-
-
-def least_cost_loops(p, cost):
+def least_cost__loops(p, cost):
     said = np.empty(p.shape[:-1], int)
     for place in np.ndindex(said.shape):
         prices = [sum(p[place][i] * cost[i, j] for i in range(len(cost))) for j in range(len(cost))]
@@ -66,46 +58,40 @@ def least_cost_loops(p, cost):
     return said
 
 
-def least_cost_einsum(p, cost):
+def least_cost__einsum(p, cost):
     return np.argmin(np.einsum("...i,ij->...j", p, cost), axis=-1).astype(np.uint8)
 
 
-def least_cost_torch(p, cost):
+def least_cost__torch(p, cost):
     import torch
 
     return torch.argmax(-torch.from_numpy(p).float() @ torch.from_numpy(cost).float(), dim=-1).numpy()
 
 
-# ---------- weight_for_recall
-
-
-def weight_by_trying(p1, y, recall):
+def weight_for_recall__trying(p1, y, recall):
     odds = np.unique((1.0 - p1) / p1)
     for w in odds:
         if np.count_nonzero(w * p1[y] >= (1.0 - p1[y]) * (1 - 1e-12)) >= recall * np.count_nonzero(y):
             return w
 
 
-def weight_by_partition(p1, y, recall):
+def weight_for_recall__partition(p1, y, recall):
     true = p1[np.flatnonzero(y)]
     missed = int(np.floor((1.0 - recall) * len(true) + 1e-9))
     return 1.0 / np.partition(true, missed)[missed] - 1.0
 
 
-def weight_by_quantile(p1, y, recall):
+def weight_for_recall__quantile(p1, y, recall):
     return float(np.quantile((1.0 - p1[y]) / p1[y], recall, method="inverted_cdf"))
 
 
-# ---------- adjusted_grad
-
-
-def adjusted_grad_of_products(z, y, shares, tau):
+def adjusted_grad__of_products(z, y, shares, tau):
     p, Y, counted = parts(z, y)
     q = p * shares**tau
     return np.where(counted, q / q.sum(axis=-1, keepdims=True) - Y, 0.0)
 
 
-def adjusted_grad_loops(z, y, shares, tau):
+def adjusted_grad__loops(z, y, shares, tau):
     out = np.zeros(z.shape)
     for place in np.ndindex(y.shape):
         if y[place] != 255:
@@ -116,47 +102,29 @@ def adjusted_grad_loops(z, y, shares, tau):
     return out
 
 
-def adjusted_grad_float32(z, y, shares, tau):
+def adjusted_grad__float32(z, y, shares, tau):
     p, Y, counted = parts((z + tau * np.log(shares)).astype(np.float32), y)
     return np.float32(p - Y) * counted
 
 
-# ---------- change_prior
-
-
-def change_prior_loops(z, w, shares, new_shares):
+def change_prior__loops(z, w, shares, new_shares):
     out = z.copy()
     for c in range(len(w)):
         out[..., c] += np.log(new_shares[c]) - np.log(shares[c]) - np.log(w[c])
     return out
 
 
-def change_prior_of_probabilities(z, w, shares, new_shares):
+def change_prior__of_probabilities(z, w, shares, new_shares):
     p = np.exp(z - z.max(axis=-1, keepdims=True)) / w / shares * new_shares
     return np.log(p / p.sum(axis=-1, keepdims=True))
 
 
-def change_prior_torch(z, w, shares, new_shares):
+def change_prior__torch(z, w, shares, new_shares):
     import torch
 
     ratio = torch.from_numpy(new_shares / shares / w)
     return torch.log_softmax(torch.from_numpy(z) + ratio.log(), dim=-1).numpy()
 
 
-def change_prior_float32(z, w, shares, new_shares):
-    return change_prior_loops(z.astype(np.float32), w.astype(np.float32), shares, new_shares)
-
-
-ALTERNATIVES = {
-    "class_weights": (weights_loops, weights_einsum, weights_torch, weights_float32),
-    "two_means": (two_means_weighted, two_means_loops, two_means_float32),
-    "least_cost": (least_cost_loops, least_cost_einsum, least_cost_torch),
-    "weight_for_recall": (weight_by_trying, weight_by_partition, weight_by_quantile),
-    "adjusted_grad": (adjusted_grad_of_products, adjusted_grad_loops, adjusted_grad_float32),
-    "change_prior": (
-        change_prior_loops,
-        change_prior_of_probabilities,
-        change_prior_torch,
-        change_prior_float32,
-    ),
-}
+def change_prior__float32(z, w, shares, new_shares):
+    return change_prior__loops(z.astype(np.float32), w.astype(np.float32), shares, new_shares)

@@ -6,25 +6,23 @@ from labkit.course.questions.t07_grasp.grasp_pose import pose, unit
 from labkit.course.questions.t07_grasp.pad_slice import in_grasp, middle_and_width
 from labkit.course.questions.t07_grasp.points_in_fingers import in_boxes, moved
 
-# ---------- closing_yaw
 
-
-def closing_yaw_formula(Sigma):
+def closing_yaw__formula(Sigma):
     long = 0.5 * np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1])
     return (long + np.pi / 2) % np.pi
 
 
-def closing_yaw_svd(Sigma):
+def closing_yaw__svd(Sigma):
     axes, _, _ = np.linalg.svd(Sigma[:2, :2])
     return float(np.arctan2(*axes[::-1, -1]))
 
 
-def closing_yaw_across_the_long_axis(Sigma):
+def closing_yaw__across_the_long_axis(Sigma):
     x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, -1]
     return np.arctan2(y, x) - np.pi / 2
 
 
-def closing_yaw_loop(Sigma):
+def closing_yaw__loop(Sigma):
     low, high = 0.0, np.pi
     for _ in range(12):  # a fan of directions, ever finer round the one of least variance
         fan = np.linspace(low, high, 61)
@@ -34,26 +32,23 @@ def closing_yaw_loop(Sigma):
     return best
 
 
-def closing_yaw_torch(Sigma):
+def closing_yaw__torch(Sigma):
     import torch
 
     _, axes = torch.linalg.eigh(torch.as_tensor(Sigma[:2, :2]))
     return torch.atan2(axes[1, 0], axes[0, 0])
 
 
-def closing_yaw_float32(Sigma):
+def closing_yaw__float32(Sigma):
     _, axes = np.linalg.eigh(Sigma[:2, :2].astype(np.float32))
     return np.arctan2(axes[1, 0], axes[0, 0])
 
 
-# ---------- grasp_height
-
-
-def height_with(P, table_z, palm, tips, clearance):
+def grasp_height__with(P, table_z, palm, tips, clearance):
     return np.max([P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance]) + tips
 
 
-def height_loops(P, table_z, palm, tips, clearance):
+def grasp_height__loops(P, table_z, palm, tips, clearance):
     low, high = float("inf"), -float("inf")
     for _, _, z in P.tolist():
         low, high = min(low, z), max(high, z)
@@ -65,7 +60,7 @@ def height_loops(P, table_z, palm, tips, clearance):
     return bound + tips
 
 
-def height_torch(P, table_z, palm, tips, clearance):
+def grasp_height__torch(P, table_z, palm, tips, clearance):
     import torch
 
     z = torch.as_tensor(P[:, 2])
@@ -73,30 +68,27 @@ def height_torch(P, table_z, palm, tips, clearance):
     return bounds.max() + tips
 
 
-def height_float32(P, table_z, palm, tips, clearance):
+def grasp_height__float32(P, table_z, palm, tips, clearance):
     z = P[:, 2].astype(np.float32)
     return np.float32(max(z.max() - np.float32(palm), z.min(), np.float32(table_z + clearance)) + np.float32(tips))
 
 
-# ---------- grasp_pose
-
-
-def grasp_pose_crossed(position, approach, closing):
+def grasp_pose__crossed(position, approach, closing):
     x = unit(np.cross(closing, approach))
     return pose(x, np.cross(unit(approach), x), unit(approach), position)
 
 
-def grasp_pose_other_way_round(position, approach, closing):
-    return grasp_pose_crossed(position, approach, -closing)
+def grasp_pose__other_way_round(position, approach, closing):
+    return grasp_pose__crossed(position, approach, -closing)
 
 
-def grasp_pose_qr(position, approach, closing):
+def grasp_pose__qr(position, approach, closing):
     z, y = np.linalg.qr(np.column_stack([approach, closing]))[0].T
     z = z * np.sign(z @ approach)
     return pose(np.cross(y, z), y, z, position)
 
 
-def grasp_pose_torch(position, approach, closing):
+def grasp_pose__torch(position, approach, closing):
     import torch
 
     z, y = (torch.from_numpy(np.ascontiguousarray(v)) for v in (approach, closing))
@@ -108,19 +100,16 @@ def grasp_pose_torch(position, approach, closing):
     return T
 
 
-def grasp_pose_float32(position, approach, closing):
-    return grasp_pose_crossed(position, approach, closing).astype(np.float32)
+def grasp_pose__float32(position, approach, closing):
+    return grasp_pose__crossed(position, approach, closing).astype(np.float32)
 
 
-# ---------- pad_slice
-
-
-def slice_by_inverse(P, T_base_grasp, half):
+def pad_slice__by_inverse(P, T_base_grasp, half):
     homogeneous = np.column_stack([P, np.ones(len(P))]) @ np.linalg.inv(T_base_grasp).T
     return middle_and_width(homogeneous[np.abs(homogeneous[:, 0]) <= half, 1])
 
 
-def slice_loops(P, T_base_grasp, half):
+def pad_slice__loops(P, T_base_grasp, half):
     low, high = float("inf"), -float("inf")
     for p in P:
         x, y = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in (0, 1))
@@ -129,25 +118,22 @@ def slice_loops(P, T_base_grasp, half):
     return (low + (high - low) / 2, high - low) if high >= low else (0.0, 0.0)
 
 
-def slice_float32(P, T_base_grasp, half):
+def pad_slice__float32(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp).astype(np.float32)
     return middle_and_width(y[np.abs(x) <= np.float32(half)])
 
 
-# ---------- slip_across
-
-
-def slip_by_inverse(T_base_grasp, middle):
+def slip_across__by_inverse(T_base_grasp, middle):
     off = np.linalg.inv(T_base_grasp) @ np.append(middle, 1.0)
     return abs(1000.0 * off[1]), abs(1000.0 * off[0])
 
 
-def slip_by_products(T_base_grasp, middle):
+def slip_across__by_products(T_base_grasp, middle):
     off = middle - T_base_grasp[:3, 3]
     return tuple(1000.0 * abs(sum(off[i] * T_base_grasp[i, k] for i in range(3))) for k in (1, 0))
 
 
-def slip_torch(T_base_grasp, middle):
+def slip_across__torch(T_base_grasp, middle):
     import torch
 
     T = torch.from_numpy(T_base_grasp)
@@ -155,14 +141,11 @@ def slip_torch(T_base_grasp, middle):
     return 1000.0 * y.abs(), 1000.0 * x.abs()
 
 
-# ---------- points_in_fingers
-
-
-def points_by_inverse(P, T_base_grasp, *boxes):
+def points_in_fingers__by_inverse(P, T_base_grasp, *boxes):
     return in_boxes(*moved(P, np.linalg.inv(T_base_grasp)), *boxes)
 
 
-def points_loops(P, T_base_grasp, width, half, thickness, tips):
+def points_in_fingers__loops(P, T_base_grasp, width, half, thickness, tips):
     count = 0
     for p in P:
         x, y, z = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in range(3))
@@ -170,34 +153,11 @@ def points_loops(P, T_base_grasp, width, half, thickness, tips):
     return count
 
 
-def points_einsum(P, T_base_grasp, *boxes):
+def points_in_fingers__einsum(P, T_base_grasp, *boxes):
     x, y, z = np.einsum("ik,ni->kn", T_base_grasp[:3, :3], P - T_base_grasp[:3, 3])
     return in_boxes(x, y, z, *boxes)
 
 
-def points_float32(P, T_base_grasp, *boxes):
+def points_in_fingers__float32(P, T_base_grasp, *boxes):
     R, t = T_base_grasp[:3, :3].astype(np.float32), T_base_grasp[:3, 3]
     return in_boxes(*((P - t).astype(np.float32) @ R).T, *boxes)
-
-
-ALTERNATIVES = {
-    "closing_yaw": (
-        closing_yaw_formula,
-        closing_yaw_svd,
-        closing_yaw_across_the_long_axis,
-        closing_yaw_loop,
-        closing_yaw_torch,
-        closing_yaw_float32,
-    ),
-    "grasp_height": (height_with, height_loops, height_torch, height_float32),
-    "grasp_pose": (
-        grasp_pose_crossed,
-        grasp_pose_other_way_round,
-        grasp_pose_qr,
-        grasp_pose_torch,
-        grasp_pose_float32,
-    ),
-    "pad_slice": (slice_by_inverse, slice_loops, slice_float32),
-    "slip_across": (slip_by_inverse, slip_by_products, slip_torch),
-    "points_in_fingers": (points_by_inverse, points_loops, points_einsum, points_float32),
-}

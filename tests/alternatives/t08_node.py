@@ -8,10 +8,8 @@ from labkit.course.questions.t08_node.pack_cloud import finite
 from labkit.course.questions.t08_node.pose_at import neighbours, outside
 from labkit.course.questions.t08_node.quaternion import from_trace, right_quaternion
 
-# ---------- decode_depth
 
-
-def depth_loops(data, height, width, step, is_bigendian):
+def decode_depth__loops(data, height, width, step, is_bigendian):
     depth = np.full((height, width), np.nan)
     for v in range(height):
         for u in range(width):
@@ -22,20 +20,20 @@ def depth_loops(data, height, width, step, is_bigendian):
     return depth
 
 
-def depth_struct(data, height, width, step, is_bigendian):
+def decode_depth__struct(data, height, width, step, is_bigendian):
     row = struct.Struct(f"{'>' if is_bigendian else '<'}{width}H")
     numbers = np.array([row.unpack_from(bytes(data), v * step) for v in range(height)], np.float32)
     numbers[numbers == 0] = np.nan
     return numbers / np.float32(1000)
 
 
-def depth_strided(data, height, width, step, is_bigendian):
+def decode_depth__strided(data, height, width, step, is_bigendian):
     order = ">" if is_bigendian else "<"
     numbers = np.ndarray((height, width), f"{order}u2", np.ascontiguousarray(data).tobytes(), strides=(step, 2))
     return np.where(numbers != 0, numbers.astype(float), np.nan) / 1e3
 
 
-def depth_torch(data, height, width, step, is_bigendian):
+def decode_depth__torch(data, height, width, step, is_bigendian):
     import torch
 
     rows = torch.stack([torch.from_numpy(data.copy())[v * step : v * step + 2 * width] for v in range(height)])
@@ -45,10 +43,7 @@ def depth_torch(data, height, width, step, is_bigendian):
     return torch.where(numbers > 0, numbers / 1000, torch.nan)
 
 
-# ---------- pair_stamps
-
-
-def pairs_loops(a, b, slop):
+def pair_stamps__loops(a, b, slop):
     def nearest(stamp, others):
         return min(range(len(others)), key=lambda k: abs(int(stamp) - int(others[k])), default=-1)
 
@@ -60,7 +55,7 @@ def pairs_loops(a, b, slop):
     return np.array(found, int)
 
 
-def pairs_sorted(a, b, slop):
+def pair_stamps__sorted(a, b, slop):
     def nearest(of, among):
         after = np.searchsorted(among, of).clip(0, len(among) - 1)
         before = (after - 1).clip(0)
@@ -74,7 +69,7 @@ def pairs_sorted(a, b, slop):
     return np.where(mutual & (np.abs(a - b[best]) <= slop), best, -1)
 
 
-def pairs_torch(a, b, slop):
+def pair_stamps__torch(a, b, slop):
     import torch
 
     if len(b) == 0:
@@ -86,10 +81,7 @@ def pairs_torch(a, b, slop):
     return torch.where(kept, of_a, -1)
 
 
-# ---------- pose_at
-
-
-def pose_by_an_angle(stamps, positions, quaternions, t):
+def pose_at__by_an_angle(stamps, positions, quaternions, t):
     """Turn from a by a share of the rotation from a to b, whose axis and angle its quaternion says."""
 
     def product(p, q):
@@ -106,7 +98,7 @@ def pose_by_an_angle(stamps, positions, quaternions, t):
     return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
 
 
-def pose_by_a_frame(stamps, positions, quaternions, t):
+def pose_at__by_a_frame(stamps, positions, quaternions, t):
     """Go round the circle that a and the part of b at right angles to it span."""
     i, share = neighbours(stamps, t)
     a, b = quaternions[i], quaternions[i + 1]
@@ -119,7 +111,7 @@ def pose_by_a_frame(stamps, positions, quaternions, t):
     return outside(stamps, t) or (np.array(place), -turn)
 
 
-def pose_torch(stamps, positions, quaternions, t):
+def pose_at__torch(stamps, positions, quaternions, t):
     import torch
 
     i, share = neighbours(stamps, t)
@@ -130,29 +122,26 @@ def pose_torch(stamps, positions, quaternions, t):
     return outside(stamps, t) or (torch.lerp(P[i], P[i + 1], float(share)), q / torch.sin(angle))
 
 
-# ---------- pack_cloud
-
-
-def pack_struct(P):
+def pack_cloud__struct(P):
     data = b"".join(struct.pack("<fff4x", *p) for p in P if np.isfinite(p).all())
     return np.frombuffer(data, np.uint8)
 
 
-def pack_structured(P):
+def pack_cloud__structured(P):
     points = np.zeros(len(finite(P)), np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("pad", "V4")]))
     for axis, name in enumerate("xyz"):
         points[name] = finite(P)[:, axis]
     return np.frombuffer(points.tobytes(), np.uint8)
 
 
-def pack_columns(P):
+def pack_cloud__columns(P):
     cloud = finite(P)
     numbers = np.zeros((len(cloud), 4), np.float32)
     numbers[:, :3] = cloud
     return numbers.view(np.uint8).reshape(-1)
 
 
-def pack_torch(P):
+def pack_cloud__torch(P):
     import torch
 
     cloud = torch.from_numpy(P.copy())
@@ -161,14 +150,11 @@ def pack_torch(P):
     return numbers.contiguous().view(torch.uint8).reshape(-1)
 
 
-# ---------- quaternion
-
-
-def quaternion_scipy(R):
+def quaternion__scipy(R):
     return -right_quaternion(R)  # the same rotation
 
 
-def quaternion_eigen(R):
+def quaternion__eigen(R):
     S = np.zeros((4, 4))
     S[:3, :3] = R + R.T - np.trace(R) * np.eye(3)
     S[:3, 3] = S[3, :3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
@@ -176,7 +162,7 @@ def quaternion_eigen(R):
     return np.linalg.eigh(S)[1][:, -1].astype(np.float32)
 
 
-def quaternion_cases(R):
+def quaternion__cases(R):
     i = int(np.argmax([*np.diag(R), np.trace(R)]))
     if i == 3:
         return from_trace(R)
@@ -188,16 +174,7 @@ def quaternion_cases(R):
     return q
 
 
-def quaternion_torch(R):
+def quaternion__torch(R):
     import torch
 
-    return torch.tensor(quaternion_cases(R), dtype=torch.float32)
-
-
-ALTERNATIVES = {
-    "decode_depth": (depth_loops, depth_struct, depth_strided, depth_torch),
-    "pair_stamps": (pairs_loops, pairs_sorted, pairs_torch),
-    "pose_at": (pose_by_an_angle, pose_by_a_frame, pose_torch),
-    "pack_cloud": (pack_struct, pack_structured, pack_columns, pack_torch),
-    "quaternion": (quaternion_scipy, quaternion_eigen, quaternion_cases, quaternion_torch),
-}
+    return torch.tensor(quaternion__cases(R), dtype=torch.float32)

@@ -7,10 +7,8 @@ from labkit.course.questions.t09_other_stacks.choose_region import chosen
 from labkit.course.questions.t09_other_stacks.hsv_mask import between
 from labkit.course.questions.t09_other_stacks.make_blob import padded
 
-# ---------- make_blob
 
-
-def blob_loops(bgr, multiple):
+def make_blob__loops(bgr, multiple):
     H, W, _ = bgr.shape
     tall, wide = H, W
     while tall % multiple:
@@ -25,26 +23,23 @@ def blob_loops(bgr, multiple):
     return blob
 
 
-def blob_stacked(bgr, multiple):
+def make_blob__stacked(bgr, multiple):
     image = padded(bgr, multiple)
     return np.stack([image[:, :, c].astype(np.float32) / 255 for c in (2, 1, 0)])[np.newaxis]
 
 
-def blob_torch(bgr, multiple):
+def make_blob__torch(bgr, multiple):
     image = torch.from_numpy(bgr).flip(-1).permute(2, 0, 1).unsqueeze(0).float() / 255
     H, W = bgr.shape[:2]
     return torch.nn.functional.pad(image, (0, -W % multiple, 0, -H % multiple))
 
 
-def blob_einsum(bgr, multiple):
+def make_blob__einsum(bgr, multiple):
     swap = np.eye(3, dtype=np.float32)[::-1]
     return np.einsum("hwc,dc->dhw", padded(bgr, multiple).astype(np.float32), swap / np.float32(255))[None]
 
 
-# ---------- engine_contract
-
-
-def contract_loops(reference, other, tolerance):
+def engine_contract__loops(reference, other, tolerance):
     _C, H, W = reference.shape
     kept, changed, close = True, 0, 0
     for v in range(H):
@@ -57,7 +52,7 @@ def contract_loops(reference, other, tolerance):
     return kept, changed / (H * W), close / (H * W)
 
 
-def contract_without_the_best(reference, other, tolerance):
+def engine_contract__without_the_best(reference, other, tolerance):
     labels = reference.argmax(axis=0)
     rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
     margin = reference.max(axis=0) - rest.max(axis=0)
@@ -65,17 +60,14 @@ def contract_without_the_best(reference, other, tolerance):
     return kept, 1.0 - np.mean(labels == other.argmax(axis=0)), np.count_nonzero(margin <= 2 * tolerance) / margin.size
 
 
-def contract_torch(reference, other, tolerance):
+def engine_contract__torch(reference, other, tolerance):
     z, y = torch.from_numpy(np.array(reference)), torch.from_numpy(np.array(other))
     best = z.topk(2, dim=0).values
     changed = torch.from_numpy(reference.argmax(0) != other.argmax(0)).double().mean()
     return ((z - y).abs() <= tolerance).all(), changed, (best[0] - best[1] <= 2 * tolerance).double().mean()
 
 
-# ---------- enlarge
-
-
-def resize_loops(labels, size):
+def enlarge__loops(labels, size):
     W, H = size
     h, w = labels.shape
     out = np.zeros((H, W), labels.dtype)
@@ -85,22 +77,19 @@ def resize_loops(labels, size):
     return out
 
 
-def resize_take(labels, size):
+def enlarge__take(labels, size):
     rows, columns = (
         ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
     )
     return labels.take(rows, axis=0).take(columns, axis=1)
 
 
-def resize_torch(labels, size):
+def enlarge__torch(labels, size):
     image = torch.from_numpy(labels.astype(np.float64))[None, None]
     return torch.nn.functional.interpolate(image, size[::-1], mode="nearest-exact")[0, 0].long()
 
 
-# ---------- hsv_mask
-
-
-def mask_loops(hsv, lower, upper):
+def hsv_mask__loops(hsv, lower, upper):
     mask = np.zeros(hsv.shape[:2], bool)
     for v in range(hsv.shape[0]):
         for u in range(hsv.shape[1]):
@@ -111,12 +100,12 @@ def mask_loops(hsv, lower, upper):
     return mask
 
 
-def mask_modulo(hsv, lower, upper):
+def hsv_mask__modulo(hsv, lower, upper):
     shifted = (hsv[..., 0].astype(int) - int(lower[0])) % 180 <= (int(upper[0]) - int(lower[0])) % 180
     return shifted & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
-def mask_by_table(hsv, lower, upper):
+def hsv_mask__by_table(hsv, lower, upper):
     hues = np.zeros(256, bool)
     hue = int(lower[0])
     while True:
@@ -128,7 +117,7 @@ def mask_by_table(hsv, lower, upper):
     return hues[hsv[..., 0]] * (s >= lower[1]) * (s <= upper[1]) * (v >= lower[2]) * (v <= upper[2])
 
 
-def mask_torch(hsv, lower, upper):
+def hsv_mask__torch(hsv, lower, upper):
     x = torch.from_numpy(hsv.astype(np.int32))
     low, high = (torch.from_numpy(np.asarray(b).astype(np.int32)) for b in (lower, upper))
     above, below = x >= low, x <= high
@@ -136,10 +125,7 @@ def mask_torch(hsv, lower, upper):
     return hue & (above & below)[..., 1:].all(dim=-1)
 
 
-# ---------- measure_pieces
-
-
-def measured_loops(pieces):
+def measure_pieces__loops(pieces):
     n = int(pieces.max())
     area, total = [0] * n, [[0, 0] for _ in range(n)]
     box = [[10**9, 10**9, -1, -1] for _ in range(n)]
@@ -155,7 +141,7 @@ def measured_loops(pieces):
     return area, np.array(total) / area[:, None], np.array(box)
 
 
-def measured_bincount(pieces):
+def measure_pieces__bincount(pieces):
     flat, n = pieces.ravel(), int(pieces.max())
     v, u = (grid.ravel() for grid in np.mgrid[: pieces.shape[0], : pieces.shape[1]])
     area = np.bincount(flat, minlength=n + 1)[1:]
@@ -164,7 +150,7 @@ def measured_bincount(pieces):
     return area, middle.astype(np.float32), box
 
 
-def measured_einsum(pieces):
+def measure_pieces__einsum(pieces):
     H, W = pieces.shape
     member = pieces[None] == np.arange(1, pieces.max() + 1)[:, None, None]
     area = np.einsum("nhw->n", member.astype(np.int64))
@@ -174,10 +160,7 @@ def measured_einsum(pieces):
     return area, middle / area[:, None], np.stack([columns.argmax(axis=1), rows.argmax(axis=1), *last], axis=1)
 
 
-# ---------- choose_region
-
-
-def chosen_loops(features, mean, covariance, allowed):
+def choose_region__loops(features, mean, covariance, allowed):
     best, number, P = np.inf, 0, np.linalg.inv(covariance)
     for i in range(len(features)):
         off = features[i] - mean
@@ -186,28 +169,18 @@ def chosen_loops(features, mean, covariance, allowed):
     return number
 
 
-def chosen_einsum(features, mean, covariance, allowed):
+def choose_region__einsum(features, mean, covariance, allowed):
     off = features - mean
     return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
 
 
-def chosen_whitened(features, mean, covariance, allowed):
+def choose_region__whitened(features, mean, covariance, allowed):
     white = np.linalg.solve(np.linalg.cholesky(covariance), (features - mean).T)
     return chosen((white**2).sum(axis=0), allowed)
 
 
-def chosen_torch(features, mean, covariance, allowed):
+def choose_region__torch(features, mean, covariance, allowed):
     off = torch.from_numpy(features - mean)
     distance = (off * torch.linalg.solve(torch.from_numpy(covariance), off.T).T).sum(dim=1)
     distance[~torch.from_numpy(allowed)] = torch.inf
     return distance.argmin() + 1 if allowed.any() else 0
-
-
-ALTERNATIVES = {
-    "make_blob": (blob_loops, blob_stacked, blob_torch, blob_einsum),
-    "engine_contract": (contract_loops, contract_without_the_best, contract_torch),
-    "enlarge": (resize_loops, resize_take, resize_torch),
-    "hsv_mask": (mask_loops, mask_modulo, mask_by_table, mask_torch),
-    "measure_pieces": (measured_loops, measured_bincount, measured_einsum),
-    "choose_region": (chosen_loops, chosen_einsum, chosen_whitened, chosen_torch),
-}
