@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64, Integer, Num
 
 from labkit.labels import IGNORE, one_hot
-from labkit.support.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_shape, require
 
 if TYPE_CHECKING:
     import torch
@@ -83,12 +83,9 @@ def class_weights(counts: Num[np.ndarray, " C"], scheme: str) -> Float64[np.ndar
     array([0.55555556, 5. , 1. ])
     """
     counts = check_finite("counts", check_shape("counts", counts, (None,))).astype(np.float64)
-    if counts.size and counts.min() < 0:
-        raise ValueError(f"counts: expected numbers of pixels, at least 0, got {counts.min():g}")
-    if not counts.any():
-        raise ValueError("counts: expected at least one pixel of some class, got none")
-    if scheme not in SCHEMES:
-        raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")
+    require("counts", counts.min(initial=0) >= 0, "numbers of pixels, at least 0", f"{counts.min(initial=0):g}")
+    require("counts", counts.any(), "at least one pixel of some class", "none")
+    require("scheme", scheme in SCHEMES, f"one of {', '.join(SCHEMES)}", repr(scheme))
     present = counts > 0
     w = np.ones(counts.size)
     w[present] = counts[present] ** SCHEMES[scheme]
@@ -108,8 +105,7 @@ def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -
     array([0.5, 0.5])
     """
     p = check_finite("p", p).astype(np.float64)
-    if p.ndim < 1 or p.shape[-1] < 1:
-        raise ValueError(f"p: expected probabilities (..., C) of at least one class, got shape {p.shape}")
+    require("p", p.ndim >= 1 and p.shape[-1] >= 1, "probabilities (..., C) of at least one class", f"shape {p.shape}")
     off = np.abs(p.sum(axis=-1) - 1.0).max(initial=0.0)
     if p.min(initial=0.0) < 0.0 or off > 1e-5:
         raise ValueError(
@@ -136,11 +132,9 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
     import torch  # here, so that the NumPy half of this module does not wait for it
     from torch.nn.functional import cross_entropy
 
-    if logits.ndim != 4:
-        raise ValueError(f"logits: expected shape (N, C, H, W), got {tuple(logits.shape)}")
+    require("logits", logits.ndim == 4, "shape (N, C, H, W)", tuple(logits.shape))
     image_shape = (logits.shape[0], *logits.shape[2:])
-    if labels.shape != image_shape:
-        raise ValueError(f"labels: expected the shape (N, H, W) of logits, {image_shape}, got {tuple(labels.shape)}")
+    require("labels", labels.shape == image_shape, f"the shape (N, H, W) of logits, {image_shape}", tuple(labels.shape))
     if labels.is_floating_point() or labels.is_complex() or labels.dtype == torch.bool:
         raise ValueError(f"labels: expected integers, got {labels.dtype}")
     num_classes = logits.shape[1]
@@ -175,23 +169,20 @@ def _log_softmax(z: Float64[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*sh
 
 def _check_logits(z) -> np.ndarray:
     z = check_finite("z", z)
-    if z.ndim < 1 or z.shape[-1] < 1:
-        raise ValueError(f"z: expected logits (..., C) of at least one class, got shape {z.shape}")
+    require("z", z.ndim >= 1 and z.shape[-1] >= 1, "logits (..., C) of at least one class", f"shape {z.shape}")
     return z.astype(np.float64, copy=False)
 
 
 def _check_weights(name: str, w, num_classes: int) -> np.ndarray:
     w = check_finite(name, check_shape(name, w, (num_classes,)))
-    if w.min() <= 0:
-        raise ValueError(f"{name}: expected one number above 0 for each class, got {w.min():g}")
+    require(name, w.min() > 0, "one number above 0 for each class", f"{w.min():g}")
     return w.astype(np.float64)
 
 
 def _check_pixels(z, y, weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the logits, the one-hot tensor Y (all zeros where ignored) and one weight per class."""
     z, y = _check_logits(z), np.asarray(y)
-    if y.shape != z.shape[:-1]:
-        raise ValueError(f"y: expected one label for each pixel of z, shape {z.shape[:-1]}, got {y.shape}")
+    require("y", y.shape == z.shape[:-1], f"one label for each pixel of z, shape {z.shape[:-1]}", y.shape)
     num_classes = z.shape[-1]
     w = np.ones(num_classes) if weights is None else _check_weights("weights", weights, num_classes)
     return z, one_hot(y, num_classes), w

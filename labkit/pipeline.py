@@ -17,7 +17,15 @@ from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
 from labkit.inference import Engine
 from labkit.labels import IGNORE, TARGET
 from labkit.stacks.engines import open_engine
-from labkit.support.validation import check_finite, check_height, check_labels, check_rgb, check_shape
+from labkit.support.validation import (
+    check_finite,
+    check_height,
+    check_labels,
+    check_rgb,
+    check_shape,
+    check_whole,
+    require,
+)
 
 # What the Panda can reach and meet, in front of it: x, y from its base, z from the table; metres.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
@@ -94,9 +102,7 @@ class Pipeline:
         model = as_engine(model) if engine is None else open_engine(engine, model)
         if model is not None and not callable(model):
             raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
-        classes = getattr(model, "num_classes", None) or IGNORE
-        if isinstance(target_class, bool) or target_class not in range(classes):
-            raise ValueError(f"target_class: expected a class in 0 to {classes - 1}, got {target_class!r}")
+        check_whole("target_class", target_class, 0, (getattr(model, "num_classes", None) or IGNORE) - 1)
         if grasp is not None and gripper is not None:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
         self.model = model
@@ -153,8 +159,7 @@ class Pipeline:
         return probabilities
 
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
-        if self.model is None:
-            raise ValueError("model: expected one to perceive with, got None; `locate` takes labels from elsewhere")
+        require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
         with _timed(seconds, "network"):
             probabilities = self._with_target(class_probabilities(self.model, frame, self.mirror))
         with _timed(seconds, "labels"):
@@ -303,8 +308,7 @@ def segment_rgb_image(model, image: UInt8[np.ndarray, "H W 3"], order: str = "rg
     >>> segment_rgb_image(lambda rgb: rgb / 255.0, np.array([[[255, 0, 0]]], np.uint8), order="bgr")
     array([[2]], dtype=uint8)
     """
-    if order not in ("rgb", "bgr"):
-        raise ValueError(f'order: expected "rgb" or "bgr", got {order!r}')
+    require("order", order in ("rgb", "bgr"), '"rgb" or "bgr"', repr(order))
     image = check_rgb("image", image)
     rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if order == "bgr" else image
     return most_probable(class_probabilities(model, rgb))

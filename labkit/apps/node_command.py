@@ -14,6 +14,7 @@ from labkit.node.messages import DEFAULT_TOPICS, ROS_TOPICS, Topics
 from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.pipeline import Pipeline
+from labkit.support.validation import require
 
 SIMULATED_RATE = 5.0  # frames per second of --ros --sim
 
@@ -68,8 +69,7 @@ class Settings:
             numbers = [float(word) for word in words]
         except ValueError:
             numbers = []
-        if len(numbers) != 7:
-            raise ValueError(f"camera_pose: expected seven numbers, x y z qx qy qz qw, got {self.camera_pose!r}")
+        require("camera_pose", len(numbers) == 7, "seven numbers, x y z qx qy qz qw", repr(self.camera_pose))
         return rigid(numbers[:3], numbers[3:])
 
     def topics(self, default: Topics = DEFAULT_TOPICS) -> Topics:
@@ -81,8 +81,7 @@ class Settings:
         known = [field.name for field in fields(Topics)]
         named = [item.partition("=") for item in self.renamed]
         for name, _, topic in named:
-            if name not in known or not topic:
-                raise ValueError(f"topic: expected NAME=TOPIC with NAME of {', '.join(known)}, got {name}={topic}")
+            require("topic", name in known and topic, f"NAME=TOPIC with NAME of {', '.join(known)}", f"{name}={topic}")
         return replace(default, **{name: topic for name, _, topic in named})
 
 

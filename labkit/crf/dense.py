@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Num
 
 from labkit.crf.energy import check_channels
-from labkit.support.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_shape, require
 
 
 def dense_crf(
@@ -39,15 +39,13 @@ def dense_crf(
     from labkit.crf.lattice_kernels import softmax
 
     unary = check_finite("unary", check_shape("unary", unary, (None, None, None)))
-    if 0 in unary.shape:
-        raise ValueError(f"unary: expected at least one pixel and class, got shape {unary.shape}")
+    require("unary", 0 not in unary.shape, "at least one pixel and class", f"shape {unary.shape}")
     numbers = {"theta_alpha": theta_alpha, "theta_beta": theta_beta, "theta_gamma": theta_gamma}
     numbers |= {"w_appearance": w_appearance, "w_smoothness": w_smoothness}
     for name, number in numbers.items():
         if not (0.0 <= number < np.inf) or (number == 0.0 and name.startswith("theta")):
             raise ValueError(f"{name}: expected a finite number {'above' if 'theta' in name else '>='} 0, got {number}")
-    if iterations < 0:
-        raise ValueError(f"iterations: expected at least 0, got {iterations}")
+    require("iterations", iterations >= 0, "at least 0", iterations)
     H, W, C = unary.shape
     colours = check_channels("image", check_finite("image", image), unary).astype(np.float32)
     v, u = np.indices((H, W), np.float32)

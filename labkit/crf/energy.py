@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer, Num, UInt8
 
-from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape
+from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape, require
 
 # Each unordered pair of neighbours counts once: a pixel owns the pairs with these neighbours, (down, right) of it.
 OFFSETS = {4: ((0, 1), (1, 0)), 8: ((0, 1), (1, 0), (1, 1), (1, -1))}
@@ -38,8 +38,7 @@ class PottsCRF:
     def __post_init__(self):
         unary = check_unary(self.unary)
         weights = check_finite("weights", check_shape("weights", self.weights, (None, *unary.shape[:2])))
-        if len(weights) not in (2, 4):
-            raise ValueError(f"weights: expected 2 or 4 pairs per pixel (4 or 8 neighbours), got {len(weights)}")
+        require("weights", len(weights) in (2, 4), "2 or 4 pairs per pixel (4 or 8 neighbours)", len(weights))
         if weights.min() < 0.0:
             raise ValueError(
                 f"weights: expected costs >= 0, got {weights.min():.6g}; a negative one rewards disagreement, "
@@ -95,12 +94,9 @@ class PottsCRF:
         ((2, 2, 3), 7, np.float64(1.213))
         """
         for name, sigma in (("sigma_I", sigma_I), ("sigma_p", sigma_p), *(("extra", sigma) for _, sigma in extra)):
-            if not (np.isfinite(sigma) and sigma > 0.0):
-                raise ValueError(f"{name}: expected a scale above 0, got {sigma}")
-        if not (np.isfinite(lam) and lam >= 0.0):
-            raise ValueError(f"lam: expected a weight >= 0, got {lam}")
-        if connectivity not in OFFSETS:
-            raise ValueError(f"connectivity: expected 4 or 8 neighbours, got {connectivity}")
+            require(name, np.isfinite(sigma) and sigma > 0.0, "a scale above 0", sigma)
+        require("lam", np.isfinite(lam) and lam >= 0.0, "a weight >= 0", lam)
+        require("connectivity", connectivity in OFFSETS, "4 or 8 neighbours", connectivity)
         unary = check_unary(unary)
         image = check_channels("image", check_finite("image", image), unary)
         scaled = [check_channels("extra", channels, unary).astype(np.float64) / sigma for channels, sigma in extra]
@@ -157,8 +153,7 @@ def unary_from_probabilities(
     array([[[0.   , 4.605]]])
     """
     p = check_finite("probabilities", check_shape("probabilities", probabilities, (None, None, None)))
-    if not 0.0 < floor < 1.0:
-        raise ValueError(f"floor: expected a probability between 0 and 1, got {floor}")
+    require("floor", 0.0 < floor < 1.0, "a probability between 0 and 1", floor)
     sums = np.einsum("vuc->vu", p) if p.size else np.ones(1)
     if p.size and (p.min() < 0.0 or p.max() > 1.0 + 1e-3 or np.abs(sums - 1.0).max() > 1e-3):
         raise ValueError(
@@ -172,8 +167,7 @@ def unary_from_probabilities(
 def check_unary(unary: Num[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
     """Return a unary term as float64; raise a ValueError unless each pixel has at least one class of finite cost."""
     unary = check_shape("unary", unary, (None, None, None))
-    if unary.dtype.kind not in "fiu":
-        raise ValueError(f"unary: expected real costs, got dtype {unary.dtype}")
+    require("unary", unary.dtype.kind in "fiu", "real costs", f"dtype {unary.dtype}")
     if 0 in unary.shape or not 2 <= unary.shape[2] <= MAX_CLASSES:
         raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
     if not unary.min() > -np.inf:  # NaN is not, either

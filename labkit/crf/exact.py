@@ -10,6 +10,7 @@ from jaxtyping import Float, Int, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
 from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
+from labkit.support.validation import require
 
 MAX_LABELLINGS = 2**22
 CHUNK = 2**14
@@ -84,8 +85,7 @@ def min_cut(crf: PottsCRF) -> MapResult:
     >>> min_cut(PottsCRF(psi, w)).labels
     array([[0, 0, 0]], dtype=uint8)
     """
-    if crf.shape[2] != 2:
-        raise ValueError(f"crf: expected two classes for a minimum cut, got {crf.shape[2]}; use expansion or trws")
+    require("crf", crf.shape[2] == 2, "two classes for a minimum cut", f"{crf.shape[2]}; use expansion or trws")
     integer = quantise(crf)
     # Each pixel's cheaper class costs 0, so that only one of its arcs to the terminals has a capacity.
     flow, labels = cut_grid(integer.unary[:, 1] - integer.unary[:, 0], integer.weights, integer.step, integer.size)
@@ -125,8 +125,7 @@ def enumerate_labellings(crf: PottsCRF) -> Iterator[tuple[UInt8[np.ndarray, "n H
     """Yield all labellings of a tiny grid with their energies, some thousands at a time."""
     H, W, C = crf.shape
     count = C ** (H * W)
-    if count > MAX_LABELLINGS:
-        raise ValueError(f"crf: expected at most {MAX_LABELLINGS} labellings to enumerate, got {C}^{H * W}")
+    require("crf", count <= MAX_LABELLINGS, f"at most {MAX_LABELLINGS} labellings to enumerate", f"{C}^{H * W}")
     place = C ** np.arange(H * W).reshape(H, W)
     rows, columns = np.indices((H, W))
     for start in range(0, count, CHUNK):

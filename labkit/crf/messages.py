@@ -12,6 +12,7 @@ from jaxtyping import Int, Integer, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
 from labkit.crf.integers import IntegerPotts, inside, quantise
+from labkit.support.validation import require
 
 # How often labels are read off the messages, in iterations.
 LABEL_EVERY = 5
@@ -28,8 +29,7 @@ def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapRes
     >>> result.labels, round(result.energy, 3), result.gap < 1e-6
     (array([[0, 0, 0]], dtype=uint8), 1.0, True)
     """
-    if iterations < 1:
-        raise ValueError(f"iterations: expected at least 1, got {iterations}")
+    require("iterations", iterations >= 1, "at least 1", iterations)
     return _trws(crf, quantise(crf), iterations, tolerance)
 
 

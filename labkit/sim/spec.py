@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from labkit.labels import CLASSES, OBSTACLE, TARGET
-from labkit.support.validation import check_finite, check_shape, check_T
+from labkit.support.validation import check_finite, check_shape, check_T, require
 
 Vector = tuple[float, ...]
 
@@ -69,19 +69,13 @@ class ObjectSpec:
     friction: float = 0.8
 
     def __post_init__(self):
-        if (self.urdf is None) == (not self.parts):
-            raise ValueError(
-                f"object {self.name!r}: expected either a urdf or parts, got {self.urdf!r} and {self.parts!r}"
-            )
         if self.class_id not in (TARGET, OBSTACLE):
             raise ValueError(f"class_id: expected {TARGET} (target) or {OBSTACLE} (obstacle), got {self.class_id!r}")
         check_finite("position", check_shape("position", self.position, (3,)))
         length = np.linalg.norm(check_finite("orientation", check_shape("orientation", self.orientation, (4,))))
-        if abs(length - 1.0) > 0.01:
-            raise ValueError(f"orientation: expected a unit quaternion x, y, z, w, got one of length {length:.3g}")
+        require("orientation", abs(length - 1.0) <= 0.01, "a unit quaternion x, y, z, w", f"one of length {length:.3g}")
         for name in ("mass", "scale"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name}: expected a number above 0, got {getattr(self, name)}")
+            require(name, 0.0 < getattr(self, name) < np.inf, "a number above 0", getattr(self, name))
 
 
 @dataclass(frozen=True)
@@ -167,8 +161,7 @@ class SceneSpec:
 
     def __post_init__(self):
         names = [thing.name for thing in self.objects]
-        if len(set(names)) < len(names):
-            raise ValueError(f"objects: expected unique names, got {names}")
+        require("objects", len(set(names)) == len(names), "unique names", names)
         for thing in self.objects:
             off = np.abs(np.subtract(thing.position[:2], self.table.centre)) > np.array(self.table.size[:2]) / 2
             if off.any():

@@ -5,6 +5,7 @@ from jaxtyping import Float, UInt8
 from scipy.ndimage import gaussian_filter
 
 from labkit.sim.spec import Texture
+from labkit.support.validation import require
 
 SIZE = 128
 
@@ -17,8 +18,7 @@ def paint(texture: Texture) -> UInt8[np.ndarray, "128 128 3"]:
     >>> paint(Texture("plain", colour_a=(1.0, 0.0, 0.0)))[0, 0].tolist()
     [255, 0, 0]
     """
-    if texture.kind not in KINDS:
-        raise ValueError(f"texture.kind: expected one of {sorted(KINDS)}, got {texture.kind!r}")
+    require("texture.kind", texture.kind in KINDS, f"one of {sorted(KINDS)}", repr(texture.kind))
     v, u = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     mix = KINDS[texture.kind](u, v, texture.scale, np.random.default_rng(texture.seed))[..., None]
     colour = (1.0 - mix) * np.asarray(texture.colour_a) + mix * np.asarray(texture.colour_b)

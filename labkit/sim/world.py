@@ -17,6 +17,7 @@ from labkit.sim.kinematics import HOME, PANDA_URDF
 from labkit.sim.shapes import as_file, data_path, object_mesh, part_mesh, parts_as_obj, urdf_path
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
 from labkit.sim.textures import paint
+from labkit.support.validation import require
 
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7
@@ -78,8 +79,7 @@ class World:
 
     def pose(self, name: str) -> Float[np.ndarray, "4 4"]:
         """The true pose of an object now, T_base_object. Raises ValueError if there is no such object."""
-        if name not in self.bodies:
-            raise ValueError(f"name: expected one of {sorted(self.bodies)}, got {name!r}")
+        require("name", name in self.bodies, f"one of {sorted(self.bodies)}", repr(name))
         body = self.bodies[name]
         # PyBullet speaks of the centre of mass; an object's frame is where its mesh is drawn.
         T_base_mass = _pose_matrix(*self.client.getBasePositionAndOrientation(body))
@@ -103,8 +103,7 @@ class World:
         the spec's. Raises ValueError for an empty size.
         """
         width, height = size
-        if min(size) < 1:
-            raise ValueError(f"size: expected width and height of at least 1, got {size}")
+        require("size", min(size) >= 1, "width and height of at least 1", size)
         camera = camera or self.spec.camera
         light = self.spec.light
         with self.client.quiet():
