@@ -10,6 +10,7 @@ message to a pixel is a weighted mean of all q's, which is one Gaussian filter i
 import numpy as np
 from jaxtyping import Float, Num
 
+from labkit.crf import lattice_kernels as lattice
 from labkit.crf.energy import check_channels
 from labkit.support.validation import check_finite, check_shape, require
 
@@ -36,8 +37,6 @@ def dense_crf(
     >>> dense_crf(unary, np.zeros((4, 4, 3), np.uint8)).argmax(axis=2)[1, 1]
     np.int64(0)
     """
-    from labkit.crf.lattice_kernels import softmax
-
     unary = check_finite("unary", check_shape("unary", unary, (None, None, None)))
     require("unary", 0 not in unary.shape, "at least one pixel and class", f"shape {unary.shape}")
     numbers = {"theta_alpha": theta_alpha, "theta_beta": theta_beta, "theta_gamma": theta_gamma}
@@ -54,12 +53,12 @@ def dense_crf(
     kernels = [(w_appearance, GaussianFilter(appearance)), (w_smoothness, GaussianFilter(smoothness))]
     minus_unary = -unary.reshape(H * W, C).astype(np.float32)
     q = np.empty_like(minus_unary)
-    softmax(minus_unary, q)
+    lattice.softmax(minus_unary, q)
     for _ in range(iterations):
         z = minus_unary.copy()
         for weight, gaussian in kernels:
             gaussian.add_filtered(q, weight, z)
-        softmax(z, q)
+        lattice.softmax(z, q)
     return q.reshape(H, W, C)
 
 
@@ -68,8 +67,6 @@ class GaussianFilter:
 
     def __init__(self, features: Float[np.ndarray, "H W d"]):
         """features: each channel divided by its standard deviation; ValueError for a range too large to index."""
-        from labkit.crf import lattice_kernels as lattice
-
         d = features.shape[2]
         elevated, least, largest = lattice.elevate(
             features.reshape(-1, d).astype(np.float32), elevation(d).astype(np.float32)
@@ -92,10 +89,8 @@ class GaussianFilter:
 
     def add_filtered(self, values: Float[np.ndarray, "N C"], weight: float, out: Float[np.ndarray, "N C"]) -> None:
         """out += weight * filtered values, both float32, one row a pixel."""
-        from labkit.crf.lattice_kernels import lattice_filter
-
         scale = (np.sqrt(weight) * self.scale).astype(np.float32)
-        lattice_filter(values, scale, self.corner, self.weights, self.near, out)
+        lattice.lattice_filter(values, scale, self.corner, self.weights, self.near, out)
 
 
 def elevation(d: int) -> Float[np.ndarray, "d1 d"]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer, Num, UInt8
 
+from labkit.crf.energy_kernels import energy_by_row, pair_exponents
 from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape, require
 
 # Each unordered pair of neighbours counts once: a pixel owns the pairs with these neighbours, (down, right) of it.
@@ -116,8 +117,6 @@ class PottsCRF:
         return self._energy(self.check_labelling("y", y))
 
     def _energy(self, y: Integer[np.ndarray, "H W"]) -> float:
-        from labkit.crf.energy_kernels import energy_by_row
-
         return float(energy_by_row(self.unary, self.weights, np.array(self.offsets), y).sum())
 
 
@@ -190,8 +189,6 @@ def contrast_weights(
     image: Num[np.ndarray, "H W k"], scaled: list, lam: float, sigma_I: float, sigma_p: float, connectivity: int
 ) -> Float[np.ndarray, "D H W"]:
     """Return w of the module's formula for all pairs; `scaled` holds further channels, each divided by its sigma."""
-    from labkit.crf.energy_kernels import pair_exponents
-
     H, W = image.shape[:2]
     image = image if image.dtype == np.uint8 else image.astype(np.float64, copy=False)
     extra = np.concatenate(scaled, axis=2) if scaled else np.empty((H, W, 0))

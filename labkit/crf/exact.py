@@ -10,6 +10,7 @@ from jaxtyping import Float, Int, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
 from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
+from labkit.crf.maxflow_kernels import SINK, Graph, both_ways, max_flow, new_forest
 from labkit.support.validation import require
 
 MAX_LABELLINGS = 2**22
@@ -113,8 +114,6 @@ def cut_grid(
     excess: Int[np.ndarray, "N"], weights: Int[np.ndarray, "N D"], step: Int[np.ndarray, "K"], size: tuple[int, int]
 ) -> tuple[int, UInt8[np.ndarray, "H W"]]:
     """Return the maximum flow through a flat grid with a ring (`integers`), and 1 on the sink's side of a cut."""
-    from labkit.crf.maxflow_kernels import SINK, Graph, both_ways, max_flow, new_forest
-
     nodes = pixel_numbers(size)
     trees = new_forest(len(excess))
     flow = max_flow(Graph(both_ways(weights, step), excess, step), *trees, nodes, NEAR)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.energy_kernels import mean_field_sweep
 from labkit.support.validation import require
 
 
@@ -31,8 +32,6 @@ def mean_field_marginals(
     >>> mean_field_marginals(crf).round(3)  # no pairwise term: exp(-psi) / sum(exp(-psi))
     array([[[0.731, 0.269], [0.378, 0.622]]])
     """
-    from labkit.crf.mean_field_kernels import mean_field_sweep
-
     require("iterations", iterations >= 1, "at least 1", iterations)
     first, last = temperatures if temperatures is not None else (1.0, 1.0)
     require("temperatures", 0.0 < first < np.inf and 0.0 < last < np.inf, "two numbers above 0", temperatures)
