@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
@@ -135,18 +135,6 @@ class World:
             instances=instances,
             table_z=self.spec.table.z,
         )
-
-    def silhouette(self, name: str, size: tuple[int, int] = (320, 240)) -> Bool[np.ndarray, "H W"]:
-        """The pixels that an object would cover if no other object stood before it; the simulation stays as it is."""
-        number = 1 + [thing.name for thing in self.spec.objects].index(name)
-        state = self.client.saveState()
-        for other, body in self.bodies.items():
-            if other != name:
-                self.client.resetBasePositionAndOrientation(body, (0.0, 0.0, -100.0), (0.0, 0.0, 0.0, 1.0))
-        mask = self.render(size).instances == number
-        self.client.restoreState(state)
-        self.client.removeState(state)
-        return mask
 
     def _label(self, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Turn the renderer's body numbers (-1 for nothing) into labels and instances."""
