@@ -12,8 +12,10 @@ from matplotlib.patches import Patch, Polygon
 from PIL import Image
 
 from labkit.apps.evaluation import lift
+from labkit.course.views import fingers
 from labkit.frame import RGBDFrame
 from labkit.geometry import centroid_and_covariance
+from labkit.grasp import Gripper
 from labkit.labels import CLASSES, PALETTE, TARGET, colorize
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.pipeline import Perception, Pipeline
@@ -99,8 +101,12 @@ def report(story: Story) -> str:
         grasp = p.plan.grasps[0]
         place = ", ".join(f"{x:+.3f}" for x in grasp.T_base_grasp[:3, 3])
         rows.append(f"best grasp: at ({place}) m, jaws {100.0 * grasp.width:.1f} cm apart")
-    outcome = f"lifted {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
-    return "\n".join([*rows, outcome])
+    return "\n".join([*rows, outcome_in_words(story)])
+
+
+def outcome_in_words(story: Story) -> str:
+    """What became of the lift."""
+    return f"lifted {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
 
 
 def nearest(point: np.ndarray, places: dict[str, np.ndarray]) -> tuple[str, float]:
@@ -152,10 +158,6 @@ def draw_height(axes, story: Story) -> None:
     axes.set_axis_off()
 
 
-def outcome_in_words(story: Story) -> str:
-    return f"lifted: {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
-
-
 def draw_cloud(axes, story: Story) -> None:
     """The points round the targets in their colours, with visible and true centres: they are not the same point."""
     p, frame, table_z = story.perception, story.frame, story.spec.table.z
@@ -197,20 +199,9 @@ def draw_grasp(axes, story: Story) -> None:
         axes.text(middle[1], middle[0], p.plan.reason, ha="center", wrap=True)
         return
     for rank, grasp in reversed(list(enumerate(p.plan.grasps[:5]))):
-        for side in (-1.0, 1.0):
-            corners = jaw(grasp, side)[:, [1, 0]]
-            style = (
-                {"facecolor": "tab:blue", "alpha": 0.9} if rank == 0 else {"fill": False, "edgecolor": "0.5", "lw": 0.6}
-            )
-            axes.add_patch(Polygon(corners, **style))
-
-
-def jaw(grasp, side: float, width: float = 0.02, thickness: float = 0.012) -> np.ndarray:
-    """The corners of a jaw in the base frame's x and y, (4, 2); side is -1 or 1."""
-    inner = side * grasp.width / 2.0
-    outer = inner + side * thickness
-    corners = np.array([[-width / 2, inner], [width / 2, inner], [width / 2, outer], [-width / 2, outer]])
-    return corners @ grasp.T_base_grasp[:2, :2].T + grasp.T_base_grasp[:2, 3]
+        style = {"facecolor": "tab:blue", "alpha": 0.9} if rank == 0 else {"fill": False, "edgecolor": "0.5", "lw": 0.6}
+        for finger in fingers(grasp.T_base_grasp, grasp.width, Gripper()):
+            axes.add_patch(Polygon(finger[[0, 1, 3, 2], 1::-1], **style))
 
 
 def save(story: Story, out: Path) -> list[Path]:
