@@ -64,11 +64,7 @@ class Settings:
         """
         if not self.camera_pose:
             return None
-        words = re.split(r"[\s,]+", self.camera_pose.strip())
-        try:
-            numbers = [float(word) for word in words]
-        except ValueError:
-            numbers = []
+        numbers = numbers_of(self.camera_pose)
         require("camera_pose", len(numbers) == 7, "seven numbers, x y z qx qy qz qw", repr(self.camera_pose))
         return rigid(numbers[:3], numbers[3:])
 
@@ -83,6 +79,18 @@ class Settings:
         for name, _, topic in named:
             require("topic", name in known and topic, f"NAME=TOPIC with NAME of {', '.join(known)}", f"{name}={topic}")
         return replace(default, **{name: topic for name, _, topic in named})
+
+
+def numbers_of(text: str) -> list[float]:
+    """The numbers of a text that holds nothing else; none if it does.
+
+    >>> numbers_of("[1, 2.5; 3]"), numbers_of("camera.json")
+    ([1.0, 2.5, 3.0], [])
+    """
+    try:
+        return [float(word) for word in re.split(r"[\s,;]+", text.strip(" \t\r\n[]"))]
+    except ValueError:
+        return []
 
 
 def rehearse(settings: Settings, spec) -> str:
