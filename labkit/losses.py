@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64, Integer, Num
 
 from labkit.labels import IGNORE, one_hot
-from labkit.support.validation import check_finite, check_shape, require
+from labkit.support.validation import check_finite, check_labels, check_shape, require
 
 if TYPE_CHECKING:
     import torch
@@ -135,15 +135,9 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
     require("logits", logits.ndim == 4, "shape (N, C, H, W)", tuple(logits.shape))
     image_shape = (logits.shape[0], *logits.shape[2:])
     require("labels", labels.shape == image_shape, f"the shape (N, H, W) of logits, {image_shape}", tuple(labels.shape))
-    if labels.is_floating_point() or labels.is_complex() or labels.dtype == torch.bool:
-        raise ValueError(f"labels: expected integers, got {labels.dtype}")
-    num_classes = logits.shape[1]
+    check_labels("labels", labels.cpu().numpy(), logits.shape[1])
     labels = labels.long()
     counted = labels != IGNORE
-    wrong = counted & ((labels < 0) | (labels >= num_classes))
-    if wrong.any():
-        values = labels[wrong].unique()[:5].tolist()
-        raise ValueError(f"labels: expected labels 0 to {num_classes - 1} or {IGNORE}, got {values}")
     logits = logits if logits.dtype == torch.float64 else logits.float()
     # One sum finds any NaN or infinity; at an ignored pixel it would spare the loss and spoil the gradient.
     if not torch.isfinite(logits.detach().sum()):
@@ -151,7 +145,7 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
         raise ValueError(f"logits: expected finite numbers, got {bad} NaN or infinite; has the training diverged?")
     if weights is not None:
         array = torch.as_tensor(weights, dtype=torch.float64, device="cpu").detach().numpy()
-        weights = torch.from_numpy(_check_weights("weights", array, num_classes)).to(logits)
+        weights = torch.from_numpy(_check_weights("weights", array, logits.shape[1])).to(logits)
     losses = cross_entropy(logits, labels, weight=weights, ignore_index=IGNORE, reduction="none")
     # Summed in float64: in float32, a batch of some 100,000 pixels is off in the fourth digit.
     return (losses.sum(dtype=torch.float64) / counted.sum().clamp(min=1)).to(logits.dtype)

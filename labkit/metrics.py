@@ -4,8 +4,6 @@ Counts add up over frames and scores do not: keep one confusion matrix (and one 
 test set, add each frame's to it, and divide once at the end. A score of 0 / 0 is NaN, neither 0 nor 1.
 """
 
-from statistics import NormalDist
-
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64, Integer, Num, UInt8
@@ -29,7 +27,7 @@ def confusion_matrix(
     >>> confusion_matrix(np.array([0, 0, 1, 255]), np.array([0, 1, 1, 0]), 2)
     array([[1, 1], [0, 1]])
     """
-    from labkit.support.metrics_kernels import count_pairs  # here, so that importing this module waits for no numba
+    from labkit.support.label_kernels import count_pairs  # here, so that importing this module waits for no numba
 
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.
@@ -182,14 +180,10 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
     require("trials", trials >= 1, "at least 1", trials)
     require("successes", 0 <= successes <= trials, f"0 to {trials}", successes)
     require("confidence", 0.0 < confidence < 1.0, "a share between 0 and 1", confidence)
-    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
-    rate = successes / trials
-    spread = 1.0 + z**2 / trials
-    centre = (rate + z**2 / (2 * trials)) / spread
-    half = z * np.sqrt(rate * (1.0 - rate) / trials + z**2 / (4 * trials**2)) / spread
-    low = 0.0 if successes == 0 else float(centre - half)  # exactly 0, where rounding would miss it
-    high = 1.0 if successes == trials else float(centre + half)
-    return low, high
+    from scipy.stats import binomtest  # takes its time to import
+
+    interval = binomtest(int(successes), int(trials)).proportion_ci(confidence, "wilson")
+    return float(interval.low), float(interval.high)
 
 
 def reliability_counts(

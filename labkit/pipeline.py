@@ -272,9 +272,9 @@ def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray
     >>> most_probable(np.array([[[0.2, 0.8], [0.5, 0.5]]]))
     array([[1, 0]], dtype=uint8)
     """
-    from labkit.support import labels_kernels  # numba takes its time to import
+    from labkit.support import label_kernels  # numba takes its time to import
 
-    return labels_kernels.most_probable(np.asarray(probabilities))
+    return label_kernels.most_probable(np.asarray(probabilities))
 
 
 def refine_labels(probabilities: Float[np.ndarray, "H W C"], frame: RGBDFrame) -> UInt8[np.ndarray, "H W"]:

@@ -6,9 +6,7 @@ from jaxtyping import Float, Num
 
 CHANNELS = ("height", "height, fine", "known", "right", "away", "up", "footprint")
 HEIGHTS = (0.25, 0.05)  # metres above and below the table that the two height channels reach
-FOOTPRINT = (
-    0.003  # metres that a pixel covers where the footprint channel is 0.5; 0 and 1 are an eighth and eight times
-)
+FOOTPRINT = 0.003  # metres that a pixel covers where its channel is 0.5; 0 and 1 are an eighth and eight times of it
 MIRRORED = CHANNELS.index("right")  # changes its sign in a mirror
 
 
