@@ -72,4 +72,4 @@ class Client:
             with self.quiet():
                 pybullet.disconnect(self.number)
         self.__dict__.clear()  # methods bound to this simulation would act on the next one of the same number
-        self.number = -1
+        self.number, self.egl = -1, False

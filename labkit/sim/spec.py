@@ -69,6 +69,8 @@ class ObjectSpec:
     friction: float = 0.8
 
     def __post_init__(self):
+        named = f"object {self.name!r}"
+        require(named, (self.urdf is None) != (not self.parts), "either a urdf or parts", (self.urdf, self.parts))
         if self.class_id not in (TARGET, OBSTACLE):
             raise ValueError(f"class_id: expected {TARGET} (target) or {OBSTACLE} (obstacle), got {self.class_id!r}")
         check_finite("position", check_shape("position", self.position, (3,)))
