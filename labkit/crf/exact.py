@@ -50,12 +50,10 @@ def marginals(crf: PottsCRF) -> Float[np.ndarray, "H W C"]:
 
 def brute_force(crf: PottsCRF) -> MapResult:
     """Return the labelling of least energy out of all C^(H W); raises ValueError beyond 2^22 of them."""
-    best = min(
-        ((energies.min(), labellings[energies.argmin()]) for labellings, energies in enumerate_labellings(crf)),
-        key=lambda pair: pair[0],
-    )
-    energy = crf.energy(best[1])
-    return MapResult(best[1], energy, lower_bound=energy, iterations=1)
+    chunks = ((energies.min(), labellings[energies.argmin()]) for labellings, energies in enumerate_labellings(crf))
+    _, labels = min(chunks, key=lambda pair: pair[0])
+    energy = crf.energy(labels)
+    return MapResult(labels, energy, lower_bound=energy, iterations=1)
 
 
 def unary(crf: PottsCRF) -> MapResult:
