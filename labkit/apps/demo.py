@@ -4,13 +4,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 from PIL import Image
 
+from labkit.apps import perceive
 from labkit.apps.evaluation import lift
 from labkit.course.views import fingers
 from labkit.frame import RGBDFrame
@@ -124,14 +124,11 @@ def picture(story: Story) -> Figure:
         per_subplot_kw={"cloud": {"projection": "3d"}},
     )
     frame, p = story.frame, story.perception
-    painted = frame.rgb.copy()
-    outlines, _ = cv2.findContours((p.labels == TARGET).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    painted[p.labels == TARGET] = (0.45 * painted[p.labels == TARGET] + 0.55 * PALETTE[TARGET]).astype(np.uint8)
-    cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+    target = np.where(p.labels == TARGET, p.labels, 0)
     images = {
         "rgb": (frame.rgb, "1  the camera's image"),
         "labels": (colorize(p.labels), "3  a class for each pixel"),
-        "overlay": (painted, "4  the target mask"),
+        "overlay": (perceive.picture(frame.rgb, target), "4  the target mask"),
         "arm": (story.film[-1] if story.film else frame.rgb, "7  " + outcome_in_words(story)),
     }
     for name, (image, title) in images.items():

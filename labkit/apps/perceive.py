@@ -24,6 +24,7 @@ from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.files import write_atomically
+from labkit.support.validation import require
 
 MOST_POINTS = 9000  # of the report's view: more make the page heavy, and the eye sees no difference
 TABLE_MARGIN = 0.02  # metres under the table that noise may reach
@@ -104,8 +105,7 @@ def read_mask(path, size: tuple[int, int]) -> np.ndarray:
     size: width and height that it must have. Raises ValueError for an image of another kind, size or other values.
     """
     mask = read_image("mask", path, np.uint8)
-    if mask.shape[::-1] != size:
-        raise ValueError(f"mask: expected the colour picture's size, {size[0]} x {size[1]}, got {mask.shape[::-1]}")
+    require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
     values = np.unique(mask)
     if len(values[values > 0]) <= 1:
         return np.where(mask > 0, TARGET, 0).astype(np.uint8)
@@ -271,10 +271,9 @@ def view(seen: Seen, gripper: Gripper | None = None) -> View:
     return shown.frame(np.eye(4), "base", 0.1)
 
 
-def picture(seen: Seen) -> UInt8[np.ndarray, "H W 3"]:
+def picture(rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
     """The colour picture with its labels laid over it, and the targets outlined in white."""
-    labels = np.where(seen.perception.labels == SURFACE, 0, seen.perception.labels)
-    painted = overlay(seen.frame.rgb, labels)
+    painted = overlay(rgb, np.where(labels == SURFACE, 0, labels))
     target = (labels == TARGET).astype(np.uint8)
     outlines, _ = cv2.findContours(target, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     return cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
@@ -286,7 +285,8 @@ def picture(seen: Seen) -> UInt8[np.ndarray, "H W 3"]:
 def save(seen: Seen, out, gripper: Gripper | None = None) -> list[Path]:
     """Write overlay.png, target_N.ply, grasps.json and report.html into the folder `out`; returns their paths."""
     out = Path(out)
-    files = {"overlay.png": _png(picture(seen)), "grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
+    painted = picture(seen.frame.rgb, seen.perception.labels)
+    files = {"overlay.png": _png(painted), "grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
     for number, (cloud, pixels) in enumerate(zip(seen.perception.clouds, seen.perception.pixels, strict=True), start=1):
         colours = seen.frame.rgb.reshape(-1, 3)[pixels]
         files[f"target_{number}.ply"] = trimesh.PointCloud(cloud, colours).export(file_type="ply")
@@ -310,7 +310,7 @@ def report(seen: Seen, gripper: Gripper | None = None) -> str:
     pictures = {
         "what the camera saw": seen.frame.rgb,
         f"depth: {low:.2f} m (yellow) to {high:.2f} m (violet), black without a reading": coloured[..., ::-1],
-        "labels: targets orange, obstacles green": picture(seen),
+        "labels: targets orange, obstacles green": picture(seen.frame.rgb, seen.perception.labels),
     }
     figures = "".join(
         f'<figure><img alt="{html.escape(title)}" src="data:image/png;base64,{_base64(_at_most(image, 640))}">'
