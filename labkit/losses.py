@@ -111,11 +111,9 @@ def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -
     p = check_finite("p", p).astype(np.float64)
     require("p", p.ndim >= 1 and p.shape[-1] >= 1, "probabilities (..., C) of at least one class", f"shape {p.shape}")
     off = np.abs(p.sum(axis=-1) - 1.0).max(initial=0.0)
-    if p.min(initial=0.0) < 0.0 or off > 1e-5:
-        raise ValueError(
-            f"p: expected probabilities of at least 0 that sum to 1 over the last axis, "
-            f"got a minimum of {p.min():.3g} and a sum that is off by {off:.3g}"
-        )
+    got = f"a minimum of {p.min(initial=0.0):.3g} and a sum that is off by {off:.3g}"
+    fits = p.min(initial=0.0) >= 0.0 and off <= 1e-5
+    require("p", fits, "probabilities of at least 0 that sum to 1 over the last axis", got)
     weighted = _check_weights("w", w, p.shape[-1]) * p
     return weighted / weighted.sum(axis=-1, keepdims=True)
 

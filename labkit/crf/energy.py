@@ -40,11 +40,8 @@ class PottsCRF:
         unary = check_unary(self.unary)
         weights = check_finite("weights", check_shape("weights", self.weights, (None, *unary.shape[:2])))
         require("weights", len(weights) in (2, 4), "2 or 4 pairs per pixel (4 or 8 neighbours)", len(weights))
-        if weights.min() < 0.0:
-            raise ValueError(
-                f"weights: expected costs >= 0, got {weights.min():.6g}; a negative one rewards disagreement, "
-                "which is not submodular, so that no cut can represent it"
-            )
+        why = "a negative one rewards disagreement, which is not submodular, so that no cut can represent it"
+        require("weights", weights.min() >= 0.0, "costs >= 0", f"{weights.min():.6g}; {why}")
         for d, offset in enumerate(OFFSETS[2 * len(weights)]):
             outside = np.ones(unary.shape[:2], bool)
             outside[pair_slices(offset)[0]] = False

@@ -108,10 +108,8 @@ class Camera:
             raise ValueError(f'renderer: expected "tiny" or "egl", got {self.renderer!r}')
         T = check_T("T_base_cam", self.T_base_cam)
         object.__setattr__(self, "T_base_cam", tuple(map(tuple, T.tolist())))
-        if not 0.0 < self.fov_y < np.pi:
-            raise ValueError(
-                f"fov_y: expected radians between 0 and pi, got {self.fov_y}; np.radians makes them of degrees"
-            )
+        got = f"{self.fov_y}; np.radians makes them of degrees"
+        require("fov_y", 0.0 < self.fov_y < np.pi, "radians between 0 and pi", got)
         if not 0.0 < self.near < self.far < np.inf:
             raise ValueError(f"near, far: expected 0 < near < far in metres, got {self.near} and {self.far}")
 
@@ -166,11 +164,8 @@ class SceneSpec:
         require("objects", len(set(names)) == len(names), "unique names", names)
         for thing in self.objects:
             off = np.abs(np.subtract(thing.position[:2], self.table.centre)) > np.array(self.table.size[:2]) / 2
-            if off.any():
-                raise ValueError(
-                    f"objects: expected {thing.name!r} over the table, {self.table.size[:2]} m around "
-                    f"{self.table.centre}, got position {thing.position}"
-                )
+            where = f"{self.table.size[:2]} m around {self.table.centre}"
+            require("objects", not off.any(), f"{thing.name!r} over the table, {where}", f"position {thing.position}")
 
     def __repr__(self) -> str:
         return f"SceneSpec({self.config}, seed {self.seed}: {', '.join(thing.name for thing in self.objects)})"

@@ -76,11 +76,8 @@ def check_rgb(name: str, image) -> np.ndarray:
 def check_depth(name: str, depth) -> np.ndarray:
     """Return a depth image in metres, floating point (H, W); 0 and NaN mean "no reading" and are fine."""
     depth = check_shape(name, depth, (None, None))
-    if depth.dtype.kind != "f":
-        raise ValueError(
-            f"{name}: expected floating-point metres, got dtype {depth.dtype}; "
-            "integer depth is usually millimetres: multiply by its scale (often 0.001)"
-        )
+    got = f"dtype {depth.dtype}; integer depth is usually millimetres: multiply by its scale (often 0.001)"
+    require(name, depth.dtype.kind == "f", "floating-point metres", got)
     # One reduction answers most frames: NaN fails both comparisons, so only odd frames pay for the second look.
     low, high = (depth.min(), depth.max()) if depth.size else (0.0, 0.0)
     if not (low >= 0.0 and high <= MAX_DEPTH_M):
@@ -118,10 +115,8 @@ def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
         raise ValueError(f"{name}: expected its last row to be 0 0 0 1, got {T[3].tolist()}; is it transposed?")
     R = T[:3, :3]
     error = np.abs(R @ R.T - np.eye(3)).max()
-    if error > tolerance:
-        raise ValueError(
-            f"{name}: expected an orthonormal rotation, but R @ R.T is off from the identity by {error:.3g}"
-        )
+    got = f"one whose R @ R.T is off from the identity by {error:.3g}"
+    require(name, error <= tolerance, "an orthonormal rotation", got)
     require(name, np.linalg.det(R) >= 0.0, "a right-handed rotation (determinant +1)", "a mirror image (-1)")
     far = np.abs(T[:3, 3]).max()
     got = f"{far:.6g}, which looks like millimetres: multiply T[:3, 3] by 0.001"
