@@ -160,21 +160,21 @@ class Pipeline:
 
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
         require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
-        with _timed(seconds, "network"):
+        with timed(seconds, "network"):
             probabilities = self._with_target(class_probabilities(self.model, frame, self.mirror))
-        with _timed(seconds, "labels"):
+        with timed(seconds, "labels"):
             labels = most_probable(probabilities)
         if self.crf:
-            with _timed(seconds, "crf"):
+            with timed(seconds, "crf"):
                 labels = self.crf(probabilities, frame)
         return labels, probabilities
 
     def _locate(self, frame: RGBDFrame, labels, probabilities, seconds: dict[str, float]) -> Perception:
-        with _timed(seconds, "back_projection"):
+        with timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
-        with _timed(seconds, "clouds"):
+        with timed(seconds, "clouds"):
             pixels, clouds, scene = self.targets(labels, points, frame.table_z)
-        with _timed(seconds, "grasps"):
+        with timed(seconds, "grasps"):
             plan = self.plan(clouds, scene, frame.table_z, frame.T_base_cam[:3, 3])
             certainty = tuple(1.0 for _ in pixels)
             if probabilities is not None:
@@ -214,7 +214,8 @@ def _check_labels_of(frame: RGBDFrame, labels) -> UInt8[np.ndarray, "H W"]:
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str):
+def timed(seconds: dict[str, float], stage: str):
+    """Write the seconds that a block takes down under the name of its stage."""
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start

@@ -1,6 +1,5 @@
 """The main job, shown: one scene from camera to lift, with a table of stages, a picture of every step and a film."""
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from labkit.geometry import centroid_and_covariance
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, PALETTE, TARGET, colorize
 from labkit.metrics import confusion_matrix, iou, mean_iou
-from labkit.pipeline import Perception, Pipeline
+from labkit.pipeline import Perception, Pipeline, timed
 from labkit.sim.panda import LiftResult
 from labkit.sim.spec import Camera, SceneSpec
 from labkit.sim.world import TIME_STEP, World
@@ -42,30 +41,29 @@ class Story:
 
 def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool | None = None) -> Story:
     """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
-    start = time.perf_counter()
-    with World(spec) as world:
-        built = time.perf_counter()
-        frame = world.render(size)
-        rendered = time.perf_counter()
+    seconds, film = {}, []
+    camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
+
+    def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
+        record.steps += 1
+        if record.steps % every == 0:
+            film.append(world.render(FILM_SIZE, camera).rgb)
+
+    record.steps = -1
+    with timed(seconds, "scene"):
+        world = World(spec)
+    with world:
+        with timed(seconds, "render"):
+            frame = world.render(size)
         pipeline = Pipeline(model, crf=crf)
-        pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
-        warm = time.perf_counter()
+        with timed(seconds, "warm-up"):
+            pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
         perception = pipeline.run(frame)
+        seconds |= perception.seconds
         true_centroids = {t.name: world.centre(t.name) for t in spec.objects if t.class_id == TARGET}
-        film = []
-        camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
-
-        def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
-            record.steps += 1
-            if record.steps % every == 0:
-                film.append(world.render(FILM_SIZE, camera).rgb)
-
-        record.steps = -1
         world.observers.append(record)
-        before = time.perf_counter()
-        result = lift(world, perception)
-        seconds = {"scene": built - start, "render": rendered - built, "warm-up": warm - rendered, **perception.seconds}
-        seconds["lift and film"] = time.perf_counter() - before
+        with timed(seconds, "lift and film"):
+            result = lift(world, perception)
     return Story(spec, frame, perception, result, film, true_centroids, seconds)
 
 
