@@ -11,8 +11,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from labkit.support.validation import require
-
 app = typer.Typer(
     help="Semantic segmentation for robotic manipulation: from one RGB-D image to a lifted object.",
     no_args_is_help=True,
@@ -80,7 +78,8 @@ def train(
 
     network = None if init is None else load_model(weights_path(init))
     model = model or ("unet" if network is None else architecture_of(network))
-    require("model", model in training.RECIPES, " or ".join(training.RECIPES), repr(model))
+    if model not in training.RECIPES:
+        raise ValueError(f"model: expected {' or '.join(training.RECIPES)}, got {model!r}")
     if network is not None and architecture_of(network) != model:
         raise ValueError(f"init: expected weights of {model}, got {init} of {architecture_of(network)}")
     recipe = training.RECIPES[model] if network is None else training.fine_tuning(model, validated=val is not None)
@@ -223,7 +222,8 @@ def perceive(
     from labkit.apps.node_command import Settings
     from labkit.network import load_model, weights_path
 
-    require("plane", plane is None or camera_pose is None, "either --plane auto or --camera-pose", "both")
+    if plane is not None and camera_pose is not None:
+        raise ValueError("plane: expected either --plane auto or --camera-pose, got both")
     T_base_cam = Settings(camera_pose=camera_pose).T_base_cam()
     frame = own.read_frame(color, depth, own.read_intrinsics(intrinsics), depth_scale)
     if mask is None:
