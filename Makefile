@@ -7,6 +7,8 @@
 #   make stacks  build the same in C++, Java and Octave where they are installed, and compare
 #   make ros2    set up .venv-ros2 with wheels of ROS 2, then the node beside a simulated camera, until Ctrl-C
 #   make test-ros2  the tests of ROS 2, there
+#   make site    set up .venv-site, then a static site of lessons, labs, guides and reference in out/site
+#   make test-site  its links, its words for figures, and what axe-core says of it
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make mutants how many wrong answers that nobody wrote down a check can name, by lab (an hour)
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
@@ -18,7 +20,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench mutants fresh everywhere clean
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench mutants fresh everywhere clean site test-site
 
 BIN := .venv/bin
 ARGS ?=
@@ -57,6 +59,13 @@ mutants: .venv/installed
 fresh: .venv/installed
 	$(BIN)/python tests/fresh/run $(ARGS)
 
+site: .venv-site/installed
+	.venv-site/bin/python -m sphinx -q -W --keep-going -b html -c docs/site . out/site
+	@echo "wrote out/site/index.html"
+
+test-site: .venv-site/installed
+	.venv-site/bin/python -m pytest tests/test_site.py $(ARGS)
+
 everywhere: .venv/installed
 	$(BIN)/python tests/fresh/run --suite bookworm trixie $(ARGS)
 
@@ -81,13 +90,16 @@ train: .venv/installed
 	for model in smallsegnet unet; do
 	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	done
-	$(BIN)/labkit train data/train data/wide --scenes $(WIDE_SCENES) --val data/val --model unet_rgbd $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
-	cp data/runs/{smallsegnet,unet,unet_rgbd}.pt labkit/weights/
+	rgbd="$(BIN)/labkit train data/train data/wide --scenes $(WIDE_SCENES) --val data/val --device $(DEVICE) --epochs $(or $(EPOCHS),24)"
+	$$rgbd --model unet_rgbd
+	$$rgbd --init data/runs/unet_rgbd.pt --lr 2e-3 --seed 1 --out data/runs/again
+	cp data/runs/{smallsegnet,unet}.pt data/runs/again/unet_rgbd.pt labkit/weights/
 
 # Environments, and the extras of pyproject.toml that each holds.
-.venv/installed: EXTRAS := course,instructor,stacks,test
+.venv/installed: EXTRAS := course,instructor,stacks,cluster,test
 .venv/installed-lab: EXTRAS := course,stacks
-.venv-bench/installed: EXTRAS := course,instructor,stacks,test,bench
+.venv-bench/installed: EXTRAS := course,instructor,stacks,cluster,test,bench
+.venv-site/installed: EXTRAS := course,instructor,stacks,cluster,test,site
 .venv-ros2/installed: EXTRAS := stacks,test
 .venv-ros2/installed: MORE := -r constraints-ros2.txt
 .venv-ros2/installed: constraints-ros2.txt
@@ -95,7 +107,7 @@ train: .venv/installed
 # A file `installing` is there while an installation runs and becomes `installed` when it ends. One that was killed leaves
 # `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
 # A changed pyproject.toml or constraints.txt only installs the difference.
-.venv/installed .venv/installed-lab .venv-bench/installed .venv-ros2/installed: pyproject.toml constraints.txt
+.venv/installed .venv/installed-lab .venv-bench/installed .venv-site/installed .venv-ros2/installed: pyproject.toml constraints.txt
 	@is_right='import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))'
 	for python in $(or $(PYTHON),python3.13 python3.12 python3.11 python3 python) ""; do
 	    if "$$python" -c "$$is_right" 2>/dev/null; then break; fi

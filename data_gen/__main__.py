@@ -1,13 +1,12 @@
 """The command `python -m data_gen`: write a dataset, or verify one."""
 
-import multiprocessing
 import sys
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from labkit.support.executors import executor_for
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -20,6 +19,7 @@ def main(
     config: Annotated[str, typer.Option(help="train, wide, test, hard or other")] = "train",
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels")] = "320x240",
     workers: Annotated[int, typer.Option(help="processes", min=1)] = 1,
+    dask: Annotated[str | None, typer.Option(help="a Dask scheduler, tcp://host:8786, whose workers see OUT")] = None,
     depth_noise: Annotated[bool, typer.Option(help="spoil depth as a real sensor does")] = False,
     verify: Annotated[bool, typer.Option("--verify", help="write nothing, check the files of OUT")] = False,
 ) -> None:
@@ -34,14 +34,7 @@ def main(
         width, height = (int(n) for n in size.split("x"))
     except ValueError:
         raise ValueError(f"size: expected WIDTHxHEIGHT such as 320x240, got {size!r}") from None
-    # Fresh processes: PyBullet and OpenCV must not be forked while they run. Each is replaced after some hundred
-    # scenes, which bounds what PyBullet's caches hold.
-    pool = (
-        ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), max_tasks_per_child=400)
-        if workers > 1
-        else nullcontext()
-    )
-    with pool as executor:
+    with executor_for(workers, dask) as executor:
         data_gen.generate(
             out,
             range(first_seed, first_seed + scenes),

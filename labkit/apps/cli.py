@@ -23,6 +23,7 @@ app = typer.Typer(
 Model = Annotated[str, typer.Option(help="unet_rgbd, unet, smallsegnet, or a file of your own weights.")]
 Refine = Annotated[bool | None, typer.Option("--crf/--no-crf", help="Refine a network's masks with the CRF.")]
 Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
+Dask = Annotated[str | None, typer.Option(help="Run on the workers of this Dask scheduler, tcp://host:8786.")]
 
 
 @app.callback()
@@ -116,6 +117,7 @@ def evaluate(
     ] = False,
     json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
     workers: Workers = 1,
+    dask: Dask = None,
 ) -> None:
     """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
     from data_gen import sample_scene
@@ -127,7 +129,7 @@ def evaluate(
     if weights is not None:
         load_model(weights)  # so that wrong weights are said before anything is simulated
     specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
-    report = summarise(run_trials(specs, weights, crf=crf, perturb=perturb, workers=workers))
+    report = summarise(run_trials(specs, weights, crf=crf, perturb=perturb, workers=workers, dask=dask))
     typer.echo(table(report))
     if json is not None:
         write_atomically(json, as_json(report).encode())
@@ -161,11 +163,12 @@ def compare(
 def study(
     out: Annotated[Path, typer.Option(help="Where to write the table.")] = Path("out/07_grasp.csv"),
     workers: Workers = 1,
+    dask: Dask = None,
 ) -> None:
     """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it goes on where it was."""
     from labkit.apps import mask_study
 
-    rows = mask_study.run(out, workers=workers)
+    rows = mask_study.run(out, workers=workers, dask=dask)
     rate, low, high = mask_study.lift_rate(rows)
     typer.echo(f"{out}: {len(rows)} lifts, {rate:.1%} succeeded (95 % interval {low:.1%} to {high:.1%})")
 
@@ -336,7 +339,6 @@ def grade(
     workers: Annotated[int | None, typer.Option(help="Submissions at a time; one a core if not given.", min=1)] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
     course: Annotated[Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.")] = Path("."),
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to grade on.")] = None,
     comment: Annotated[
         tuple[str, str] | None, typer.Option(help="A group of wrong answers, see class.html, and what all in it read.")
     ] = None,
@@ -355,7 +357,7 @@ def grade(
     from labkit.course.grading.sandbox import NO_SANDBOX
 
     workers = workers or os.cpu_count() or 1
-    how = {"workers": workers, "dask": dask, "force": force, "unsafe": unsafe}
+    how = {"workers": workers, "force": force, "unsafe": unsafe}
     graded = grade_course(topic, course, submissions, out, seed, new_round, comment, **how)
     typer.echo(terminal_table(graded.lab, graded.records))
     for student, failure in graded.failures.items():

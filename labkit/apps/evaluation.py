@@ -1,6 +1,7 @@
 """How good is the whole chain? Scores of the masks, and lifts by the simulated arm, over many scenes."""
 
 import json
+import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from tqdm.auto import tqdm
 
-from labkit.apps.trials import in_processes
+from labkit.apps.trials import in_order
 from labkit.geometry.sensor import StereoSensor, perturbed
 from labkit.labels import CLASSES, TARGET
 from labkit.metrics import (
@@ -22,7 +23,7 @@ from labkit.metrics import (
     reliability_counts,
     wilson_interval,
 )
-from labkit.pipeline import Pipeline, timed
+from labkit.pipeline import Pipeline
 
 BOUNDARY_WIDTH = 2  # pixels
 
@@ -63,18 +64,19 @@ def run_trial(
         raise ValueError("crf: expected none with true masks, which there is nothing to refine in")
     if isinstance(model, (str, Path)):
         model = _loaded(str(model), Path(model).stat().st_mtime_ns)
-    pipeline, seconds = Pipeline(model, crf=crf), {}
+    pipeline = Pipeline(model, crf=crf)
     with World(spec) as world:
-        with timed(seconds, "render"):
-            frame = world.render(size)
+        start = time.perf_counter()
+        frame = world.render(size)
+        rendered = time.perf_counter()
         if spec.config == "other":
             frame = StereoSensor().apply(frame, np.random.default_rng([spec.seed, 3]))
         if perturb:
             frame = perturbed(frame, np.random.default_rng([spec.seed, 2]))
         perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)
-        seconds |= perception.seconds
-        with timed(seconds, "lift"):
-            result = lift(world, perception)
+        before = time.perf_counter()
+        result = lift(world, perception)
+        seconds = {"render": rendered - start, **perception.seconds, "lift": time.perf_counter() - before}
     families = {thing.name: thing.family for thing in spec.objects}
     return Trial(
         seed=spec.seed,
@@ -185,13 +187,15 @@ def run_trials(
     perturb: bool = False,
     workers: int = 1,
     progress: bool = True,
+    dask: str | None = None,
 ) -> list[Trial]:
-    """Run a trial of each scene, in the order of `specs`, in so many processes; the options are those of `run_trial`.
+    """Run a trial of each scene, in the order of `specs`, where `labkit.support.executors.executor_for` says.
 
-    With several workers, give `model` as the path of its weights: each worker loads them once.
+    The other options are those of `run_trial`. Away from this process give `model` as the path of its weights: each
+    worker loads them once.
     """
     specs, trials, lifts = list(specs), [], 0
-    results = in_processes(partial(run_trial, model=model, size=size, crf=crf, perturb=perturb), specs, workers)
+    results = in_order(partial(run_trial, model=model, size=size, crf=crf, perturb=perturb), specs, workers, dask)
     with tqdm(results, total=len(specs), unit="scene", disable=not progress) as bar:
         for trial in bar:
             trials.append(trial)

@@ -15,7 +15,6 @@ from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
 from labkit.metrics import wilson_interval
 from labkit.pipeline import Perception, Pipeline
-from labkit.support.validation import require
 
 FIRST_SEED, SCENES, SIZE = 600_000, 60, (320, 240)
 
@@ -61,7 +60,8 @@ def spoil(mask: Bool[np.ndarray, "H W"], kind: str, strength: int | float, seed:
 
     Raises ValueError for an unknown kind.
     """
-    require("kind", kind in KINDS, f"one of {', '.join(KINDS)}", repr(kind))
+    if kind not in KINDS:
+        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
     return KINDS[kind][1](mask, strength, np.random.default_rng([seed, list(KINDS).index(kind)]))
 
 
@@ -115,9 +115,11 @@ def try_lift(spec, perception: Perception, name: str) -> tuple[bool, str]:
     return result.success, result.reason
 
 
-def run(out, first_seed: int = FIRST_SEED, scenes: int = SCENES, workers: int = 1, progress: bool = True) -> list[Row]:
+def run(
+    out, first_seed: int = FIRST_SEED, scenes: int = SCENES, workers: int = 1, progress=True, dask=None
+) -> list[Row]:
     """Run all trials of so many scenes and write them to `out`, as `trials.make_table` does."""
-    return trials.make_table(out, Row, trials_of_scene, range(first_seed, first_seed + scenes), workers, progress)
+    return trials.make_table(out, Row, trials_of_scene, range(first_seed, first_seed + scenes), workers, progress, dask)
 
 
 def read(path) -> list[Row]:

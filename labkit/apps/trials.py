@@ -1,36 +1,31 @@
-"""Trials over many scenes, in several processes if wanted, and their table: a CSV file with a row for each trial."""
+"""Trials over many scenes, here or on a cluster, and their table: a CSV file with a row for each trial."""
 
 import csv
 import io
-import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import astuple, fields
 from pathlib import Path
 
 from tqdm.auto import tqdm
 
+from labkit.support.executors import executor_for
 from labkit.support.files import write_atomically
 
 
-def in_processes(function: Callable, items: Iterable, workers: int = 1) -> Iterator:
-    """Yield function(item) for each item, in their order; with several workers in as many processes."""
-    if workers == 1:
-        yield from map(function, items)
-        return
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_one_thread) as executor:
-        yield from executor.map(function, items)
-
-
-def _one_thread() -> None:
-    """Workers share the cores among themselves, not each with all threads of PyTorch."""
-    import torch
-
-    torch.set_num_threads(1)
+def in_order(function: Callable, items: Iterable, workers: int = 1, dask: str | None = None) -> Iterator:
+    """Yield function(item) for each item, in their order; where they run says `executor_for`."""
+    with executor_for(workers, dask) as executor:
+        yield from map(function, items) if executor is None else executor.map(function, items)
 
 
 def make_table(
-    out, kind: type, trials_of_scene: Callable[[int], list], seeds: Sequence[int], workers: int = 1, progress=True
+    out,
+    kind: type,
+    trials_of_scene: Callable[[int], list],
+    seeds: Sequence[int],
+    workers: int = 1,
+    progress=True,
+    dask=None,
 ) -> list:
     """Try every scene and write the rows to `out`, scene by scene in the order of `seeds`; returns them.
 
@@ -46,7 +41,7 @@ def make_table(
         raise ValueError(f"out: {unfinished} is of other scenes; remove it, or ask for those")
     missing = [seed for seed in seeds if seed not in done]
     with tqdm(total=len(seeds), initial=len(done), unit="scene", disable=not progress) as bar:
-        for rows in in_processes(trials_of_scene, missing, workers):
+        for rows in in_order(trials_of_scene, missing, workers, dask):
             done[rows[0].seed] = rows
             write_rows(unfinished, [row for seed in sorted(done) for row in done[seed]])
             bar.update()

@@ -30,7 +30,7 @@ from labkit.sim.planning import (
     trajectory,
 )
 from labkit.sim.world import TIME_STEP, World
-from labkit.support.validation import check_finite, check_shape, check_T, require
+from labkit.support.validation import check_finite, check_shape, check_T
 
 ARM_JOINTS = tuple(range(7))
 FINGER_JOINTS = (9, 10)
@@ -81,7 +81,8 @@ class Panda:
     """
 
     def __init__(self, world: World):
-        require("world", world.robot is not None, "a scene with a robot", "a spec with robot=False")
+        if world.robot is None:
+            raise ValueError("world: expected a scene with a robot, got a spec with robot=False")
         self.world = world
         self._target = self.q  # the joint angles last sent to the motors
         self._opening = self.opening  # what the hand is to keep to while open, metres
@@ -130,7 +131,8 @@ class Panda:
         closes there. Raises ValueError if the plan does not begin where the arm is.
         """
         off = np.abs(plan.transit[0][0] - self.q).max()
-        require("plan", off <= 0.05, "one that begins at the arm's joints", f"one that is {off:.2f} rad off")
+        if off > 0.05:
+            raise ValueError(f"plan: expected one that begins at the arm's joints, got one that is {off:.2f} rad off")
         self._opening, self._gripping = plan.opening, False
         if not all(self._follow_or_back_off(leg) for leg in plan.transit):
             return "blocked on the way over"

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Integer, UInt8
 from scipy import ndimage
-from scipy.cluster.vq import kmeans2, vq
+from scipy.cluster import vq
 
-from labkit.support.validation import check_finite, check_rgb, check_shape, require
+from labkit.support.validation import check_finite, check_rgb, check_shape
 
 SAMPLE = 4096  # pixels that the means are found from; all pixels are then assigned to them
 
@@ -28,8 +28,8 @@ def kmeans(
     X = check_finite("X", check_shape("X", X, (None, None))).astype(np.float64)
     if not 1 <= k <= len(np.unique(X, axis=0)):
         raise ValueError(f"k: expected 1 to {len(np.unique(X, axis=0))}, the number of different points, got {k}")
-    means, _ = kmeans2(X, k, iter=iterations, minit="++", missing="raise", rng=np.random.default_rng(seed))
-    return means, vq(X, means)[0]
+    means, _ = vq.kmeans2(X, k, iter=iterations, minit="++", missing="raise", rng=np.random.default_rng(seed))
+    return means, vq.vq(X, means)[0]
 
 
 def segment_kmeans(rgb: UInt8[np.ndarray, "H W 3"], k: int, seed: int = 0) -> UInt8[np.ndarray, "H W"]:
@@ -41,7 +41,7 @@ def segment_kmeans(rgb: UInt8[np.ndarray, "H W 3"], k: int, seed: int = 0) -> UI
     """
     lab = cv2.cvtColor(check_rgb("rgb", rgb).astype(np.float32) / 255.0, cv2.COLOR_RGB2Lab).reshape(-1, 3)
     means, _ = kmeans(lab[:: max(1, len(lab) // SAMPLE)], k, seed)
-    regions = vq(lab, means)[0]
+    regions = vq.vq(lab, means)[0]
     order = np.argsort(-np.bincount(regions, minlength=k), kind="stable")
     rank = np.empty(k, np.uint8)
     rank[order] = np.arange(k)
@@ -58,7 +58,8 @@ def components(regions: Integer[np.ndarray, "H W"], connectivity: int = 4) -> In
            [3, 1, 1]], dtype=int32)
     """
     regions = check_shape("regions", regions, (None, None))
-    require("connectivity", connectivity in (4, 8), "4 or 8", repr(connectivity))
+    if connectivity not in (4, 8):
+        raise ValueError(f"connectivity: expected 4 or 8, got {connectivity!r}")
     pieces, structure = np.zeros(regions.shape, np.int32), ndimage.generate_binary_structure(2, connectivity // 4)
     for value in np.unique(regions):
         found, _ = ndimage.label(regions == value, structure)
@@ -135,7 +136,8 @@ class Typical:
 def learn_typical(masks: Sequence[Bool[np.ndarray, "H W"]]) -> Typical:
     """Learn what wanted pieces look like from true masks of one each; raises ValueError for fewer than five."""
     rows = [measure(mask.astype(np.int32)).features() for mask in masks if mask.any()]
-    require("masks", len(rows) >= 5, "at least five with a pixel, to learn three features from", len(rows))
+    if len(rows) < 5:
+        raise ValueError(f"masks: expected at least five with a pixel, to learn three features from, got {len(rows)}")
     features = np.concatenate(rows)
     return Typical(features.mean(axis=0), np.cov(features.T) + 1e-6 * np.eye(3))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from labkit.apps import cli
-from labkit.apps.trials import in_processes, make_table, read_rows, write_rows
+from labkit.apps.trials import in_order, make_table, read_rows, write_rows
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def test_what_is_left_of_other_scenes_or_other_tables_is_not_mixed_in(tmp_path):
 
 
 def test_several_processes_give_results_in_order():
-    assert list(in_processes(abs, [-3, 2, -1], workers=2)) == [3, 2, 1]
+    assert list(in_order(abs, [-3, 2, -1], workers=2)) == [3, 2, 1]
 
 
 @pytest.mark.parametrize("command", [cli.compare, cli.study])

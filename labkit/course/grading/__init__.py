@@ -7,7 +7,7 @@ worker     the program in the sandbox: takes cells and arguments, sends numbers 
 channel    the other end: sends, waits until a deadline, and takes nothing but numbers
 grade      one submission: every question, whatever happens in the others
 copies     which answers hold the kit's own code
-batch      a folder of submissions: what changed is graded, here or on a Dask cluster
+batch      a folder of submissions: what changed is graded
 outputs    grades.csv, results.json, and `feedback`, a page per student
 markdown   a stranger's Markdown, made harmless
 gradebook  nbgrader's database and the copies that formgrader shows

@@ -1,4 +1,4 @@
-"""Grading submissions: what changed is graded, by threads here or on a Dask cluster, and kept as it comes.
+"""Grading submissions: what changed is graded, by threads, and kept as it comes.
 
 Each finished submission is a record, a file of its own that is written at once; a run that was killed is taken up by
 the next one. The record's key tells what it depends on: the lab, the submission, the secret, the limits and this code.
@@ -10,8 +10,8 @@ import json
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from tqdm.auto import tqdm
@@ -60,7 +60,6 @@ class Batch:
     out: Path
     secret: str
     workers: int = 1
-    dask: str | None = None
     force: bool = False
     unsafe: bool = False
     limits: Limits = field(default_factory=Limits)
@@ -71,7 +70,7 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
 
     Raises ValueError if no sandbox can be made.
     """
-    if not batch.unsafe and batch.dask is None:
+    if not batch.unsafe:
         sandbox.probe(("numpy",), batch.limits)
     code, total = code_digest(), len(batch.submissions)
     keys = {submission.student: key_of(batch, submission, code) for submission in batch.submissions}
@@ -82,8 +81,8 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
             records[student] = old
     waiting = [submission for submission in batch.submissions if submission.student not in records]
     bar = tqdm(total=total, initial=len(records), desc=batch.lab.topic, unit="student", disable=not progress)
-    with bar, executor_of(batch) as (executor, width):
-        for submission, results in graded(executor, width, batch, waiting):
+    with bar, closing(sandbox.servers), ThreadPoolExecutor(batch.workers) as executor:
+        for submission, results in graded(executor, batch, waiting):
             student = submission.student
             records[student] = Record(student, submission.reason, results, not batch.unsafe, keys[student])
             write_record(batch.out, records[student])
@@ -92,10 +91,9 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
 
 
 def graded(
-    executor: Executor, width: int, batch: Batch, waiting: Iterable[Submission]
+    executor: Executor, batch: Batch, waiting: Iterable[Submission]
 ) -> Iterator[tuple[Submission, tuple[Result, ...]]]:
     """Grade submissions, a few at a time; gives each with its results, as they are ready."""
-    lab = replace(batch.lab, notebook={})  # which grading does not need, and a cluster would be sent
     pending: dict[Future, Submission] = {}
     queue = iter(waiting)
     try:
@@ -104,9 +102,9 @@ def graded(
                 if submission.reason:
                     yield submission, ()
                     continue
-                task = (lab, submission, batch.secret, batch.limits, batch.unsafe)
+                task = (batch.lab, submission, batch.secret, batch.limits, batch.unsafe)
                 pending[executor.submit(grade_submission, *task)] = submission
-                if len(pending) >= width:
+                if len(pending) >= 2 * batch.workers:
                     break
             if not pending:
                 return
@@ -115,22 +113,6 @@ def graded(
     finally:
         for future in pending:
             future.cancel()
-
-
-@contextmanager
-def executor_of(batch: Batch) -> Iterator[tuple[Executor, int]]:
-    """Threads, each of which waits for a worker of its own, or a Dask cluster; and how many tasks to keep in flight."""
-    if batch.dask is None:
-        try:
-            with ThreadPoolExecutor(batch.workers) as executor:
-                yield executor, 2 * batch.workers
-        finally:
-            sandbox.servers.close()
-        return
-    from distributed import Client
-
-    with Client(batch.dask) as client:
-        yield client.get_executor(pure=False), max(2, 2 * sum(client.nthreads().values()))
 
 
 # ------------------------------------------------------------------------------------------------------ records

@@ -1,4 +1,4 @@
-"""A folder of submissions: what is written, what is graded again, what a killed run leaves, Dask, the gradebook."""
+"""A folder of submissions: what is written, what is graded again, what a killed run leaves, the gradebook."""
 
 import csv
 import html
@@ -239,16 +239,6 @@ def test_killed_in_the_middle_and_run_again(course):
     assert graded.graded_now == 3 and [r.points for r in graded.records] == [TOTAL, 0.0, TOTAL, TOTAL, TOTAL]
     kept = files(course / "grades")
     assert grade(course, force=True).graded_now == 5 and files(course / "grades") == kept
-
-
-def test_a_dask_cluster_gives_the_same_bytes(course):
-    from distributed import LocalCluster
-
-    grade(course)
-    here = files(course / "grades")
-    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster:
-        graded = grade(course, force=True, dask=cluster.scheduler_address)
-    assert graded.graded_now == 3 and files(course / "grades") == here
 
 
 # --------------------------------------------------------------------------------------- without a sandbox

@@ -1,0 +1,251 @@
+"""How `make site` makes a static site of the repository: lessons, labs, guides, and reference pages from docstrings.
+
+The pages are the repository's own files, where they lie; nothing is written twice. Four hooks adapt them: links into
+the code lead to its reference page, views in 3-D get one plotly for the whole site, docstrings and lessons are linked
+both ways by the topic's number, and README becomes the first page. Everything is bundled: the site needs no network.
+"""
+
+import importlib
+import json
+import os
+import pkgutil
+import re
+import shutil
+from collections import defaultdict
+from pathlib import Path
+
+import plotly
+
+import labkit
+from labkit import losses  # noqa: F401  torch first: its threads must not meet those of other libraries half loaded
+
+ROOT = Path(__file__).parents[2]
+project, author, version = "labkit", "the labkit authors", importlib.metadata.version("labkit")
+project_copyright = "the labkit authors, MIT licence"
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx-mathjax-offline"]
+root_doc = "README"
+include_patterns = [
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "BENCHMARKS.md",
+    "labkit/weights/MODEL_CARD.md",
+    "lessons/*.ipynb",
+    "lessons/*.md",
+    "labs/*/*.ipynb",
+    "docs/*.md",
+    "out/reference/*.rst",
+]
+myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_heading_anchors = 4
+nb_execution_mode = "off"
+nb_ipywidgets_js = {}
+autodoc_default_options = {"members": True, "show-inheritance": False, "member-order": "bysource"}
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+python_use_unqualified_type_names = True
+
+html_theme = "sphinx_book_theme"
+html_title = "labkit"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_theme_options = {
+    "use_download_button": True,
+    "use_fullscreen_button": False,
+    "show_toc_level": 2,
+    "home_page_in_toc": True,
+    "navbar_persistent": [],
+}
+
+GUIDES = {
+    "Guides": [
+        "docs/teaching",
+        "docs/grading",
+        "docs/library",
+        "docs/scale",
+        "CONTRIBUTING",
+        "docs/style",
+        "CHANGELOG",
+    ],
+    "How good it is": ["labkit/weights/MODEL_CARD", "BENCHMARKS", "docs/evidence"],
+}
+
+
+# ------------------------------------------------------------------------------------------- what stands where
+
+
+def written(folder: str, end: str) -> list[str]:
+    """Pages of a folder, as Sphinx names them."""
+    return sorted(str(path.relative_to(ROOT).with_suffix("")) for path in (ROOT / folder).rglob(f"*{end}"))
+
+
+def modules() -> list[str]:
+    """Every module of labkit that says what it is and that a reader of the reference may want."""
+    found = [info.name for info in pkgutil.walk_packages(labkit.__path__, "labkit.")]
+    hidden = re.compile(r"_kernels$|labkit\.course\.(questions|grading|widgets|jupyter)\b|\.ros2_types$|\._")
+    return ["data_gen", *(name for name in sorted(found) if not hidden.search(name))]
+
+
+def lesson_of(number: str) -> str | None:
+    """The page of a topic's first lesson, given its two digits."""
+    return next(iter(written("lessons", ".ipynb")[i] for i, page in enumerate(LESSONS) if f"/{number}_" in page), None)
+
+
+LESSONS = written("lessons", ".ipynb")
+TOPIC = re.compile(r"\bTopics? ((?:\d\d(?:_\w+)?(?:, | and )?)+)")
+derived: dict[str, set[str]] = defaultdict(set)  # lesson's page -> modules whose docstrings cite its topic
+
+
+def write_reference() -> None:
+    """Write a page per module, and note which lesson derives what it holds."""
+    out = ROOT / "out" / "reference"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    for name in modules():
+        module = importlib.import_module(name)
+        text = " ".join(
+            [
+                module.__doc__ or "",
+                *(str(x.__doc__) for x in vars(module).values() if getattr(x, "__module__", "") == name),
+            ]
+        )
+        for numbers in TOPIC.findall(text):
+            for number in re.findall(r"\d\d", numbers):
+                if page := lesson_of(number):
+                    derived[page].add(name)
+        title = f"``{name}``"
+        text = f"{title}\n{'=' * len(title)}\n\n.. automodule:: {name}\n"
+        if hasattr(module, "__path__"):  # its names are documented where they are written
+            inside = [other for other in modules() if other.rpartition(".")[0] == name]
+            text += "   :no-members:\n\n" + "\n".join(f"* :doc:`{other}`" for other in inside) + "\n"
+        (out / f"{name}.rst").write_text(text)
+
+
+def contents() -> str:
+    """The site's table of contents, as README's last lines."""
+    parts = {
+        "Lessons": [*LESSONS, "lessons/errata"],
+        "Labs": written("labs", ".ipynb"),
+        **{name: [page for page in pages if (ROOT / f"{page}.md").exists()] for name, pages in GUIDES.items()},
+        "Reference": [f"out/reference/{name}" for name in modules()],
+    }
+    trees = [
+        "\n".join(["", "```{toctree}", ":hidden:", f":caption: {name}", *(f"/{page}" for page in pages), "```", ""])
+        for name, pages in parts.items()
+    ]
+    return "\n".join(trees)
+
+
+# ------------------------------------------------------------------------------------------- how a page is read
+
+LINK = re.compile(r"(?<!!)\[([^\]\n]*)\]\((?!\w+:|#)([^)\s#]+)(#[^)\s]*)?\)")
+
+
+def links_that_lead_somewhere(text: str, folder: Path) -> str:
+    """Links to code lead to its reference page; the words of a link to a file that the site does not have stay."""
+
+    def mend(match: re.Match) -> str:
+        words, target, anchor = match.groups()
+        path = Path(os.path.normpath(ROOT / folder / target))
+        if not path.is_relative_to(ROOT):
+            return words
+        place = str(path.relative_to(ROOT))
+        module = place.removesuffix(".py").removesuffix("/").replace("/", ".").removesuffix(".__init__")
+        if module in REFERENCE:
+            return f"[{words}](/out/reference/{module}.rst)"
+        shown = path.suffix in (".md", ".ipynb") and any(path.match(str(ROOT / p)) for p in include_patterns)
+        return f"[{words}](/{place}{anchor or ''})" if shown and path.exists() else words
+
+    return LINK.sub(mend, text)
+
+
+def read_source(app, page: str, source: list[str]) -> None:
+    """Adapt a page: see the module's docstring."""
+    path = ROOT / page
+    if (ROOT / f"{page}.md").exists():
+        text = links_that_lead_somewhere(source[0], path.parent.relative_to(ROOT))
+        source[0] = text + contents() if page == root_doc else text
+        return
+    if not (ROOT / f"{page}.ipynb").exists():
+        return
+    notebook = json.loads(source[0])
+    for cell in notebook["cells"]:
+        text = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            cell["source"] = links_that_lead_somewhere(text, path.parent.relative_to(ROOT))
+        for output in cell.get("outputs", []):
+            show_in_3d(output.get("data", {}))
+        cell["metadata"]["mystnb"] = {"image": {"alt": what_is_shown(notebook["cells"], cell)}}
+    if page in derived:
+        links = ", ".join(f"[`{name}`](/out/reference/{name}.rst)" for name in sorted(derived[page]))
+        last = {"cell_type": "markdown", "metadata": {}, "id": "reference", "source": f"**In the kit:** {links}"}
+        notebook["cells"].append(last)
+    if page.startswith("labs/"):
+        words = (
+            f"{{download}}`Download this lab <{Path(page).name}.ipynb>` and open it in JupyterLab: here it only reads."
+        )
+        notebook["cells"].insert(1, {"cell_type": "markdown", "metadata": {}, "id": "download", "source": words})
+    source[0] = json.dumps(notebook)
+
+
+def what_is_shown(cells: list[dict], cell: dict) -> str:
+    """Alternative text of a cell's figures: the section that they stand in, and what the lesson says right after."""
+    place = cells.index(cell)
+    words = [("".join(c["source"]) if c["cell_type"] == "markdown" else "") for c in cells]
+    titles = [line.strip("# ") for text in words[:place] for line in text.splitlines() if line.startswith("#")]
+    after = next((text for text in words[place + 1 : place + 3] if text), "")
+    plain = re.sub(r"<[^>]*>|[*`$#\[\]\\]|\([^)]*\.\w+\)", "", after)
+    sentence = re.split(r"(?<=[.!?])\s", " ".join(plain.split()))[0]
+    return f'Figure in "{titles[-1] if titles else "the lesson"}". {sentence}'
+
+
+def show_in_3d(data: dict) -> None:
+    """Turn a plotly figure into a place for one, which `_static/views.js` fills when the reader comes near."""
+    figure = data.pop("application/vnd.plotly.v1+json", None)
+    if figure is None:
+        return
+    text = json.dumps(figure).replace("</", "<\\/")
+    height = figure.get("layout", {}).get("height", 460)
+    data["text/html"] = (
+        f'<div class="view" style="height:{height}px" role="img" aria-label="A view in 3-D: drag to turn">'
+        f'<script type="application/json">{text}</script></div>'
+    )
+
+
+def plain_words(app, what, name, thing, options, lines: list[str]) -> None:
+    """Docstrings are plain English: "Topic 06" becomes a link to its lesson, `x`s and |x| stay what they are."""
+
+    def link(match: re.Match) -> str:
+        def one(number: re.Match) -> str:
+            page = lesson_of(number[0][:2])
+            return f":doc:`{number[0]} </{page}>`" if page else number[0]
+
+        return re.sub(r"\d\d(?:_\w+)?", one, match[0])
+
+    in_example = False
+    for i, line in enumerate(lines):
+        in_example = line.lstrip().startswith(">>>") or (in_example and line.strip() != "")
+        if not in_example:
+            line = re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", line).replace("|", "\\|").replace("*", "\\*")
+            line = re.sub(r"(?<=\w)_(?=\W|$)", r"\\_", line)
+            lines[i] = TOPIC.sub(link, line)
+
+
+def finish(app, error) -> None:
+    """The first page is index.html; plotly stands beside the pages once."""
+    if error is None:
+        shutil.copy(Path(app.outdir) / "README.html", Path(app.outdir) / "index.html")
+        script = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
+        shutil.copy(script, Path(app.outdir) / "_static" / "plotly.min.js")
+
+
+REFERENCE = set(modules())
+write_reference()
+
+
+def setup(app) -> None:
+    """Tell Sphinx of the hooks."""
+    app.add_js_file("views.js", defer="defer")
+    app.connect("source-read", read_source)
+    app.connect("autodoc-process-docstring", plain_words)
+    app.connect("build-finished", finish)

@@ -1,0 +1,65 @@
+"""Where many equal jobs run: in this process, in several, or on the workers of a Dask cluster."""
+
+import multiprocessing
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+
+import labkit
+
+
+@contextmanager
+def executor_for(workers: int = 1, dask: str | None = None) -> Iterator[Executor | None]:
+    """Give an executor of concurrent.futures: None for this process, or so many processes, or a cluster's workers.
+
+    dask: address of a Dask scheduler, "tcp://host:8786"; its workers have the same files and the same kit, or
+    ValueError names those that have not. A job whose worker dies is run again by another.
+    """
+    if dask is not None:
+        from distributed import Client
+
+        try:
+            client = Client(dask, timeout=20)
+        except OSError as error:
+            raise ValueError(f"dask: found no scheduler at {dask}") from error
+        with client:
+            _check_workers(client, dask)
+            yield client.get_executor(pure=False)
+    elif workers == 1:
+        yield None
+    else:
+        # Fresh processes: PyBullet and OpenCV must not be forked while they run. Each is replaced after some hundred
+        # jobs, which bounds what PyBullet's caches hold.
+        spawn = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, spawn, initializer=one_thread, max_tasks_per_child=400) as executor:
+            yield executor
+
+
+def one_thread() -> None:
+    """Workers share the cores among themselves, not each with all threads of PyTorch."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def kit_version() -> str:
+    """Name this installation of the kit: its version, and a digest of its code."""
+    files = sorted(Path(labkit.__file__).parent.rglob("*.py"))
+    return f"{version('labkit')}, code {sha256(b''.join(path.read_bytes() for path in files)).hexdigest()[:8]}"
+
+
+def _check_workers(client, address: str) -> None:
+    try:
+        found = client.run(kit_version)
+    except ImportError as error:
+        raise ValueError(f"dask: expected workers with labkit {kit_version()}, got some without the kit") from error
+    if not found:
+        raise ValueError(f"dask: expected workers at {address}, got none yet")
+    others = {where: what for where, what in found.items() if what != kit_version()}
+    if others:
+        where, what = next(iter(others.items()))
+        raise ValueError(f"dask: expected workers with labkit {kit_version()}, got {what} at {where}")
+    client.run(one_thread)

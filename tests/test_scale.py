@@ -1,0 +1,116 @@
+"""More than one machine's work on a real Dask scheduler with two workers, processes of their own on loopback."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor
+from pathlib import Path
+
+import pytest
+
+import data_gen
+from labkit.apps import mask_study
+from labkit.apps.evaluation import run_trials
+from labkit.support.executors import executor_for
+
+pytest.importorskip("distributed")
+ROOT = Path(__file__).parent.parent
+HERE = ("--host", "tcp://127.0.0.1")
+
+
+def start(*words: str, path: Path = ROOT) -> subprocess.Popen:
+    environment = os.environ | {"PYTHONPATH": str(path), "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen([sys.executable, "-m", *words], env=environment, cwd=path, stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """The scheduler's address, and a function that starts a worker."""
+    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
+    running = [
+        start("distributed.cli.dask_scheduler", "--scheduler-file", str(file), "--no-dashboard", "--port", "0", *HERE)
+    ]
+
+    def worker(path: Path = ROOT) -> subprocess.Popen:
+        words = ("--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard", *HERE)
+        running.append(start("distributed.cli.dask_worker", *words, path=path))
+        return running[-1]
+
+    from distributed import Client
+
+    while not file.exists():
+        time.sleep(0.1)
+    with Client(scheduler_file=str(file)) as client:
+        yield client, worker
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture(scope="module")
+def two_workers(cluster):
+    client, worker = cluster
+    workers = [worker(), worker()]
+    client.wait_for_workers(2, timeout=60)
+    return client, workers
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def test_a_worker_killed_in_the_middle_costs_nothing_but_time(two_workers, tmp_path):
+    """Same bytes as in this process, though one of two workers dies after the first frames."""
+    client, workers = two_workers
+    seeds = range(12)
+    data_gen.generate(tmp_path / "here", seeds, "test", (64, 48), progress=False)
+    with executor_for(dask=client.scheduler.address) as executor:
+
+        class Watched(Executor):
+            """Kills a worker when the fourth job comes back."""
+
+            def submit(self, function, *job):
+                future = executor.submit(function, *job)
+                if job[1] == 3:
+                    future.add_done_callback(lambda _: os.kill(workers[0].pid, signal.SIGKILL))
+                return future
+
+        data_gen.generate(tmp_path / "there", seeds, "test", (64, 48), Watched(), progress=False)
+    assert workers[0].wait(timeout=30) == -signal.SIGKILL
+    assert files(tmp_path / "there") == files(tmp_path / "here")
+
+
+def test_scores_and_tables_are_those_of_one_process(two_workers, tmp_path):
+    address = two_workers[0].scheduler.address
+    specs = [data_gen.sample_scene(seed, "test") for seed in (3, 4)]
+    here, there = (run_trials(specs, None, (96, 72), progress=False, dask=dask) for dask in (None, address))
+    assert [(a.lifted, a.reason, a.counts.tolist()) for a in here] == [
+        (b.lifted, b.reason, b.counts.tolist()) for b in there
+    ]
+    for name, dask in (("here", None), ("there", address)):
+        mask_study.run(tmp_path / name, scenes=1, progress=False, dask=dask)
+    assert (tmp_path / "here").read_bytes() == (tmp_path / "there").read_bytes()
+
+
+def test_a_worker_with_another_kit_is_refused_in_a_line(cluster, tmp_path):
+    """Another version: the same package with one more line."""
+    client, worker = cluster
+    subprocess.run(["cp", "-r", str(ROOT / "labkit"), str(ROOT / "data_gen"), str(tmp_path)], check=True)
+    with (tmp_path / "labkit" / "losses.py").open("a") as file:
+        file.write("# newer\n")
+    before = len(client.scheduler_info()["workers"])
+    other = worker(tmp_path)
+    client.wait_for_workers(before + 1, timeout=60)
+    refused = pytest.raises(ValueError, match=r"dask: expected workers with labkit .*, got .* at tcp://")
+    with refused, executor_for(dask=client.scheduler.address):
+        pass
+    other.kill()
+
+
+@pytest.mark.bad_input
+def test_no_scheduler_is_said():
+    refused = pytest.raises(ValueError, match=r"dask: found no scheduler at tcp://127\.0\.0\.1:9")
+    with refused, executor_for(dask="tcp://127.0.0.1:9"):
+        pass
