@@ -95,7 +95,7 @@ def test_the_library_imports_without_jupyter_and_without_the_simulator():
     ("names", "unloaded"),
     [
         ("labkit", "numpy torch IPython cv2"),
-        ("labkit.crf labkit.grasp", "numba"),
+        ("labkit.pipeline labkit.grasp", "numba"),
         ("labkit.pipeline labkit.apps.evaluation labkit.sim.spec", "pybullet"),
         ("labkit.sim.panda", ""),  # PyBullet's greeting would stand in every notebook
     ],
