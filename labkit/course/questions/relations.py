@@ -134,7 +134,7 @@ def axes_in_another_order(view: View) -> str:
     """Of three or four axes."""
     for order in itertools.permutations(axes(view)) if 3 <= len(axes(view)) <= 4 else ():
         if view.gives(lambda e, order=order: np.transpose(e, order)):
-            return f"The values are right, the axes are in another order: your axis 0 should be axis {order[0]}."
+            return f"The values are right; your axes are the right ones in the order {', '.join(map(str, order))}."
     return ""
 
 

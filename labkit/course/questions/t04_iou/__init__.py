@@ -39,13 +39,3 @@ def divide(part, whole, empty=np.nan):
 def iou_of(n, empty=np.nan):
     correct, predicted, true = parts(n)
     return divide(correct, predicted + true - correct, empty)
-
-
-def recall_of(n):
-    correct, _, true = parts(n)
-    return divide(correct, true)
-
-
-def precision_of(n):
-    correct, predicted, _ = parts(n)
-    return divide(correct, predicted)
