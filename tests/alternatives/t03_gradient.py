@@ -2,10 +2,8 @@
 
 import numpy as np
 
-# ---------- softmax
 
-
-def softmax_loops(z):
+def softmax__loops(z):
     out = np.empty(z.shape)
     for place in np.ndindex(z.shape[:-1]):
         total = sum(np.exp(other - max(z[place])) for other in z[place])
@@ -14,23 +12,20 @@ def softmax_loops(z):
     return out
 
 
-def softmax_einsum(z):
+def softmax__einsum(z):
     e = np.exp(z - np.maximum.reduce(z, axis=-1)[..., None])
     return np.einsum("...c,...->...c", e, 1.0 / np.einsum("...c->...", e))
 
 
-def softmax_float32(z):
-    return softmax_einsum(z.astype(np.float32))
+def softmax__float32(z):
+    return softmax__einsum(z.astype(np.float32))
 
 
-# ---------- log_sum_exp
-
-
-def log_sum_exp_pairwise(z):
+def log_sum_exp__pairwise(z):
     return np.logaddexp.reduce(z, axis=-1)
 
 
-def log_sum_exp_loops(z):
+def log_sum_exp__loops(z):
     out = np.empty(z.shape[:-1])
     for place in np.ndindex(out.shape):
         top = max(z[place])
@@ -38,14 +33,11 @@ def log_sum_exp_loops(z):
     return out
 
 
-def log_sum_exp_float32(z):
-    return log_sum_exp_pairwise(z.astype(np.float32))
+def log_sum_exp__float32(z):
+    return log_sum_exp__pairwise(z.astype(np.float32))
 
 
-# ---------- cross_entropy
-
-
-def cross_entropy_loops(z, y):
+def cross_entropy__loops(z, y):
     total = 0.0
     for place in np.ndindex(y.shape):
         if y[place] != 255:
@@ -54,20 +46,17 @@ def cross_entropy_loops(z, y):
     return total
 
 
-def cross_entropy_one_hot(z, y):
+def cross_entropy__one_hot(z, y):
     Y = (y[..., None] == np.arange(z.shape[-1])).astype(float)
     log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
     return -(Y * log_p).sum()
 
 
-def cross_entropy_float32(z, y):
-    return cross_entropy_one_hot(z.astype(np.float32), y)
+def cross_entropy__float32(z, y):
+    return cross_entropy__one_hot(z.astype(np.float32), y)
 
 
-# ---------- cross_entropy_grad
-
-
-def grad_loops(z, y):
+def cross_entropy_grad__loops(z, y):
     out = np.zeros(z.shape)
     for place in np.ndindex(y.shape):
         if y[place] != 255:
@@ -77,7 +66,7 @@ def grad_loops(z, y):
     return out
 
 
-def grad_in_place(z, y):
+def cross_entropy_grad__in_place(z, y):
     p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
     counted = y != 255
     rows = np.nonzero(counted)
@@ -85,14 +74,11 @@ def grad_in_place(z, y):
     return np.einsum("...c,...->...c", p, counted)
 
 
-def grad_float32(z, y):
-    return grad_in_place(z.astype(np.float32), y)
+def cross_entropy_grad__float32(z, y):
+    return cross_entropy_grad__in_place(z.astype(np.float32), y)
 
 
-# ---------- numerical_grad
-
-
-def numerical_grad_in_place(z, y, h):
+def numerical_grad__in_place(z, y, h):
     moved, out = z.astype(float), []
     for c in range(len(z)):
         values = []
@@ -104,45 +90,32 @@ def numerical_grad_in_place(z, y, h):
     return np.array(out)
 
 
-def numerical_grad_at_once(z, y, h):
+def numerical_grad__at_once(z, y, h):
     both = z + np.multiply.outer([h, -h], np.eye(len(z)))  # (2, C, C): up and down, the moved logit, the logits
     losses = np.logaddexp.reduce(both, axis=-1) - both[..., y]
     return (losses[0] - losses[1]) / (2.0 * h)
 
 
-def numerical_grad_float32(z, y, h):
+def numerical_grad__float32(z, y, h):
     steps = np.float32(h) * np.eye(len(z), dtype=np.float32)
     up, down = (z.astype(np.float32) + sign * steps for sign in (1, -1))
     return (np.log(np.exp(up).sum(1)) - up[:, y] - np.log(np.exp(down).sum(1)) + down[:, y]) / np.float32(2 * h)
 
 
-# ---------- receptive_field
-
-
-def field_backwards(kernels, strides):
+def receptive_field__backwards(kernels, strides):
     size = 1
     for kernel, stride in list(zip(kernels, strides, strict=True))[::-1]:
         size = (size - 1) * int(stride) + int(kernel)
     return size
 
 
-def field_products(kernels, strides):
+def receptive_field__products(kernels, strides):
     jumps = np.cumprod([1, *strides[:-1]])
     return 1 + int(np.dot(np.asarray(kernels) - 1, jumps))
 
 
-def field_by_counting(kernels, strides):
+def receptive_field__by_counting(kernels, strides):
     seen = {0}  # inputs of the last layer's output 0, then of the layer before, and so on
     for kernel, stride in list(zip(kernels, strides, strict=True))[::-1]:
         seen = {place * int(stride) + offset for place in seen for offset in range(int(kernel))}
     return max(seen) - min(seen) + 1
-
-
-ALTERNATIVES = {
-    "softmax": (softmax_loops, softmax_einsum, softmax_float32),
-    "log_sum_exp": (log_sum_exp_pairwise, log_sum_exp_loops, log_sum_exp_float32),
-    "cross_entropy": (cross_entropy_loops, cross_entropy_one_hot, cross_entropy_float32),
-    "cross_entropy_grad": (grad_loops, grad_in_place, grad_float32),
-    "numerical_grad": (numerical_grad_in_place, numerical_grad_at_once, numerical_grad_float32),
-    "receptive_field": (field_backwards, field_products, field_by_counting),
-}
