@@ -7,5 +7,3 @@ dataset, load(path) reads it.
 from data_gen.dataset import Dataset, Joined, generate, load, render, verify
 from data_gen.scenes import CONFIGS, sample_scene
 from labkit.geometry.sensor import DepthSensor
-
-__all__ = ["CONFIGS", "Dataset", "DepthSensor", "Joined", "generate", "load", "render", "sample_scene", "verify"]

@@ -29,6 +29,7 @@ from labkit.labels import CLASSES
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
+from labkit.support.validation import require
 
 VERSION = 1
 DEPTH_UNIT_MM = 0.1  # one step of the 16-bit files: finer than any sensor, and 6.5 m still fit
@@ -85,10 +86,8 @@ def generate(
 def _request(seeds, config, size, sensor) -> dict:
     """What makes a dataset the one that was asked for."""
     width, height = size
-    if config not in CONFIGS:
-        raise ValueError(f"config: expected one of {sorted(CONFIGS)}, got {config!r}")
-    if min(width, height) < 1:
-        raise ValueError(f"size: expected width and height of at least 1, got {size}")
+    require("config", config in CONFIGS, f"one of {sorted(CONFIGS)}", repr(config))
+    require("size", min(width, height) >= 1, "width and height of at least 1", size)
     return {
         "version": VERSION,
         "config": config,

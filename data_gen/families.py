@@ -5,7 +5,7 @@ and obstacle. Each recipe takes a generator and `hard`, which asks for proportio
 never sees.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,24 +40,31 @@ def box(length, width, height, at=(0.0, 0.0, 0.0), turn=0.0) -> Part:
     return Part("box", (length, width, height), at, quaternion(0.0, 0.0, turn))
 
 
-def wedge_ring(outer: float, inner: float, height: float, sides: int, z: float = 0.0) -> tuple[Part, ...]:
-    """A ring about z as convex pieces: outer and inner are radii at the corners."""
-    parts = []
-    for i in range(sides):
-        ends = 2.0 * np.pi * np.array([i, i + 1]) / sides
-        corners = [(r * np.cos(t), r * np.sin(t), z + h) for h in (0.0, height) for r in (inner, outer) for t in ends]
-        parts.append(Part("hull", tuple(float(x) for corner in corners for x in corner)))
-    return tuple(parts)
+def hull(corners) -> Part:
+    """The convex hull of points (x, y, z)."""
+    return Part("hull", tuple(float(x) for corner in corners for x in corner))
+
+
+def wedge_ring(levels: Sequence[tuple[float, float, float]], sides: int) -> tuple[Part, ...]:
+    """A ring about z as convex pieces; levels: (height, inner, outer radius at the corners), the lower one first."""
+    ends = [2.0 * np.pi * np.array([i, i + 1]) / sides for i in range(sides)]
+    return tuple(
+        hull([(r * np.cos(t), r * np.sin(t), z) for z, *radii in levels for r in radii for t in pair]) for pair in ends
+    )
 
 
 def frustum(bottom: float, top: float, height: float, sides: int, z: float = 0.0) -> Part:
     """A cone or pyramid about z, cut off where its radius is `top`."""
-    corners = [
-        (r * np.cos(t), r * np.sin(t), z + h)
-        for r, h in ((bottom, 0.0), (max(top, 1e-4), height))
-        for t in 2.0 * np.pi * np.arange(sides) / sides
-    ]
-    return Part("hull", tuple(float(x) for corner in corners for x in corner))
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    levels = (bottom, 0.0), (max(top, 1e-4), height)
+    return hull([(r * np.cos(t), r * np.sin(t), z + h) for r, h in levels for t in angles])
+
+
+def studs(pitch: float, nx: int, ny: int, z: float) -> list[Part]:
+    """The studs of a brick, nx by ny of them, with their middles at height z."""
+    size = (0.3 * pitch, 0.22 * pitch)
+    places = [(pitch * (i - (nx - 1) / 2), pitch * (j - (ny - 1) / 2), z) for i in range(nx) for j in range(ny)]
+    return [Part("cylinder", size, place) for place in places]
 
 
 # Targets ------------------------------------------------------------------------------------------------------------
@@ -74,7 +81,7 @@ def mug(rng: np.random.Generator, hard: bool) -> Body:
     grip = rng.uniform(0.45, 0.6) * height
     side = 0.007
     parts = (
-        *wedge_ring(radius, radius - wall, height, 14),
+        *wedge_ring([(0.0, radius - wall, radius), (height, radius - wall, radius)], 14),
         Part("cylinder", (radius - wall / 2, wall), (0.0, 0.0, wall / 2)),
         box(handle - radius + 0.004, side, side, ((handle + radius) / 2 - 0.003, 0.0, height / 2 + grip / 2)),
         box(handle - radius + 0.004, side, side, ((handle + radius) / 2 - 0.003, 0.0, height / 2 - grip / 2)),
@@ -96,16 +103,7 @@ def lego(rng: np.random.Generator, hard: bool) -> Body:
     pitch = rng.uniform(0.018, 0.022)
     nx, ny = [(3, 2), (4, 2), (3, 1), (4, 1)][rng.integers(4)]
     height = 1.2 * pitch
-    studs = [
-        Part(
-            "cylinder",
-            (0.3 * pitch, 0.22 * pitch),
-            (pitch * (i - (nx - 1) / 2), pitch * (j - (ny - 1) / 2), 0.61 * height),
-        )
-        for i in range(nx)
-        for j in range(ny)
-    ]
-    return Body(UPRIGHT, parts=(box(nx * pitch, ny * pitch, height), *studs))
+    return Body(UPRIGHT, parts=(box(nx * pitch, ny * pitch, height), *studs(pitch, nx, ny, 0.61 * height)))
 
 
 def block(rng: np.random.Generator, hard: bool) -> Body:
@@ -136,7 +134,8 @@ def ring(rng: np.random.Generator, hard: bool) -> Body:
     outer = rng.uniform(0.03, 0.042)
     inner = outer - rng.uniform(0.012, 0.018)
     sides = int(rng.integers(4, 7)) if hard else 18
-    return Body(UPRIGHT, parts=wedge_ring(outer, inner, rng.uniform(0.02, 0.035), sides))
+    height = rng.uniform(0.02, 0.035)
+    return Body(UPRIGHT, parts=wedge_ring([(0.0, inner, outer), (height, inner, outer)], sides))
 
 
 def bottle(rng: np.random.Generator, hard: bool) -> Body:
@@ -206,18 +205,10 @@ def can(rng: np.random.Generator, hard: bool) -> Body:
 def bowl(rng: np.random.Generator, hard: bool) -> Body:
     """A wide, low dish with a flared wall; hard: a square one."""
     radius, height, wall = rng.uniform(0.05, 0.065), rng.uniform(0.025, 0.035), 0.005
-    sides = 4 if hard else 16
-    wedges = []
-    for i in range(sides):
-        ends = 2.0 * np.pi * np.array([i, i + 1]) / sides
-        corners = [
-            ((r + lean) * np.cos(t), (r + lean) * np.sin(t), h)
-            for h, lean in ((0.0, 0.0), (height, 0.25 * radius))
-            for r in (0.7 * radius - wall, 0.7 * radius)
-            for t in ends
-        ]
-        wedges.append(Part("hull", tuple(float(x) for corner in corners for x in corner)))
-    return Body(UPRIGHT, parts=(frustum(0.7 * radius, 0.7 * radius, wall, sides), *wedges))
+    sides, foot = 4 if hard else 16, 0.7 * radius
+    lean = 0.25 * radius
+    wedges = wedge_ring([(0.0, foot - wall, foot), (height, foot - wall + lean, foot + lean)], sides)
+    return Body(UPRIGHT, parts=(frustum(foot, foot, wall, sides), *wedges))
 
 
 def teddy(rng: np.random.Generator, hard: bool) -> Body:

@@ -12,6 +12,7 @@ from labkit.labels import OBSTACLE, TARGET
 from labkit.sim.shapes import object_mesh
 from labkit.sim.spec import Camera, Light, ObjectSpec, SceneSpec, Table, Texture
 from labkit.sim.world import intrinsics
+from labkit.support.validation import require
 
 DROP_HEIGHT = 0.002  # objects start this far above the table
 TARGET_AREA = ((0.40, 0.62), (-0.20, 0.20))  # x and y of target centres: well within the arm's reach
@@ -77,10 +78,8 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
     (True, True)
     """
-    if config not in CONFIGS:
-        raise ValueError(f"config: expected one of {sorted(CONFIGS)}, got {config!r}")
-    if not (isinstance(seed, (int, np.integer)) and seed >= 0):
-        raise ValueError(f"seed: expected an integer of at least 0, got {seed!r}")
+    require("config", config in CONFIGS, f"one of {sorted(CONFIGS)}", repr(config))
+    require("seed", isinstance(seed, (int, np.integer)) and seed >= 0, "an integer of at least 0", repr(seed))
     kind = CONFIGS[config]
     rng = np.random.default_rng([kind.stream, int(seed)])
     table = _table(rng, kind)

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 from tqdm.auto import tqdm
 
 from data_gen.families import BOXES
@@ -44,7 +45,7 @@ def statistics(seeds: Iterable[int], config: str, size=(320, 240), progress: boo
             frame = world.render(size)
             for number, thing in enumerate(spec.objects, start=1):
                 if thing.class_id == TARGET:
-                    whole = np.count_nonzero(world.silhouette(thing.name, size))
+                    whole = np.count_nonzero(silhouette(world, thing.name, size))
                     seen = np.count_nonzero(frame.instances == number)
                     hidden.append(1.0 - seen / whole if whole else 1.0)
             middle = np.mean([world.centre(thing.name) for thing in targets], axis=0)
@@ -60,3 +61,16 @@ def statistics(seeds: Iterable[int], config: str, size=(320, 240), progress: boo
         camera=tuple(float(d) for d in np.quantile(distances, (0.05, 0.95))),
         target_pixels=float(np.median(pixels)),
     )
+
+
+def silhouette(world: World, name: str, size: tuple[int, int] = (320, 240)) -> Bool[np.ndarray, "H W"]:
+    """The pixels that an object would cover if no other object stood before it; the simulation stays as it is."""
+    number = 1 + list(world.bodies).index(name)
+    state = world.client.saveState()
+    for other, body in world.bodies.items():
+        if other != name:
+            world.client.resetBasePositionAndOrientation(body, (0.0, 0.0, -100.0), (0.0, 0.0, 0.0, 1.0))
+    mask = world.render(size).instances == number
+    world.client.restoreState(state)
+    world.client.removeState(state)
+    return mask

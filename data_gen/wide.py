@@ -9,25 +9,15 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from data_gen.families import ON_SIDE, UPRIGHT, Body, box, frustum, quaternion, wedge_ring
+from data_gen.families import ON_SIDE, UPRIGHT, Body, box, frustum, quaternion, studs, wedge_ring
 from labkit.sim.spec import Part
 
 ON_ITS_HEAD = (np.pi, 0.0, 0.0)
 
 
 def flared_ring(bottom: float, top: float, wall: float, height: float, sides: int) -> tuple[Part, ...]:
-    """A ring whose outer radius goes from `bottom` to `top`, as convex pieces: the wall of a cup."""
-    pieces = []
-    for i in range(sides):
-        ends = 2.0 * np.pi * np.array([i, i + 1]) / sides
-        corners = [
-            (r * np.cos(t), r * np.sin(t), h)
-            for outer, h in ((bottom, 0.0), (top, height))
-            for r in (outer - wall, outer)
-            for t in ends
-        ]
-        pieces.append(Part("hull", tuple(float(x) for corner in corners for x in corner)))
-    return tuple(pieces)
+    """A ring whose outer radius goes from `bottom` to `top`: the wall of a cup."""
+    return wedge_ring([(0.0, bottom - wall, bottom), (height, top - wall, top)], sides)
 
 
 def mug(rng: np.random.Generator) -> Body:
@@ -60,16 +50,8 @@ def lego(rng: np.random.Generator) -> Body:
     pitch = rng.uniform(0.014, 0.022)
     nx, ny = [(2, 2), (3, 3), (2, 1), (5, 2)][rng.integers(4)]
     height = pitch * (1.2 if rng.random() < 0.7 else 0.7)
-    studs = [
-        Part(
-            "cylinder",
-            (0.3 * pitch, 0.22 * pitch),
-            (pitch * (i - (nx - 1) / 2), pitch * (j - (ny - 1) / 2), height / 2 + 0.11 * pitch),
-        )
-        for i in range(nx)
-        for j in range(ny)
-    ]
-    return Body(UPRIGHT, parts=(box(nx * pitch, ny * pitch, height), *studs))
+    parts = (box(nx * pitch, ny * pitch, height), *studs(pitch, nx, ny, height / 2 + 0.11 * pitch))
+    return Body(UPRIGHT, parts=parts)
 
 
 def block(rng: np.random.Generator) -> Body:
@@ -100,7 +82,8 @@ def ring(rng: np.random.Generator) -> Body:
     """A ring of eight or more sides, thin or thick, low or high."""
     outer = rng.uniform(0.024, 0.048)
     inner = outer * rng.uniform(0.4, 0.75)
-    return Body(UPRIGHT, parts=wedge_ring(outer, inner, rng.uniform(0.014, 0.045), int(rng.integers(8, 19))))
+    height, sides = rng.uniform(0.014, 0.045), int(rng.integers(8, 19))
+    return Body(UPRIGHT, parts=wedge_ring([(0.0, inner, outer), (height, inner, outer)], sides))
 
 
 def bottle(rng: np.random.Generator) -> Body:

@@ -17,6 +17,7 @@ from labkit.support.validation import (
     check_same_size,
     check_shape,
     check_T,
+    require,
 )
 
 
@@ -55,14 +56,11 @@ class RGBDFrame:
         check_same_size("rgb", self.rgb, "depth", self.depth)
         put("K", check_K("K", self.K))
         put("T_base_cam", check_T("T_base_cam", self.T_base_cam))
-        if self.labels is not None:
-            labels = check_shape("labels", check_labels("labels", self.labels, IGNORE), (None, None))
-            check_same_size("rgb", self.rgb, "labels", labels)
-            put("labels", labels.astype(np.uint8, copy=False))
-        if self.instances is not None:
-            instances = check_shape("instances", check_labels("instances", self.instances, 256), (None, None))
-            check_same_size("rgb", self.rgb, "instances", instances)
-            put("instances", instances.astype(np.uint8, copy=False))
+        for name, count in (("labels", IGNORE), ("instances", 256)):
+            if getattr(self, name) is not None:
+                image = check_shape(name, check_labels(name, getattr(self, name), count), (None, None))
+                check_same_size("rgb", self.rgb, name, image)
+                put(name, image.astype(np.uint8, copy=False))
         if self.table_z is not None:
             put("table_z", check_height("table_z", self.table_z))
 
@@ -85,8 +83,7 @@ class RGBDFrame:
         depth_scale: metres for one unit of the depth file (0.001 for millimetres); 0 in the file is "no reading".
         Raises FileNotFoundError for a missing file, ValueError for one that is not such an image.
         """
-        if not (np.isfinite(depth_scale) and depth_scale > 0.0):
-            raise ValueError(f"depth_scale: expected metres for one unit, above 0, got {depth_scale}")
+        require("depth_scale", 0.0 < depth_scale < np.inf, "metres for one unit, above 0", depth_scale)
         raw_depth = read_image("depth", depth, np.uint16)
         return cls(
             rgb=read_image("rgb", rgb, np.uint8, colour=True),
@@ -106,12 +103,12 @@ def read_image(name: str, path, dtype, colour: bool = False) -> np.ndarray:
     or holds another kind of image.
     """
     data = np.frombuffer(Path(path).read_bytes(), np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR if colour else cv2.IMREAD_UNCHANGED) if data.size else None
+    how = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH if colour else cv2.IMREAD_UNCHANGED  # else it squeezes 16 bits into 8
+    image = cv2.imdecode(data, how) if data.size else None
     if image is None:
         raise ValueError(f"{name}: {path} is not an image that can be read (damaged or truncated?)")
-    if image.dtype != dtype or (not colour and image.ndim != 2):
-        raise ValueError(
-            f"{name}: expected {np.dtype(dtype).name} with {3 if colour else 1} channel(s) in {path}, "
-            f"got {image.dtype} with shape {image.shape}"
-        )
+    channels, hint = (3, "; are colour and depth swapped?") if colour else (1, "")
+    expected = f"{np.dtype(dtype).name} with {channels} channel(s) in {path}"
+    fits = image.dtype == dtype and (colour or image.ndim == 2)
+    require(name, fits, expected, f"{image.dtype} with shape {image.shape}{hint}")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if colour else image

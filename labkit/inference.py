@@ -15,7 +15,7 @@ from jaxtyping import Float32, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import geometry_channels, mirrored
-from labkit.support.validation import check_rgb
+from labkit.support.validation import check_rgb, require
 
 
 @dataclass(frozen=True)
@@ -42,20 +42,16 @@ class NetworkInput:
         if self.arrays not in (("image",), ("image", "geometry")):
             raise ValueError(f'arrays: expected ("image",) or ("image", "geometry"), got {self.arrays!r}')
         for name in ("mean", "std"):
-            if np.shape(getattr(self, name)) not in ((), (3,)):
-                raise ValueError(f"{name}: expected one number or three, got {getattr(self, name)!r}")
-        if not np.min(self.std) > 0.0:
-            raise ValueError(f"std: expected numbers above 0, got {self.std!r}")
-        if not self.divisor >= 1:
-            raise ValueError(f"divisor: expected at least 1, got {self.divisor!r}")
+            require(name, np.shape(getattr(self, name)) in ((), (3,)), "one number or three", repr(getattr(self, name)))
+        require("std", np.min(self.std) > 0.0, "numbers above 0", repr(self.std))
+        require("divisor", self.divisor >= 1, "at least 1", repr(self.divisor))
 
     def build(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> list[Float32[np.ndarray, "H W _"]]:
         """Build the arrays for one picture: a frame, or an RGB image for a network that takes nothing else."""
         is_frame = isinstance(picture, RGBDFrame)
         arrays = [self.scaled(picture.rgb if is_frame else check_rgb("rgb", picture))]
         if "geometry" in self.arrays:
-            if not is_frame:
-                raise ValueError("picture: expected an RGBDFrame, since the network looks at depth, got an RGB image")
+            require("picture", is_frame, "an RGBDFrame, since the network looks at depth", "an RGB image")
             depth, K, T = picture.depth, picture.K, picture.T_base_cam
             arrays.append(geometry_channels(depth, K, T, picture.table_z or 0.0))
         return arrays

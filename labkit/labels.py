@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Integer, Num, UInt8
 
-from labkit.support.validation import check_labels, check_rgb, check_same_size, check_shape
+from labkit.support.validation import check_labels, check_rgb, check_same_size, check_shape, require
 
 CLASSES = ("background", "surface", "target", "obstacle")
 BACKGROUND, SURFACE, TARGET, OBSTACLE = range(4)
@@ -40,8 +40,8 @@ def from_one_hot(Y: Num[np.ndarray, "*shape C"]) -> UInt8[np.ndarray, "*shape"]:
     if not np.isin(Y, (0, 1)).all():
         raise ValueError("Y: expected only 0 and 1; for probabilities use argmax over the last axis")
     count = Y.sum(axis=-1)
-    if count.size and count.max() > 1:
-        raise ValueError(f"Y: expected at most one class per pixel, got a pixel with {int(count.max())}")
+    most = int(count.max(initial=0))
+    require("Y", most <= 1, "at most one class per pixel", f"a pixel with {most}")
     return np.where(count == 0, IGNORE, Y.argmax(axis=-1)).astype(np.uint8)
 
 
@@ -67,7 +67,6 @@ def overlay(
     rgb = check_rgb("rgb", rgb)
     colours = colorize(y)
     check_same_size("rgb", rgb, "y", colours)
-    if not 0.0 <= alpha <= 1.0:
-        raise ValueError(f"alpha: expected a share in 0..1, got {alpha}")
+    require("alpha", 0.0 <= alpha <= 1.0, "a share in 0..1", alpha)
     mixed = (1.0 - alpha) * rgb + alpha * colours
     return np.where((np.asarray(y) == BACKGROUND)[..., None], rgb, mixed).astype(np.uint8)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64, Integer, Num
 
 from labkit.labels import IGNORE, one_hot
-from labkit.support.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_labels, check_shape, require
 
 if TYPE_CHECKING:
     import torch
@@ -27,7 +27,9 @@ def softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
     >>> softmax(np.array([1e4, 1e4, -1e4]))
     array([0.5, 0.5, 0. ])
     """
-    return _softmax(_check_logits(z))
+    z = _check_logits(z)
+    exponentials = np.exp(z - z.max(axis=-1, keepdims=True))
+    return exponentials / exponentials.sum(axis=-1, keepdims=True)
 
 
 def log_softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
@@ -38,7 +40,9 @@ def log_softmax(z: Num[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C
     >>> log_softmax(np.array([0.0, -1e4]))
     array([ 0., -10000.])
     """
-    return _log_softmax(_check_logits(z))
+    z = _check_logits(z)
+    shifted = z - z.max(axis=-1, keepdims=True)
+    return shifted - np.log(np.exp(shifted).sum(axis=-1, keepdims=True))
 
 
 def cross_entropy(
@@ -53,7 +57,7 @@ def cross_entropy(
     1.3863
     """
     z, Y, w = _check_pixels(z, y, weights)
-    return float(np.sum(Y * w * -_log_softmax(z)))
+    return float(np.sum(Y * w * -log_softmax(z)))
 
 
 def cross_entropy_grad(
@@ -68,7 +72,7 @@ def cross_entropy_grad(
     """
     z, Y, w = _check_pixels(z, y, weights)
     pixel_weights = Y @ w  # w[y], and 0 where the pixel is ignored
-    return pixel_weights[..., None] * (_softmax(z) - Y)
+    return pixel_weights[..., None] * (softmax(z) - Y)
 
 
 def class_weights(counts: Num[np.ndarray, " C"], scheme: str) -> Float64[np.ndarray, " C"]:
@@ -83,12 +87,9 @@ def class_weights(counts: Num[np.ndarray, " C"], scheme: str) -> Float64[np.ndar
     array([0.55555556, 5. , 1. ])
     """
     counts = check_finite("counts", check_shape("counts", counts, (None,))).astype(np.float64)
-    if counts.size and counts.min() < 0:
-        raise ValueError(f"counts: expected numbers of pixels, at least 0, got {counts.min():g}")
-    if not counts.any():
-        raise ValueError("counts: expected at least one pixel of some class, got none")
-    if scheme not in SCHEMES:
-        raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")
+    require("counts", counts.min(initial=0) >= 0, "numbers of pixels, at least 0", f"{counts.min(initial=0):g}")
+    require("counts", counts.any(), "at least one pixel of some class", "none")
+    require("scheme", scheme in SCHEMES, f"one of {', '.join(SCHEMES)}", repr(scheme))
     present = counts > 0
     w = np.ones(counts.size)
     w[present] = counts[present] ** SCHEMES[scheme]
@@ -108,14 +109,11 @@ def weighted_optimum(p: Num[np.ndarray, "*shape C"], w: Num[np.ndarray, " C"]) -
     array([0.5, 0.5])
     """
     p = check_finite("p", p).astype(np.float64)
-    if p.ndim < 1 or p.shape[-1] < 1:
-        raise ValueError(f"p: expected probabilities (..., C) of at least one class, got shape {p.shape}")
+    require("p", p.ndim >= 1 and p.shape[-1] >= 1, "probabilities (..., C) of at least one class", f"shape {p.shape}")
     off = np.abs(p.sum(axis=-1) - 1.0).max(initial=0.0)
-    if p.min(initial=0.0) < 0.0 or off > 1e-5:
-        raise ValueError(
-            f"p: expected probabilities of at least 0 that sum to 1 over the last axis, "
-            f"got a minimum of {p.min():.3g} and a sum that is off by {off:.3g}"
-        )
+    got = f"a minimum of {p.min(initial=0.0):.3g} and a sum that is off by {off:.3g}"
+    fits = p.min(initial=0.0) >= 0.0 and off <= 1e-5
+    require("p", fits, "probabilities of at least 0 that sum to 1 over the last axis", got)
     weighted = _check_weights("w", w, p.shape[-1]) * p
     return weighted / weighted.sum(axis=-1, keepdims=True)
 
@@ -136,20 +134,12 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
     import torch  # here, so that the NumPy half of this module does not wait for it
     from torch.nn.functional import cross_entropy
 
-    if logits.ndim != 4:
-        raise ValueError(f"logits: expected shape (N, C, H, W), got {tuple(logits.shape)}")
+    require("logits", logits.ndim == 4, "shape (N, C, H, W)", tuple(logits.shape))
     image_shape = (logits.shape[0], *logits.shape[2:])
-    if labels.shape != image_shape:
-        raise ValueError(f"labels: expected the shape (N, H, W) of logits, {image_shape}, got {tuple(labels.shape)}")
-    if labels.is_floating_point() or labels.is_complex() or labels.dtype == torch.bool:
-        raise ValueError(f"labels: expected integers, got {labels.dtype}")
-    num_classes = logits.shape[1]
+    require("labels", labels.shape == image_shape, f"the shape (N, H, W) of logits, {image_shape}", tuple(labels.shape))
+    check_labels("labels", labels.cpu().numpy(), logits.shape[1])
     labels = labels.long()
     counted = labels != IGNORE
-    wrong = counted & ((labels < 0) | (labels >= num_classes))
-    if wrong.any():
-        values = labels[wrong].unique()[:5].tolist()
-        raise ValueError(f"labels: expected labels 0 to {num_classes - 1} or {IGNORE}, got {values}")
     logits = logits if logits.dtype == torch.float64 else logits.float()
     # One sum finds any NaN or infinity; at an ignored pixel it would spare the loss and spoil the gradient.
     if not torch.isfinite(logits.detach().sum()):
@@ -157,41 +147,28 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
         raise ValueError(f"logits: expected finite numbers, got {bad} NaN or infinite; has the training diverged?")
     if weights is not None:
         array = torch.as_tensor(weights, dtype=torch.float64, device="cpu").detach().numpy()
-        weights = torch.from_numpy(_check_weights("weights", array, num_classes)).to(logits)
+        weights = torch.from_numpy(_check_weights("weights", array, logits.shape[1])).to(logits)
     losses = cross_entropy(logits, labels, weight=weights, ignore_index=IGNORE, reduction="none")
     # Summed in float64: in float32, a batch of some 100,000 pixels is off in the fourth digit.
     return (losses.sum(dtype=torch.float64) / counted.sum().clamp(min=1)).to(logits.dtype)
 
 
-def _softmax(z: Float64[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
-    exponentials = np.exp(z - z.max(axis=-1, keepdims=True))
-    return exponentials / exponentials.sum(axis=-1, keepdims=True)
-
-
-def _log_softmax(z: Float64[np.ndarray, "*shape C"]) -> Float64[np.ndarray, "*shape C"]:
-    shifted = z - z.max(axis=-1, keepdims=True)
-    return shifted - np.log(np.exp(shifted).sum(axis=-1, keepdims=True))
-
-
 def _check_logits(z) -> np.ndarray:
     z = check_finite("z", z)
-    if z.ndim < 1 or z.shape[-1] < 1:
-        raise ValueError(f"z: expected logits (..., C) of at least one class, got shape {z.shape}")
+    require("z", z.ndim >= 1 and z.shape[-1] >= 1, "logits (..., C) of at least one class", f"shape {z.shape}")
     return z.astype(np.float64, copy=False)
 
 
 def _check_weights(name: str, w, num_classes: int) -> np.ndarray:
     w = check_finite(name, check_shape(name, w, (num_classes,)))
-    if w.min() <= 0:
-        raise ValueError(f"{name}: expected one number above 0 for each class, got {w.min():g}")
+    require(name, w.min() > 0, "one number above 0 for each class", f"{w.min():g}")
     return w.astype(np.float64)
 
 
 def _check_pixels(z, y, weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the logits, the one-hot tensor Y (all zeros where ignored) and one weight per class."""
     z, y = _check_logits(z), np.asarray(y)
-    if y.shape != z.shape[:-1]:
-        raise ValueError(f"y: expected one label for each pixel of z, shape {z.shape[:-1]}, got {y.shape}")
+    require("y", y.shape == z.shape[:-1], f"one label for each pixel of z, shape {z.shape[:-1]}", y.shape)
     num_classes = z.shape[-1]
     w = np.ones(num_classes) if weights is None else _check_weights("weights", weights, num_classes)
     return z, one_hot(y, num_classes), w

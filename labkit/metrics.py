@@ -4,14 +4,12 @@ Counts add up over frames and scores do not: keep one confusion matrix (and one 
 test set, add each frame's to it, and divide once at the end. A score of 0 / 0 is NaN, neither 0 nor 1.
 """
 
-from statistics import NormalDist
-
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64, Integer, Num, UInt8
 
 from labkit.labels import IGNORE
-from labkit.support.validation import check_finite, check_labels, check_shape
+from labkit.support.validation import check_finite, check_labels, check_shape, check_whole, require
 
 
 def confusion_matrix(
@@ -29,7 +27,7 @@ def confusion_matrix(
     >>> confusion_matrix(np.array([0, 0, 1, 255]), np.array([0, 1, 1, 0]), 2)
     array([[1, 1], [0, 1]])
     """
-    from labkit.support.metrics_kernels import count_pairs  # here, so that importing this module waits for no numba
+    from labkit.support.label_kernels import count_pairs  # here, so that importing this module waits for no numba
 
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.
@@ -138,13 +136,11 @@ def boundary_counts(
     (array([1, 2]), array([2, 3]))
     """
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
-    if y_true.ndim < 2:
-        raise ValueError(f"y_true: expected images (..., H, W), got shape {y_true.shape}")
+    require("y_true", y_true.ndim >= 2, "images (..., H, W)", f"shape {y_true.shape}")
     _check_counted(y_true, y_pred, num_classes, ignore)
     if width is None:
         width = max(1, round(0.02 * np.hypot(*y_true.shape[-2:])))
-    if width < 1:
-        raise ValueError(f"width: expected at least 1 pixel, got {width}")
+    require("width", width >= 1, "at least 1 pixel", width)
 
     ignored = y_true == ignore
     true, pred = (np.where(ignored, np.uint8(IGNORE), y.astype(np.uint8)) for y in (y_true, y_pred))
@@ -181,20 +177,13 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
     >>> [round(bound, 3) for bound in wilson_interval(20, 20)]
     [0.839, 1.0]
     """
-    if trials < 1:
-        raise ValueError(f"trials: expected at least 1, got {trials}")
-    if not 0 <= successes <= trials:
-        raise ValueError(f"successes: expected 0 to {trials}, got {successes}")
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence: expected a share between 0 and 1, got {confidence}")
-    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
-    rate = successes / trials
-    spread = 1.0 + z**2 / trials
-    centre = (rate + z**2 / (2 * trials)) / spread
-    half = z * np.sqrt(rate * (1.0 - rate) / trials + z**2 / (4 * trials**2)) / spread
-    low = 0.0 if successes == 0 else float(centre - half)  # exactly 0, where rounding would miss it
-    high = 1.0 if successes == trials else float(centre + half)
-    return low, high
+    require("trials", trials >= 1, "at least 1", trials)
+    require("successes", 0 <= successes <= trials, f"0 to {trials}", successes)
+    require("confidence", 0.0 < confidence < 1.0, "a share between 0 and 1", confidence)
+    from scipy.stats import binomtest  # takes its time to import
+
+    interval = binomtest(int(successes), int(trials)).proportion_ci(confidence, "wilson")
+    return float(interval.low), float(interval.high)
 
 
 def reliability_counts(
@@ -237,22 +226,17 @@ def _ratio(part, whole):
 
 def _check_counts(n) -> np.ndarray:
     n = check_finite("n", n)
-    if n.ndim != 2 or n.shape[0] != n.shape[1]:
-        raise ValueError(f"n: expected a square confusion matrix (C, C), got shape {n.shape}")
-    if n.size and n.min() < 0:
-        raise ValueError(f"n: expected counts of at least 0, got {n.min()}")
+    require("n", n.ndim == 2 and n.shape[0] == n.shape[1], "a square confusion matrix (C, C)", f"shape {n.shape}")
+    require("n", n.min(initial=0) >= 0, "counts of at least 0", n.min(initial=0))
     return n.astype(np.float64)
 
 
 def _check_pair(y_true, y_pred, num_classes) -> tuple[np.ndarray, np.ndarray]:
-    if not isinstance(num_classes, int | np.integer) or not 1 <= num_classes <= IGNORE:
-        raise ValueError(f"num_classes: expected a whole number, 1 to {IGNORE}, got {num_classes!r}")
+    check_whole("num_classes", num_classes, 1, IGNORE)
     y_true, y_pred = np.asarray(y_true), np.asarray(y_pred)
     for name, y in (("y_true", y_true), ("y_pred", y_pred)):
-        if y.dtype.kind not in "iu":
-            raise ValueError(f"{name}: expected integer labels, got dtype {y.dtype}")
-    if y_true.shape != y_pred.shape:
-        raise ValueError(f"y_pred: expected the shape of y_true, {y_true.shape}, got {y_pred.shape}")
+        require(name, y.dtype.kind in "iu", "integer labels", f"dtype {y.dtype}")
+    require("y_pred", y_true.shape == y_pred.shape, f"the shape of y_true, {y_true.shape}", y_pred.shape)
     return y_true, y_pred
 
 

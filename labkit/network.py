@@ -22,6 +22,7 @@ from labkit.geometry import CHANNELS
 from labkit.inference import Engine, NetworkInput
 from labkit.labels import CLASSES
 from labkit.support.files import write_atomically
+from labkit.support.validation import require
 
 
 class SmallSegNet(nn.Module):
@@ -201,8 +202,7 @@ def read_checkpoint(name: str, path) -> dict:
         raise ValueError(
             f"{name}: {path} holds no weights that can be read (truncated or not weights?): {reason}"
         ) from error
-    if not isinstance(checkpoint, dict):
-        raise ValueError(f"{name}: expected a dict of weights in {path}, got {type(checkpoint).__name__}")
+    require(name, isinstance(checkpoint, dict), f"a dict of weights in {path}", type(checkpoint).__name__)
     return checkpoint
 
 

@@ -17,7 +17,15 @@ from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
 from labkit.inference import Engine
 from labkit.labels import IGNORE, TARGET
 from labkit.stacks.engines import open_engine
-from labkit.support.validation import check_finite, check_height, check_labels, check_rgb, check_shape
+from labkit.support.validation import (
+    check_finite,
+    check_height,
+    check_labels,
+    check_rgb,
+    check_shape,
+    check_whole,
+    require,
+)
 
 # What the Panda can reach and meet, in front of it: x, y from its base, z from the table; metres.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
@@ -94,9 +102,7 @@ class Pipeline:
         model = as_engine(model) if engine is None else open_engine(engine, model)
         if model is not None and not callable(model):
             raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
-        classes = getattr(model, "num_classes", None) or IGNORE
-        if isinstance(target_class, bool) or target_class not in range(classes):
-            raise ValueError(f"target_class: expected a class in 0 to {classes - 1}, got {target_class!r}")
+        check_whole("target_class", target_class, 0, (getattr(model, "num_classes", None) or IGNORE) - 1)
         if grasp is not None and gripper is not None:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
         self.model = model
@@ -153,23 +159,22 @@ class Pipeline:
         return probabilities
 
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
-        if self.model is None:
-            raise ValueError("model: expected one to perceive with, got None; `locate` takes labels from elsewhere")
-        with _timed(seconds, "network"):
+        require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
+        with timed(seconds, "network"):
             probabilities = self._with_target(class_probabilities(self.model, frame, self.mirror))
-        with _timed(seconds, "labels"):
+        with timed(seconds, "labels"):
             labels = most_probable(probabilities)
         if self.crf:
-            with _timed(seconds, "crf"):
+            with timed(seconds, "crf"):
                 labels = self.crf(probabilities, frame)
         return labels, probabilities
 
     def _locate(self, frame: RGBDFrame, labels, probabilities, seconds: dict[str, float]) -> Perception:
-        with _timed(seconds, "back_projection"):
+        with timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
-        with _timed(seconds, "clouds"):
+        with timed(seconds, "clouds"):
             pixels, clouds, scene = self.targets(labels, points, frame.table_z)
-        with _timed(seconds, "grasps"):
+        with timed(seconds, "grasps"):
             plan = self.plan(clouds, scene, frame.table_z, frame.T_base_cam[:3, 3])
             certainty = tuple(1.0 for _ in pixels)
             if probabilities is not None:
@@ -209,7 +214,8 @@ def _check_labels_of(frame: RGBDFrame, labels) -> UInt8[np.ndarray, "H W"]:
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str):
+def timed(seconds: dict[str, float], stage: str):
+    """Write the seconds that a block takes down under the name of its stage."""
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start
@@ -253,11 +259,9 @@ def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
     p = check_finite("probabilities", check_shape("probabilities", p, (*size, None)))
     low, high = p.min(), p.max()
     total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
-    if low < -1e-3 or high > 1.001 or np.abs(total - 1.0).max() > 0.01:
-        raise ValueError(
-            "probabilities: expected numbers in 0..1 that sum to 1 at each pixel, "
-            f"got {low:.4g} to {high:.4g}; are they scores?"
-        )
+    fits = low >= -1e-3 and high <= 1.001 and np.abs(total - 1.0).max() <= 0.01
+    got = f"{low:.4g} to {high:.4g}; are they scores?"
+    require("probabilities", fits, "numbers in 0..1 that sum to 1 at each pixel", got)
     return p if p.dtype.kind == "f" else p.astype(np.float32)
 
 
@@ -267,9 +271,9 @@ def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray
     >>> most_probable(np.array([[[0.2, 0.8], [0.5, 0.5]]]))
     array([[1, 0]], dtype=uint8)
     """
-    from labkit.support import labels_kernels  # numba takes its time to import
+    from labkit.support import label_kernels  # numba takes its time to import
 
-    return labels_kernels.most_probable(np.asarray(probabilities))
+    return label_kernels.most_probable(np.asarray(probabilities))
 
 
 def refine_labels(probabilities: Float[np.ndarray, "H W C"], frame: RGBDFrame) -> UInt8[np.ndarray, "H W"]:
@@ -303,8 +307,7 @@ def segment_rgb_image(model, image: UInt8[np.ndarray, "H W 3"], order: str = "rg
     >>> segment_rgb_image(lambda rgb: rgb / 255.0, np.array([[[255, 0, 0]]], np.uint8), order="bgr")
     array([[2]], dtype=uint8)
     """
-    if order not in ("rgb", "bgr"):
-        raise ValueError(f'order: expected "rgb" or "bgr", got {order!r}')
+    require("order", order in ("rgb", "bgr"), '"rgb" or "bgr"', repr(order))
     image = check_rgb("image", image)
     rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if order == "bgr" else image
     return most_probable(class_probabilities(model, rgb))

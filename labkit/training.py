@@ -30,7 +30,7 @@ from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
 from labkit.support.augment import augment
 from labkit.support.files import write_atomically
-from labkit.support.validation import check_labels, check_rgb
+from labkit.support.validation import check_labels, check_rgb, require
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,7 @@ class TrainConfig:
 
     def __post_init__(self):
         def need(name, fits, expected):
-            if not fits:
-                raise ValueError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+            require(name, fits, expected, repr(getattr(self, name)))
 
         need("model", re.fullmatch(r"[\w-]+", self.model), "a name of letters, digits, - and _")
         need("weights", self.weights in SCHEMES, f"one of {', '.join(SCHEMES)}")
@@ -123,8 +122,7 @@ class ImagesInMemory:
         progress: bool = True,
         depth: bool = False,
     ):
-        if len(dataset) == 0:
-            raise ValueError(f"{name}: expected at least one image, got none")
+        require(name, len(dataset) > 0, "at least one image", "none")
         self.frames: list[RGBDFrame] = []
         for i in tqdm(range(len(dataset)), desc=f"reading {name}", unit="image", disable=not progress):
             item = dataset[i]
@@ -132,15 +130,13 @@ class ImagesInMemory:
             if i == 0:
                 self.rgb = torch.empty((len(dataset), *rgb.shape), dtype=torch.uint8)
                 self.y = torch.empty((len(dataset), *y.shape), dtype=torch.uint8)
-            if y.shape != self.y.shape[1:]:
-                raise ValueError(
-                    f"{name}: expected images of one size, {tuple(self.y.shape[1:])}, got {y.shape} at {i}"
-                )
+            require(
+                name, y.shape == self.y.shape[1:], f"images of one size, {tuple(self.y.shape[1:])}", f"{y.shape} at {i}"
+            )
             self.rgb[i] = torch.from_numpy(rgb)
             self.y[i] = torch.from_numpy(check_labels(f"{name}[{i}]", y, num_classes).astype(np.uint8))
             if depth:
-                if not isinstance(item, RGBDFrame):
-                    raise ValueError(f"{name}[{i}]: expected an RGBDFrame, for its depth, got {type(item).__name__}")
+                require(f"{name}[{i}]", isinstance(item, RGBDFrame), "an RGBDFrame, for its depth", type(item).__name__)
                 images = {"rgb": self.rgb[i].numpy(), "labels": self.y[i].numpy(), "instances": None}
                 self.frames.append(replace(item, **images, table_z=table_height(item)))
 
@@ -159,11 +155,9 @@ class ImagesInMemory:
 def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
     """Take the image and the labels out of a dataset's item."""
     rgb, y = (item.rgb, item.labels) if isinstance(item, RGBDFrame) else item
-    if y is None:
-        raise ValueError(f"{name}: expected a frame with labels, got one without")
+    require(name, y is not None, "a frame with labels", "one without")
     rgb, y = np.ascontiguousarray(check_rgb(name, np.asarray(rgb))), np.asarray(y)
-    if y.shape != rgb.shape[:2]:
-        raise ValueError(f"{name}: expected labels of the size of the image, {rgb.shape[:2]}, got {y.shape}")
+    require(name, y.shape == rgb.shape[:2], f"labels of the size of the image, {rgb.shape[:2]}", y.shape)
     return rgb, y
 
 
@@ -185,8 +179,7 @@ def table_height(frame: RGBDFrame) -> float:
 
 def choose_device(device: str = "auto") -> torch.device:
     """Turn "auto", "cpu" or "cuda" into a device; raises ValueError if there is no such device here."""
-    if device not in ("auto", "cpu", "cuda"):
-        raise ValueError(f"device: expected auto, cpu or cuda, got {device!r}")
+    require("device", device in ("auto", "cpu", "cuda"), "auto, cpu or cuda", repr(device))
     if device == "cuda" and not torch.cuda.is_available():
         raise ValueError("device: expected a CUDA GPU and a CUDA build of PyTorch, got neither; use cpu or auto")
     return torch.device("cuda" if device != "cpu" and torch.cuda.is_available() else "cpu")
@@ -430,8 +423,7 @@ def in_memory(dataset, num_classes: int, name: str, progress: bool = True, depth
     """Read a dataset into memory, unless it is there already."""
     if not isinstance(dataset, ImagesInMemory):
         return ImagesInMemory(dataset, num_classes, name, progress, depth)
-    if depth and not dataset.frames:
-        raise ValueError(f"{name}: expected images with depth, got some that were read without")
+    require(name, not depth or dataset.frames, "images with depth", "some that were read without")
     return dataset
 
 

@@ -93,6 +93,7 @@ def test_files_that_do_not_fit_are_named(files, tmp_path):
         ({"rgb": tmp_path / "nowhere.png"}, FileNotFoundError, "nowhere"),
         ({"rgb": truncated}, ValueError, r"^rgb: .*damaged"),
         ({"depth": paths["labels"]}, ValueError, r"^depth: expected uint16"),
+        ({"rgb": paths["depth"]}, ValueError, r"^rgb: expected uint8 .*uint16 .*swapped"),
         ({"depth_scale": 0.0}, ValueError, r"^depth_scale:"),
     ]
     for change, error, says in cases:

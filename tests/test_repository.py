@@ -16,9 +16,10 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 import labkit
-from labkit.support.packages import canonical, read_pins, requirements
+from labkit.support.packages import read_pins, requirements
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -137,7 +138,7 @@ def test_whatever_is_required_or_installed_is_pinned_to_a_version_that_fits():
     """The build of a package stays open, and what students install holds no grader and no test tools."""
     for line in chain(PROJECT["dependencies"], *EXTRAS.values()):
         needed = Requirement(line)
-        (pin,) = PINS[canonical(needed.name)].specifier
+        (pin,) = PINS[canonicalize_name(needed.name)].specifier
         assert pin.operator == "==" and needed.specifier.contains(pin.version, prereleases=True), line
     assert not [pin for pin in PINS.values() if "+" in str(pin.specifier)]
     for extra in ("", *EXTRAS):
@@ -155,11 +156,11 @@ def test_every_import_of_the_kit_is_required():
     brought_by = {"cv2": "opencv-python-headless", "PIL": "pillow"}
     brought_by |= {"pybullet_data": "pybullet", "mpl_toolkits": "matplotlib"}
     users = chain(*(lines for extra, lines in EXTRAS.items() if extra not in ("test", "bench", "site")))
-    required = {canonical(Requirement(line).name) for line in chain(PROJECT["dependencies"], users)}
+    required = {canonicalize_name(Requirement(line).name) for line in chain(PROJECT["dependencies"], users)}
     for name, path in modules().items():
         roots = {found.split(".")[0] for found in imports(path, everywhere=True)}
         foreign = roots - sys.stdlib_module_names - {"labkit", "data_gen"}
-        missing = {root for root in foreign if canonical(brought_by.get(root, root)) not in required}
+        missing = {root for root in foreign if canonicalize_name(brought_by.get(root, root)) not in required}
         assert not missing, f"{name} imports {missing}"
 
 

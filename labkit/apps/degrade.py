@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool
 
-from labkit.support.validation import check_shape
+from labkit.support.validation import check_shape, require
 
 
 def erode(mask: Bool[np.ndarray, "H W"], pixels: int) -> Bool[np.ndarray, "H W"]:
@@ -29,8 +29,7 @@ def dilate(mask: Bool[np.ndarray, "H W"], pixels: int) -> Bool[np.ndarray, "H W"
     >>> dilate(np.array([[0, 0, 1, 0, 0]], bool), 1).astype(int)
     array([[0, 1, 1, 1, 0]])
     """
-    if pixels < 0:
-        raise ValueError(f"pixels: expected 0 or more, got {pixels}")
+    require("pixels", pixels >= 0, "0 or more", pixels)
     reach = np.arange(-pixels, pixels + 1)
     disc = (reach**2 + reach[:, None] ** 2 <= pixels**2).astype(np.uint8)
     return cv2.dilate(_check_mask(mask).astype(np.uint8), disc).astype(bool)
@@ -88,12 +87,10 @@ def cut(mask: Bool[np.ndarray, "H W"], share: float, direction: float) -> Bool[n
 
 def _check_mask(mask) -> Bool[np.ndarray, "H W"]:
     mask = check_shape("mask", mask, (None, None))
-    if mask.dtype != bool:
-        raise ValueError(f"mask: expected bool, got dtype {mask.dtype}")
+    require("mask", mask.dtype == bool, "bool", f"dtype {mask.dtype}")
     return mask
 
 
 def _check_share(share: float) -> float:
-    if not 0.0 <= share <= 1.0:
-        raise ValueError(f"share: expected a share in 0..1, got {share}")
+    require("share", 0.0 <= share <= 1.0, "a share in 0..1", share)
     return share

@@ -1,22 +1,23 @@
 """The main job, shown: one scene from camera to lift, with a table of stages, a picture of every step and a film."""
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 from PIL import Image
 
+from labkit.apps import perceive
 from labkit.apps.evaluation import lift
+from labkit.course.views import fingers
 from labkit.frame import RGBDFrame
 from labkit.geometry import centroid_and_covariance
+from labkit.grasp import Gripper
 from labkit.labels import CLASSES, PALETTE, TARGET, colorize
 from labkit.metrics import confusion_matrix, iou, mean_iou
-from labkit.pipeline import Perception, Pipeline
+from labkit.pipeline import Perception, Pipeline, timed
 from labkit.sim.panda import LiftResult
 from labkit.sim.spec import Camera, SceneSpec
 from labkit.sim.world import TIME_STEP, World
@@ -40,30 +41,29 @@ class Story:
 
 def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool | None = None) -> Story:
     """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
-    start = time.perf_counter()
-    with World(spec) as world:
-        built = time.perf_counter()
-        frame = world.render(size)
-        rendered = time.perf_counter()
+    seconds, film = {}, []
+    camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
+
+    def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
+        record.steps += 1
+        if record.steps % every == 0:
+            film.append(world.render(FILM_SIZE, camera).rgb)
+
+    record.steps = -1
+    with timed(seconds, "scene"):
+        world = World(spec)
+    with world:
+        with timed(seconds, "render"):
+            frame = world.render(size)
         pipeline = Pipeline(model, crf=crf)
-        pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
-        warm = time.perf_counter()
+        with timed(seconds, "warm-up"):
+            pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
         perception = pipeline.run(frame)
+        seconds |= perception.seconds
         true_centroids = {t.name: world.centre(t.name) for t in spec.objects if t.class_id == TARGET}
-        film = []
-        camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
-
-        def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
-            record.steps += 1
-            if record.steps % every == 0:
-                film.append(world.render(FILM_SIZE, camera).rgb)
-
-        record.steps = -1
         world.observers.append(record)
-        before = time.perf_counter()
-        result = lift(world, perception)
-        seconds = {"scene": built - start, "render": rendered - built, "warm-up": warm - rendered, **perception.seconds}
-        seconds["lift and film"] = time.perf_counter() - before
+        with timed(seconds, "lift and film"):
+            result = lift(world, perception)
     return Story(spec, frame, perception, result, film, true_centroids, seconds)
 
 
@@ -99,8 +99,12 @@ def report(story: Story) -> str:
         grasp = p.plan.grasps[0]
         place = ", ".join(f"{x:+.3f}" for x in grasp.T_base_grasp[:3, 3])
         rows.append(f"best grasp: at ({place}) m, jaws {100.0 * grasp.width:.1f} cm apart")
-    outcome = f"lifted {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
-    return "\n".join([*rows, outcome])
+    return "\n".join([*rows, outcome_in_words(story)])
+
+
+def outcome_in_words(story: Story) -> str:
+    """What became of the lift."""
+    return f"lifted {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
 
 
 def nearest(point: np.ndarray, places: dict[str, np.ndarray]) -> tuple[str, float]:
@@ -118,14 +122,11 @@ def picture(story: Story) -> Figure:
         per_subplot_kw={"cloud": {"projection": "3d"}},
     )
     frame, p = story.frame, story.perception
-    painted = frame.rgb.copy()
-    outlines, _ = cv2.findContours((p.labels == TARGET).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    painted[p.labels == TARGET] = (0.45 * painted[p.labels == TARGET] + 0.55 * PALETTE[TARGET]).astype(np.uint8)
-    cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+    target = np.where(p.labels == TARGET, p.labels, 0)
     images = {
         "rgb": (frame.rgb, "1  the camera's image"),
         "labels": (colorize(p.labels), "3  a class for each pixel"),
-        "overlay": (painted, "4  the target mask"),
+        "overlay": (perceive.picture(frame.rgb, target), "4  the target mask"),
         "arm": (story.film[-1] if story.film else frame.rgb, "7  " + outcome_in_words(story)),
     }
     for name, (image, title) in images.items():
@@ -150,10 +151,6 @@ def draw_height(axes, story: Story) -> None:
     bar.set_title("height over the table (cm)", color="white", fontsize=8, pad=3)
     axes.set_title("2  height, from depth", loc="left")
     axes.set_axis_off()
-
-
-def outcome_in_words(story: Story) -> str:
-    return f"lifted: {story.result.name}" if story.result.success else f"not lifted: {story.result.reason}"
 
 
 def draw_cloud(axes, story: Story) -> None:
@@ -197,20 +194,9 @@ def draw_grasp(axes, story: Story) -> None:
         axes.text(middle[1], middle[0], p.plan.reason, ha="center", wrap=True)
         return
     for rank, grasp in reversed(list(enumerate(p.plan.grasps[:5]))):
-        for side in (-1.0, 1.0):
-            corners = jaw(grasp, side)[:, [1, 0]]
-            style = (
-                {"facecolor": "tab:blue", "alpha": 0.9} if rank == 0 else {"fill": False, "edgecolor": "0.5", "lw": 0.6}
-            )
-            axes.add_patch(Polygon(corners, **style))
-
-
-def jaw(grasp, side: float, width: float = 0.02, thickness: float = 0.012) -> np.ndarray:
-    """The corners of a jaw in the base frame's x and y, (4, 2); side is -1 or 1."""
-    inner = side * grasp.width / 2.0
-    outer = inner + side * thickness
-    corners = np.array([[-width / 2, inner], [width / 2, inner], [width / 2, outer], [-width / 2, outer]])
-    return corners @ grasp.T_base_grasp[:2, :2].T + grasp.T_base_grasp[:2, 3]
+        style = {"facecolor": "tab:blue", "alpha": 0.9} if rank == 0 else {"fill": False, "edgecolor": "0.5", "lw": 0.6}
+        for finger in fingers(grasp.T_base_grasp, grasp.width, Gripper()):
+            axes.add_patch(Polygon(finger[[0, 1, 3, 2], 1::-1], **style))
 
 
 def save(story: Story, out: Path) -> list[Path]:

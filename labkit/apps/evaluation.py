@@ -1,7 +1,6 @@
 """How good is the whole chain? Scores of the masks, and lifts by the simulated arm, over many scenes."""
 
 import json
-import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -23,7 +22,7 @@ from labkit.metrics import (
     reliability_counts,
     wilson_interval,
 )
-from labkit.pipeline import Pipeline
+from labkit.pipeline import Pipeline, timed
 
 BOUNDARY_WIDTH = 2  # pixels
 
@@ -64,19 +63,18 @@ def run_trial(
         raise ValueError("crf: expected none with true masks, which there is nothing to refine in")
     if isinstance(model, (str, Path)):
         model = _loaded(str(model), Path(model).stat().st_mtime_ns)
-    pipeline = Pipeline(model, crf=crf)
+    pipeline, seconds = Pipeline(model, crf=crf), {}
     with World(spec) as world:
-        start = time.perf_counter()
-        frame = world.render(size)
-        rendered = time.perf_counter()
+        with timed(seconds, "render"):
+            frame = world.render(size)
         if spec.config == "other":
             frame = StereoSensor().apply(frame, np.random.default_rng([spec.seed, 3]))
         if perturb:
             frame = perturbed(frame, np.random.default_rng([spec.seed, 2]))
         perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)
-        before = time.perf_counter()
-        result = lift(world, perception)
-        seconds = {"render": rendered - start, **perception.seconds, "lift": time.perf_counter() - before}
+        seconds |= perception.seconds
+        with timed(seconds, "lift"):
+            result = lift(world, perception)
     families = {thing.name: thing.family for thing in spec.objects}
     return Trial(
         seed=spec.seed,

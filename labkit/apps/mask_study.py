@@ -15,6 +15,7 @@ from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
 from labkit.metrics import wilson_interval
 from labkit.pipeline import Perception, Pipeline
+from labkit.support.validation import require
 
 FIRST_SEED, SCENES, SIZE = 600_000, 60, (320, 240)
 
@@ -60,8 +61,7 @@ def spoil(mask: Bool[np.ndarray, "H W"], kind: str, strength: int | float, seed:
 
     Raises ValueError for an unknown kind.
     """
-    if kind not in KINDS:
-        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    require("kind", kind in KINDS, f"one of {', '.join(KINDS)}", repr(kind))
     return KINDS[kind][1](mask, strength, np.random.default_rng([seed, list(KINDS).index(kind)]))
 
 

@@ -14,6 +14,7 @@ from labkit.node.messages import DEFAULT_TOPICS, ROS_TOPICS, Topics
 from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.pipeline import Pipeline
+from labkit.support.validation import require
 
 SIMULATED_RATE = 5.0  # frames per second of --ros --sim
 
@@ -63,13 +64,8 @@ class Settings:
         """
         if not self.camera_pose:
             return None
-        words = re.split(r"[\s,]+", self.camera_pose.strip())
-        try:
-            numbers = [float(word) for word in words]
-        except ValueError:
-            numbers = []
-        if len(numbers) != 7:
-            raise ValueError(f"camera_pose: expected seven numbers, x y z qx qy qz qw, got {self.camera_pose!r}")
+        numbers = numbers_of(self.camera_pose)
+        require("camera_pose", len(numbers) == 7, "seven numbers, x y z qx qy qz qw", repr(self.camera_pose))
         return rigid(numbers[:3], numbers[3:])
 
     def topics(self, default: Topics = DEFAULT_TOPICS) -> Topics:
@@ -81,9 +77,20 @@ class Settings:
         known = [field.name for field in fields(Topics)]
         named = [item.partition("=") for item in self.renamed]
         for name, _, topic in named:
-            if name not in known or not topic:
-                raise ValueError(f"topic: expected NAME=TOPIC with NAME of {', '.join(known)}, got {name}={topic}")
+            require("topic", name in known and topic, f"NAME=TOPIC with NAME of {', '.join(known)}", f"{name}={topic}")
         return replace(default, **{name: topic for name, _, topic in named})
+
+
+def numbers_of(text: str) -> list[float]:
+    """The numbers of a text that holds nothing else; none if it does.
+
+    >>> numbers_of("[1, 2.5; 3]"), numbers_of("camera.json")
+    ([1.0, 2.5, 3.0], [])
+    """
+    try:
+        return [float(word) for word in re.split(r"[\s,;]+", text.strip(" \t\r\n[]"))]
+    except ValueError:
+        return []
 
 
 def rehearse(settings: Settings, spec) -> str:

@@ -16,17 +16,20 @@ import trimesh
 from jaxtyping import Float, UInt8
 from matplotlib.colors import to_hex
 
+from labkit.apps.node_command import numbers_of
 from labkit.course.views import View
 from labkit.frame import RGBDFrame, read_image
-from labkit.geometry import Plane, back_project, back_project_to_base, fit_plane, invert_transform
+from labkit.geometry import Plane, back_project, fit_plane, invert_transform
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.files import write_atomically
+from labkit.support.validation import require
 
 MOST_POINTS = 9000  # of the report's view: more make the page heavy, and the eye sees no difference
 TABLE_MARGIN = 0.02  # metres under the table that noise may reach
 ROOM = 0.5  # metres over the table that matter for a grasp
+WORKSPACE = ((-20.0, 20.0), (-20.0, 20.0), (-TABLE_MARGIN, ROOM))  # further off nothing is grasped
 SHOWN = 5  # grasps that the report lists and draws
 NEAR = 0.45  # metres around the targets that the view shows
 
@@ -52,7 +55,7 @@ def read_intrinsics(text: str) -> Intrinsics:
     >>> read_intrinsics("600 601 320 240").K.tolist()
     [[600.0, 0.0, 320.0], [0.0, 601.0, 240.0], [0.0, 0.0, 1.0]]
     """
-    numbers = _numbers(text)
+    numbers = numbers_of(text)
     if len(numbers) in (4, 9):
         return Intrinsics(_matrix(numbers))
     path = Path(text)
@@ -63,7 +66,7 @@ def read_intrinsics(text: str) -> Intrinsics:
         return _from_json(json.loads(content))
     except json.JSONDecodeError:
         yaml = re.search(r"camera_matrix:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
-        numbers = _numbers(yaml[1] if yaml else content)
+        numbers = numbers_of(yaml[1] if yaml else content)
     except (AttributeError, KeyError, TypeError, ValueError):
         numbers = []
     if len(numbers) not in (4, 9):
@@ -72,14 +75,6 @@ def read_intrinsics(text: str) -> Intrinsics:
             "intrinsic_matrix, camera_matrix, or four or nine numbers"
         )
     return Intrinsics(_matrix(numbers))
-
-
-def _numbers(text: str) -> list[float]:
-    """The numbers of a text that holds nothing else."""
-    try:
-        return [float(word) for word in re.split(r"[\s,;]+", text.strip(" \t\r\n[]"))]
-    except ValueError:
-        return []
 
 
 def _matrix(numbers: list[float]) -> Float[np.ndarray, "3 3"]:
@@ -110,8 +105,7 @@ def read_mask(path, size: tuple[int, int]) -> np.ndarray:
     size: width and height that it must have. Raises ValueError for an image of another kind, size or other values.
     """
     mask = read_image("mask", path, np.uint8)
-    if mask.shape[::-1] != size:
-        raise ValueError(f"mask: expected the colour picture's size, {size[0]} x {size[1]}, got {mask.shape[::-1]}")
+    require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
     values = np.unique(mask)
     if len(values[values > 0]) <= 1:
         return np.where(mask > 0, TARGET, 0).astype(np.uint8)
@@ -130,9 +124,6 @@ def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None =
     ValueError with the likely cause if the files are swapped, their sizes differ, or the depths cannot be metres.
     """
     scale = depth_scale or intrinsics.depth_scale or 0.001
-    kinds = [cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (color, depth)]
-    if all(image is not None for image in kinds) and kinds[0].dtype == np.uint16 and kinds[1].dtype == np.uint8:
-        raise ValueError(f"color: {color} holds 16-bit numbers and {depth} 8-bit ones: are the two swapped?")
     rgb = read_image("color", color, np.uint8, colour=True)
     raw = read_image("depth", depth, np.uint16)
     if raw.shape != rgb.shape[:2]:
@@ -203,15 +194,9 @@ def perceive(
     plane = None
     if T_base_cam is None:
         frame, plane = on_table(frame)
-        table_z = 0.0
     else:
         frame = RGBDFrame(frame.rgb, frame.depth, frame.K, T_base_cam, table_z=table_z)
-    P = back_project_to_base(frame.depth, frame.K, frame.T_base_cam).reshape(-1, 3)
-    over = P[(P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM)]
-    low, high = (over.min(axis=0) - 1e-3, over.max(axis=0) + 1e-3) if len(over) else (-np.ones(3), np.ones(3))
-    (x0, y0), (x1, y1) = low[:2].tolist(), high[:2].tolist()
-    workspace = ((x0, x1), (y0, y1), (-TABLE_MARGIN, ROOM))
-    pipeline = Pipeline(model, workspace=workspace, gripper=gripper)
+    pipeline = Pipeline(model, workspace=WORKSPACE, gripper=gripper)
     return Seen(frame, pipeline.run(frame) if labels is None else pipeline.locate(frame, labels), plane)
 
 
@@ -286,10 +271,9 @@ def view(seen: Seen, gripper: Gripper | None = None) -> View:
     return shown.frame(np.eye(4), "base", 0.1)
 
 
-def picture(seen: Seen) -> UInt8[np.ndarray, "H W 3"]:
+def picture(rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
     """The colour picture with its labels laid over it, and the targets outlined in white."""
-    labels = np.where(seen.perception.labels == SURFACE, 0, seen.perception.labels)
-    painted = overlay(seen.frame.rgb, labels)
+    painted = overlay(rgb, np.where(labels == SURFACE, 0, labels))
     target = (labels == TARGET).astype(np.uint8)
     outlines, _ = cv2.findContours(target, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     return cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
@@ -301,7 +285,8 @@ def picture(seen: Seen) -> UInt8[np.ndarray, "H W 3"]:
 def save(seen: Seen, out, gripper: Gripper | None = None) -> list[Path]:
     """Write overlay.png, target_N.ply, grasps.json and report.html into the folder `out`; returns their paths."""
     out = Path(out)
-    files = {"overlay.png": _png(picture(seen)), "grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
+    painted = picture(seen.frame.rgb, seen.perception.labels)
+    files = {"overlay.png": _png(painted), "grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
     for number, (cloud, pixels) in enumerate(zip(seen.perception.clouds, seen.perception.pixels, strict=True), start=1):
         colours = seen.frame.rgb.reshape(-1, 3)[pixels]
         files[f"target_{number}.ply"] = trimesh.PointCloud(cloud, colours).export(file_type="ply")
@@ -325,7 +310,7 @@ def report(seen: Seen, gripper: Gripper | None = None) -> str:
     pictures = {
         "what the camera saw": seen.frame.rgb,
         f"depth: {low:.2f} m (yellow) to {high:.2f} m (violet), black without a reading": coloured[..., ::-1],
-        "labels: targets orange, obstacles green": picture(seen),
+        "labels: targets orange, obstacles green": picture(seen.frame.rgb, seen.perception.labels),
     }
     figures = "".join(
         f'<figure><img alt="{html.escape(title)}" src="data:image/png;base64,{_base64(_at_most(image, 640))}">'

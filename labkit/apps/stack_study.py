@@ -16,7 +16,7 @@ from labkit.apps.evaluation import lift
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, SURFACE, TARGET
 from labkit.metrics import confusion_matrix, wilson_interval
-from labkit.pipeline import Pipeline, class_probabilities, most_probable
+from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.stacks import regions
 from labkit.stacks.engines import open_engine, segment_like_cpp
 from labkit.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
@@ -73,11 +73,6 @@ def region_labels(rgb: UInt8[np.ndarray, "H W 3"], typical: regions.Typical) -> 
     return np.where((pieces == chosen) & (chosen > 0), TARGET, np.where(pieces == surface, SURFACE, 0)).astype(np.uint8)
 
 
-def network_labels(model, rgb: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
-    """Labels by a network or an engine, one look."""
-    return most_probable(class_probabilities(model, rgb))
-
-
 def methods(frames: Sequence[RGBDFrame], unet) -> dict[str, Method]:
     """Make every method by its name: frame -> labels. `frames` are what the classical ones are fitted to.
 
@@ -95,10 +90,10 @@ def methods(frames: Sequence[RGBDFrame], unet) -> dict[str, Method]:
         return threshold_labels(frame.rgb, fit_hsv([frame.rgb], [frame.labels == SURFACE]))
 
     return {
-        "U-Net, PyTorch": lambda frame: network_labels(unet, frame.rgb),
-        "U-Net, onnxruntime": lambda frame: network_labels(onnxruntime, frame.rgb),
+        "U-Net, PyTorch": lambda frame: segment_rgb_image(unet, frame.rgb),
+        "U-Net, onnxruntime": lambda frame: segment_rgb_image(onnxruntime, frame.rgb),
         "U-Net, OpenCV as in C++": lambda frame: segment_like_cpp(opencv, cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR)),
-        "three-layer FCN": lambda frame: network_labels(small, frame.rgb),
+        "three-layer FCN": lambda frame: segment_rgb_image(small, frame.rgb),
         "HSV, other tables": lambda frame: threshold_labels(frame.rgb, anywhere),
         "HSV, this table": this_table,
         "k-means, one region": lambda frame: region_labels(frame.rgb, typical),
@@ -198,16 +193,12 @@ def summarise(rows: Sequence[Row]) -> list[Summary]:
     summaries = []
     for name in dict.fromkeys(row.method for row in rows):
         own = [row for row in rows if row.method == name]
-        target_both, target_either, surface_both, surface_either = (
-            sum(getattr(row, name) for row in own)
-            for name in ("target_both", "target_either", "surface_both", "surface_either")
-        )
         lifts = sum(row.lifted for row in own)
         summaries.append(
             Summary(
                 method=name,
-                target_iou=target_both / target_either,
-                surface_iou=surface_both / surface_either,
+                target_iou=sum(row.target_both for row in own) / sum(row.target_either for row in own),
+                surface_iou=sum(row.surface_both for row in own) / sum(row.surface_either for row in own),
                 milliseconds=float(np.median([row.milliseconds for row in own])),
                 lifts=lifts,
                 trials=len(own),

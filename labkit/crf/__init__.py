@@ -10,22 +10,10 @@ mean_field   the closest distribution of independent pixels
 dense        a CRF in which all pixels are neighbours
 solvers      one entrance to all of them, and the refinement of a network's probabilities
 
-Kernels compiled by numba live in the modules ending in `_kernels`; they are imported, and compiled, on first use.
+Kernels compiled by numba live in the modules ending in `_kernels`; they are compiled on first use.
 """
 
 from labkit.crf.dense import dense_crf
 from labkit.crf.energy import MapResult, PottsCRF, unary_from_probabilities
 from labkit.crf.exact import log_partition, marginals
 from labkit.crf.solvers import METHODS, refine, solve
-
-__all__ = [
-    "METHODS",
-    "MapResult",
-    "PottsCRF",
-    "dense_crf",
-    "log_partition",
-    "marginals",
-    "refine",
-    "solve",
-    "unary_from_probabilities",
-]

@@ -16,7 +16,9 @@ from jaxtyping import Bool, Integer
 from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.exact import NEAR
 from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
+from labkit.crf.maxflow_kernels import Graph, max_flow, new_forest
 from labkit.crf.messages import _trws
+from labkit.crf.move_kernels import RING, SINK, expansion_move, swap_move
 
 START_SWEEPS = 4
 
@@ -87,9 +89,6 @@ class Moves:
     """
 
     def __init__(self, integer: IntegerPotts, labels: Integer[np.ndarray, "H W"]):
-        from labkit.crf.maxflow_kernels import Graph, new_forest
-        from labkit.crf.move_kernels import RING
-
         N, dtype = len(integer.unary), integer.unary.dtype
         self.integer = integer
         self.labels, self.free = np.full(N, RING, np.uint8), np.zeros(N, bool)
@@ -110,13 +109,6 @@ class Moves:
         self.free[self.nodes[~stays]] = False
         self.nodes = self.nodes[stays]
 
-    def integer_energy(self) -> int:
-        """Return the integer energy of the labels."""
-        from labkit.crf.move_kernels import energy_of
-
-        integer = self.integer
-        return energy_of(integer.unary, integer.weights, integer.step, self.labels, pixel_numbers(integer.size))
-
     def expand_all(self) -> int:
         """Let each class expand in turn until none can; return how many moves were tried."""
         return try_in_turn([partial(self.expand, alpha) for alpha in range(self.integer.unary.shape[1])])
@@ -126,8 +118,6 @@ class Moves:
 
         The cut with the fewest changes is taken, so that any change at all lowers the energy.
         """
-        from labkit.crf.move_kernels import SINK, expansion_move
-
         _, _, tree = self.cut(expansion_move, alpha)
         takes = self.nodes[tree == SINK]
         self.labels[takes] = alpha
@@ -135,8 +125,6 @@ class Moves:
 
     def swap(self, alpha: int, beta: int) -> bool:
         """Label the pixels of alpha and beta anew with these two, as is best; return whether the energy fell."""
-        from labkit.crf.move_kernels import SINK, swap_move
-
         present, flow, tree = self.cut(swap_move, alpha, beta)
         if flow == present:
             return False
@@ -147,8 +135,6 @@ class Moves:
 
     def cut(self, question: Callable, *classes: int, near: int = NEAR):
         """Put a question of `move_kernels` to the free pixels: what it returns, the flow, and each pixel's tree."""
-        from labkit.crf.maxflow_kernels import max_flow
-
         integer = self.integer
         answer = question(
             integer.unary, integer.weights, integer.step, self.labels, self.free, self.nodes, *classes, self.graph

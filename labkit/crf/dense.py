@@ -10,8 +10,9 @@ message to a pixel is a weighted mean of all q's, which is one Gaussian filter i
 import numpy as np
 from jaxtyping import Float, Num
 
+from labkit.crf import lattice_kernels as lattice
 from labkit.crf.energy import check_channels
-from labkit.support.validation import check_finite, check_shape
+from labkit.support.validation import check_finite, check_shape, require
 
 
 def dense_crf(
@@ -36,18 +37,14 @@ def dense_crf(
     >>> dense_crf(unary, np.zeros((4, 4, 3), np.uint8)).argmax(axis=2)[1, 1]
     np.int64(0)
     """
-    from labkit.crf.lattice_kernels import softmax
-
     unary = check_finite("unary", check_shape("unary", unary, (None, None, None)))
-    if 0 in unary.shape:
-        raise ValueError(f"unary: expected at least one pixel and class, got shape {unary.shape}")
+    require("unary", 0 not in unary.shape, "at least one pixel and class", f"shape {unary.shape}")
     numbers = {"theta_alpha": theta_alpha, "theta_beta": theta_beta, "theta_gamma": theta_gamma}
     numbers |= {"w_appearance": w_appearance, "w_smoothness": w_smoothness}
     for name, number in numbers.items():
         if not (0.0 <= number < np.inf) or (number == 0.0 and name.startswith("theta")):
             raise ValueError(f"{name}: expected a finite number {'above' if 'theta' in name else '>='} 0, got {number}")
-    if iterations < 0:
-        raise ValueError(f"iterations: expected at least 0, got {iterations}")
+    require("iterations", iterations >= 0, "at least 0", iterations)
     H, W, C = unary.shape
     colours = check_channels("image", check_finite("image", image), unary).astype(np.float32)
     v, u = np.indices((H, W), np.float32)
@@ -56,12 +53,12 @@ def dense_crf(
     kernels = [(w_appearance, GaussianFilter(appearance)), (w_smoothness, GaussianFilter(smoothness))]
     minus_unary = -unary.reshape(H * W, C).astype(np.float32)
     q = np.empty_like(minus_unary)
-    softmax(minus_unary, q)
+    lattice.softmax(minus_unary, q)
     for _ in range(iterations):
         z = minus_unary.copy()
         for weight, gaussian in kernels:
             gaussian.add_filtered(q, weight, z)
-        softmax(z, q)
+        lattice.softmax(z, q)
     return q.reshape(H, W, C)
 
 
@@ -70,8 +67,6 @@ class GaussianFilter:
 
     def __init__(self, features: Float[np.ndarray, "H W d"]):
         """features: each channel divided by its standard deviation; ValueError for a range too large to index."""
-        from labkit.crf import lattice_kernels as lattice
-
         d = features.shape[2]
         elevated, least, largest = lattice.elevate(
             features.reshape(-1, d).astype(np.float32), elevation(d).astype(np.float32)
@@ -94,10 +89,8 @@ class GaussianFilter:
 
     def add_filtered(self, values: Float[np.ndarray, "N C"], weight: float, out: Float[np.ndarray, "N C"]) -> None:
         """out += weight * filtered values, both float32, one row a pixel."""
-        from labkit.crf.lattice_kernels import lattice_filter
-
         scale = (np.sqrt(weight) * self.scale).astype(np.float32)
-        lattice_filter(values, scale, self.corner, self.weights, self.near, out)
+        lattice.lattice_filter(values, scale, self.corner, self.weights, self.near, out)
 
 
 def elevation(d: int) -> Float[np.ndarray, "d1 d"]:

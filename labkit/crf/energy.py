@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer, Num, UInt8
 
-from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape
+from labkit.crf.energy_kernels import energy_by_row, pair_exponents
+from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape, require
 
 # Each unordered pair of neighbours counts once: a pixel owns the pairs with these neighbours, (down, right) of it.
 OFFSETS = {4: ((0, 1), (1, 0)), 8: ((0, 1), (1, 0), (1, 1), (1, -1))}
@@ -38,13 +39,9 @@ class PottsCRF:
     def __post_init__(self):
         unary = check_unary(self.unary)
         weights = check_finite("weights", check_shape("weights", self.weights, (None, *unary.shape[:2])))
-        if len(weights) not in (2, 4):
-            raise ValueError(f"weights: expected 2 or 4 pairs per pixel (4 or 8 neighbours), got {len(weights)}")
-        if weights.min() < 0.0:
-            raise ValueError(
-                f"weights: expected costs >= 0, got {weights.min():.6g}; a negative one rewards disagreement, "
-                "which is not submodular, so that no cut can represent it"
-            )
+        require("weights", len(weights) in (2, 4), "2 or 4 pairs per pixel (4 or 8 neighbours)", len(weights))
+        why = "a negative one rewards disagreement, which is not submodular, so that no cut can represent it"
+        require("weights", weights.min() >= 0.0, "costs >= 0", f"{weights.min():.6g}; {why}")
         for d, offset in enumerate(OFFSETS[2 * len(weights)]):
             outside = np.ones(unary.shape[:2], bool)
             outside[pair_slices(offset)[0]] = False
@@ -95,12 +92,9 @@ class PottsCRF:
         ((2, 2, 3), 7, np.float64(1.213))
         """
         for name, sigma in (("sigma_I", sigma_I), ("sigma_p", sigma_p), *(("extra", sigma) for _, sigma in extra)):
-            if not (np.isfinite(sigma) and sigma > 0.0):
-                raise ValueError(f"{name}: expected a scale above 0, got {sigma}")
-        if not (np.isfinite(lam) and lam >= 0.0):
-            raise ValueError(f"lam: expected a weight >= 0, got {lam}")
-        if connectivity not in OFFSETS:
-            raise ValueError(f"connectivity: expected 4 or 8 neighbours, got {connectivity}")
+            require(name, np.isfinite(sigma) and sigma > 0.0, "a scale above 0", sigma)
+        require("lam", np.isfinite(lam) and lam >= 0.0, "a weight >= 0", lam)
+        require("connectivity", connectivity in OFFSETS, "4 or 8 neighbours", connectivity)
         unary = check_unary(unary)
         image = check_channels("image", check_finite("image", image), unary)
         scaled = [check_channels("extra", channels, unary).astype(np.float64) / sigma for channels, sigma in extra]
@@ -120,8 +114,6 @@ class PottsCRF:
         return self._energy(self.check_labelling("y", y))
 
     def _energy(self, y: Integer[np.ndarray, "H W"]) -> float:
-        from labkit.crf.energy_kernels import energy_by_row
-
         return float(energy_by_row(self.unary, self.weights, np.array(self.offsets), y).sum())
 
 
@@ -157,8 +149,7 @@ def unary_from_probabilities(
     array([[[0.   , 4.605]]])
     """
     p = check_finite("probabilities", check_shape("probabilities", probabilities, (None, None, None)))
-    if not 0.0 < floor < 1.0:
-        raise ValueError(f"floor: expected a probability between 0 and 1, got {floor}")
+    require("floor", 0.0 < floor < 1.0, "a probability between 0 and 1", floor)
     sums = np.einsum("vuc->vu", p) if p.size else np.ones(1)
     if p.size and (p.min() < 0.0 or p.max() > 1.0 + 1e-3 or np.abs(sums - 1.0).max() > 1e-3):
         raise ValueError(
@@ -172,8 +163,7 @@ def unary_from_probabilities(
 def check_unary(unary: Num[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
     """Return a unary term as float64; raise a ValueError unless each pixel has at least one class of finite cost."""
     unary = check_shape("unary", unary, (None, None, None))
-    if unary.dtype.kind not in "fiu":
-        raise ValueError(f"unary: expected real costs, got dtype {unary.dtype}")
+    require("unary", unary.dtype.kind in "fiu", "real costs", f"dtype {unary.dtype}")
     if 0 in unary.shape or not 2 <= unary.shape[2] <= MAX_CLASSES:
         raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
     if not unary.min() > -np.inf:  # NaN is not, either
@@ -196,8 +186,6 @@ def contrast_weights(
     image: Num[np.ndarray, "H W k"], scaled: list, lam: float, sigma_I: float, sigma_p: float, connectivity: int
 ) -> Float[np.ndarray, "D H W"]:
     """Return w of the module's formula for all pairs; `scaled` holds further channels, each divided by its sigma."""
-    from labkit.crf.energy_kernels import pair_exponents
-
     H, W = image.shape[:2]
     image = image if image.dtype == np.uint8 else image.astype(np.float64, copy=False)
     extra = np.concatenate(scaled, axis=2) if scaled else np.empty((H, W, 0))

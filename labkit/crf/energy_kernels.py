@@ -1,4 +1,4 @@
-"""From an image to the weights of neighbours, and from labels to their energy, in one pass each, compiled by numba."""
+"""Loops over the pixel grid, compiled by numba: weights of neighbours, energy, and sweeps of ICM and mean field."""
 
 import numpy as np
 from numba import njit
@@ -66,3 +66,57 @@ def energy_by_row(unary, weights, offsets, y):
                     total += weights[d, v, u] if y[v, u] != y[v + down, u + right] else 0.0
         rows[v] = total
     return rows
+
+
+@njit(cache=True, nogil=True)
+def icm_sweep(unary, weights, offsets, labels):
+    """Give each pixel in turn the class that is best given its neighbours; return how many changed."""
+    H, W, C = unary.shape
+    cost = np.empty(C)
+    changed = 0
+    for v in range(H):
+        for u in range(W):
+            for c in range(C):
+                cost[c] = unary[v, u, c]
+            for d in range(len(offsets)):
+                down, right = offsets[d]
+                if weights[d, v, u] > 0.0:  # agreeing saves what disagreeing costs
+                    cost[labels[v + down, u + right]] -= weights[d, v, u]
+                up, left = v - down, u - right
+                if up >= 0 and 0 <= left < W and weights[d, up, left] > 0.0:
+                    cost[labels[up, left]] -= weights[d, up, left]
+            best = labels[v, u]
+            for c in range(C):
+                if cost[c] < cost[best]:
+                    best = c
+            if best != labels[v, u]:
+                labels[v, u] = best
+                changed += 1
+    return changed
+
+
+@njit(cache=True)
+def mean_field_sweep(unary, weights, offsets, T, q):
+    """Update q in place, pixel by pixel: q_p(c) ~ exp(-(psi_p(c) - sum over neighbours of w q_neighbour(c)) / T)."""
+    H, W, C = unary.shape
+    cost = np.empty(C)
+    for v in range(H):
+        for u in range(W):
+            for c in range(C):
+                cost[c] = unary[v, u, c]
+            for d in range(len(offsets)):
+                down, right = offsets[d]
+                if weights[d, v, u] > 0.0:
+                    for c in range(C):
+                        cost[c] -= weights[d, v, u] * q[v + down, u + right, c]
+                up, left = v - down, u - right
+                if up >= 0 and 0 <= left < W and weights[d, up, left] > 0.0:
+                    for c in range(C):
+                        cost[c] -= weights[d, up, left] * q[up, left, c]
+            lowest = cost.min()
+            total = 0.0
+            for c in range(C):
+                q[v, u, c] = np.exp((lowest - cost[c]) / T)
+                total += q[v, u, c]
+            for c in range(C):
+                q[v, u, c] /= total

@@ -10,6 +10,8 @@ from jaxtyping import Float, Int, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
 from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
+from labkit.crf.maxflow_kernels import SINK, Graph, both_ways, max_flow, new_forest
+from labkit.support.validation import require
 
 MAX_LABELLINGS = 2**22
 CHUNK = 2**14
@@ -48,12 +50,10 @@ def marginals(crf: PottsCRF) -> Float[np.ndarray, "H W C"]:
 
 def brute_force(crf: PottsCRF) -> MapResult:
     """Return the labelling of least energy out of all C^(H W); raises ValueError beyond 2^22 of them."""
-    best = min(
-        ((energies.min(), labellings[energies.argmin()]) for labellings, energies in enumerate_labellings(crf)),
-        key=lambda pair: pair[0],
-    )
-    energy = crf.energy(best[1])
-    return MapResult(best[1], energy, lower_bound=energy, iterations=1)
+    chunks = ((energies.min(), labellings[energies.argmin()]) for labellings, energies in enumerate_labellings(crf))
+    _, labels = min(chunks, key=lambda pair: pair[0])
+    energy = crf.energy(labels)
+    return MapResult(labels, energy, lower_bound=energy, iterations=1)
 
 
 def unary(crf: PottsCRF) -> MapResult:
@@ -84,8 +84,7 @@ def min_cut(crf: PottsCRF) -> MapResult:
     >>> min_cut(PottsCRF(psi, w)).labels
     array([[0, 0, 0]], dtype=uint8)
     """
-    if crf.shape[2] != 2:
-        raise ValueError(f"crf: expected two classes for a minimum cut, got {crf.shape[2]}; use expansion or trws")
+    require("crf", crf.shape[2] == 2, "two classes for a minimum cut", f"{crf.shape[2]}; use expansion or trws")
     integer = quantise(crf)
     # Each pixel's cheaper class costs 0, so that only one of its arcs to the terminals has a capacity.
     flow, labels = cut_grid(integer.unary[:, 1] - integer.unary[:, 0], integer.weights, integer.step, integer.size)
@@ -113,8 +112,6 @@ def cut_grid(
     excess: Int[np.ndarray, "N"], weights: Int[np.ndarray, "N D"], step: Int[np.ndarray, "K"], size: tuple[int, int]
 ) -> tuple[int, UInt8[np.ndarray, "H W"]]:
     """Return the maximum flow through a flat grid with a ring (`integers`), and 1 on the sink's side of a cut."""
-    from labkit.crf.maxflow_kernels import SINK, Graph, both_ways, max_flow, new_forest
-
     nodes = pixel_numbers(size)
     trees = new_forest(len(excess))
     flow = max_flow(Graph(both_ways(weights, step), excess, step), *trees, nodes, NEAR)
@@ -125,8 +122,7 @@ def enumerate_labellings(crf: PottsCRF) -> Iterator[tuple[UInt8[np.ndarray, "n H
     """Yield all labellings of a tiny grid with their energies, some thousands at a time."""
     H, W, C = crf.shape
     count = C ** (H * W)
-    if count > MAX_LABELLINGS:
-        raise ValueError(f"crf: expected at most {MAX_LABELLINGS} labellings to enumerate, got {C}^{H * W}")
+    require("crf", count <= MAX_LABELLINGS, f"at most {MAX_LABELLINGS} labellings to enumerate", f"{C}^{H * W}")
     place = C ** np.arange(H * W).reshape(H, W)
     rows, columns = np.indices((H, W))
     for start in range(0, count, CHUNK):

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Int
 
 from labkit.crf.energy import PottsCRF
+from labkit.crf.integer_kernels import measure, round_unary, round_weights
 
 # A pixel's costs and messages together stay below 16 times the largest weight: 2^26 keeps that within 31 bits, and
 # 2^36 keeps the sum over 8 million pixels within 63.
@@ -56,8 +57,6 @@ def quantise(crf: PottsCRF) -> IntegerPotts:
     by all that the neighbours can charge together is never worth its cost, so its cost is cut off just above that
     sum, and +inf becomes a number. A weight above the whole energy of a constant labelling is cut off likewise.
     """
-    from labkit.crf.integer_kernels import measure, round_unary, round_weights
-
     H, W, C = crf.shape
     offsets = np.array(crf.offsets)
     size, largest = measure(crf.unary, crf.weights, offsets, np.inf), crf.weights.max()

@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.energy_kernels import mean_field_sweep
+from labkit.support.validation import require
 
 
 def mean_field(crf: PottsCRF, iterations: int = 10, temperatures: tuple[float, float] | None = None) -> MapResult:
@@ -30,13 +32,9 @@ def mean_field_marginals(
     >>> mean_field_marginals(crf).round(3)  # no pairwise term: exp(-psi) / sum(exp(-psi))
     array([[[0.731, 0.269], [0.378, 0.622]]])
     """
-    from labkit.crf.mean_field_kernels import mean_field_sweep
-
-    if iterations < 1:
-        raise ValueError(f"iterations: expected at least 1, got {iterations}")
+    require("iterations", iterations >= 1, "at least 1", iterations)
     first, last = temperatures if temperatures is not None else (1.0, 1.0)
-    if not (0.0 < first < np.inf and 0.0 < last < np.inf):
-        raise ValueError(f"temperatures: expected two numbers above 0, got {temperatures}")
+    require("temperatures", 0.0 < first < np.inf and 0.0 < last < np.inf, "two numbers above 0", temperatures)
     offsets = np.array(crf.offsets)
     q = np.exp(-(crf.unary - crf.unary.min(axis=2, keepdims=True)))
     q /= q.sum(axis=2, keepdims=True)
@@ -50,8 +48,7 @@ def free_energy(crf: PottsCRF, q: Float[np.ndarray, "H W C"]) -> float:
 
     Raises ValueError unless q has the model's shape.
     """
-    if q.shape != crf.shape:
-        raise ValueError(f"q: expected shape {crf.shape}, got {q.shape}")
+    require("q", q.shape == crf.shape, f"shape {crf.shape}", q.shape)
     used = q > 0.0  # 0 log 0 = 0, and a class without probability costs nothing
     F = (q[used] * (crf.unary[used] + np.log(q[used]))).sum()
     for w, offset in zip(crf.weights, crf.offsets, strict=True):

@@ -1,6 +1,6 @@
-"""TRW-S and ICM sweeps, compiled by numba.
+"""TRW-S, compiled by numba.
 
-TRW-S visits the pixels in an order and uses each new message at once, which looks hopelessly sequential. But pixels on
+It visits the pixels in an order and uses each new message at once, which looks hopelessly sequential. But pixels on
 one diagonal of the image do not touch each other. So the image is stored in skewed coordinates: pixel (v, u) is at
 diagonal k = u + slant * v and place v on it, with slant 1 for 4 neighbours and 2 for 8. Then every neighbour is on
 an earlier or a later diagonal, a diagonal is a contiguous row, and the processor works on many pixels of it at once.
@@ -224,30 +224,3 @@ def sweep_nodes(unary, weights, step, nodes, place, messages, forward):
                     messages[place[m], K - 1 - k, c] = min(h[c] - messages[i, k, c] - low, w)
                 bound += low
     return bound
-
-
-@njit(cache=True, nogil=True)
-def icm_sweep(unary, weights, offsets, labels):
-    """Give each pixel in turn the class that is best given its neighbours; return how many changed."""
-    H, W, C = unary.shape
-    cost = np.empty(C)
-    changed = 0
-    for v in range(H):
-        for u in range(W):
-            for c in range(C):
-                cost[c] = unary[v, u, c]
-            for d in range(len(offsets)):
-                down, right = offsets[d]
-                if weights[d, v, u] > 0.0:  # agreeing saves what disagreeing costs
-                    cost[labels[v + down, u + right]] -= weights[d, v, u]
-                up, left = v - down, u - right
-                if up >= 0 and 0 <= left < W and weights[d, up, left] > 0.0:
-                    cost[labels[up, left]] -= weights[d, up, left]
-            best = labels[v, u]
-            for c in range(C):
-                if cost[c] < cost[best]:
-                    best = c
-            if best != labels[v, u]:
-                labels[v, u] = best
-                changed += 1
-    return changed

@@ -11,7 +11,10 @@ import numpy as np
 from jaxtyping import Int, Integer, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.energy_kernels import icm_sweep
 from labkit.crf.integers import IntegerPotts, inside, quantise
+from labkit.crf.message_kernels import skewed, trws_labels, trws_sweep
+from labkit.support.validation import require
 
 # How often labels are read off the messages, in iterations.
 LABEL_EVERY = 5
@@ -28,8 +31,7 @@ def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapRes
     >>> result.labels, round(result.energy, 3), result.gap < 1e-6
     (array([[0, 0, 0]], dtype=uint8), 1.0, True)
     """
-    if iterations < 1:
-        raise ValueError(f"iterations: expected at least 1, got {iterations}")
+    require("iterations", iterations >= 1, "at least 1", iterations)
     return _trws(crf, quantise(crf), iterations, tolerance)
 
 
@@ -50,8 +52,6 @@ def message_passing(
     unary: Int[np.ndarray, "H W C"], weights: Int[np.ndarray, "H W D"], offsets: tuple, iterations: int
 ) -> Iterator[tuple[int, UInt8[np.ndarray, "H W"], int]]:
     """Run TRW-S on integer costs >= 0; yield, now and then, the number of iterations, labels and the proven bound."""
-    from labkit.crf.message_kernels import skewed, trws_labels, trws_sweep
-
     W = unary.shape[1]
     slant = 1 if len(offsets) == 2 else 2
     hop = np.array([(right + slant * down, down) for down, right in offsets])
@@ -73,8 +73,6 @@ def icm(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None, iterati
 
     iterations counts sweeps over the image. A local minimum only: the baseline for the others.
     """
-    from labkit.crf.message_kernels import icm_sweep
-
     labels = (crf.unary.argmin(axis=2) if labels is None else crf.check_labelling("labels", labels)).astype(np.uint8)
     sweep = 0
     while sweep < iterations:

@@ -12,7 +12,9 @@ import numpy as np
 
 from labkit.crf.cuts import Moves, trws_expansion
 from labkit.crf.energy import MapResult, PottsCRF
-from labkit.crf.integers import quantise
+from labkit.crf.integers import pixel_numbers, quantise
+from labkit.crf.message_kernels import trws_bound
+from labkit.crf.move_kernels import SOURCE, energy_of, fold_fixed, persistency_test
 
 # If more of the pixels than these shares are left after the first test, or after all, "trws+expansion" solves the image
 # as a whole: it takes less time then.
@@ -46,7 +48,9 @@ def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -
     if len(moves.nodes):
         moves.labels[moves.nodes] = first[moves.nodes]
         tried += moves.expand_all()
-    bound, result = moves.integer_energy(), moves.result(crf, tried)
+    everywhere = pixel_numbers(integer.size)
+    bound = energy_of(integer.unary, integer.weights, integer.step, moves.labels, everywhere)
+    result = moves.result(crf, tried)
     if len(moves.nodes):
         above, more = distance_to_bound(moves, iterations, tolerance * abs(result.energy) * integer.scale)
         result = replace(result, iterations=tried + more)
@@ -55,8 +59,6 @@ def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -
 
 def fix_certain(moves: Moves) -> None:
     """Take the free pixels that keep their label in some best labelling out of the moves."""
-    from labkit.crf.move_kernels import SOURCE, persistency_test
-
     _, _, tree = moves.cut(persistency_test, near=NEAR)
     moves.leave_free(tree == SOURCE)
 
@@ -66,9 +68,6 @@ def distance_to_bound(moves: Moves, iterations: int, enough: float) -> tuple[int
 
     It stops once the distance is `enough`. Folds the fixed pixels' costs into the model of `moves`, as the last step.
     """
-    from labkit.crf.message_kernels import trws_bound
-    from labkit.crf.move_kernels import energy_of, fold_fixed
-
     integer = moves.integer
     problem = integer.unary, integer.weights, integer.step
     fold_fixed(*problem, moves.labels, moves.free, moves.nodes)

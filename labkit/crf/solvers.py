@@ -12,7 +12,7 @@ from labkit.crf.exact import brute_force, min_cut, unary
 from labkit.crf.mean_field import mean_field
 from labkit.crf.messages import icm, trws
 from labkit.crf.persistency import persistency
-from labkit.support.validation import check_depth
+from labkit.support.validation import check_depth, require
 
 METHODS = {
     "brute_force": brute_force,
@@ -39,8 +39,7 @@ def solve(crf: PottsCRF, method: str = "trws+expansion", **options) -> MapResult
     >>> solve(crf).labels, solve(crf, "unary").labels
     (array([[0, 0, 0]], dtype=uint8), array([[0, 2, 0]], dtype=uint8))
     """
-    if method not in METHODS:
-        raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    require("method", method in METHODS, f"one of {', '.join(METHODS)}", repr(method))
     start = time.perf_counter()
     result = METHODS[method](crf, **options)
     return replace(result, seconds=time.perf_counter() - start)

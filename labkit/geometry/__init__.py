@@ -29,27 +29,3 @@ from labkit.geometry.projection import (
     project,
     transform_points,
 )
-
-__all__ = [
-    "CHANNELS",
-    "Plane",
-    "PrincipalAxes",
-    "back_project",
-    "back_project_to_base",
-    "back_projection_jacobian",
-    "back_projection_noise",
-    "backproject_to_base",
-    "centroid_and_covariance",
-    "cluster",
-    "cluster_indices",
-    "fit_plane",
-    "geometry_channels",
-    "inliers",
-    "invert_transform",
-    "mirrored",
-    "pixel_rays",
-    "principal_axes",
-    "project",
-    "remove_outliers",
-    "transform_points",
-]

@@ -6,9 +6,7 @@ from jaxtyping import Float, Num
 
 CHANNELS = ("height", "height, fine", "known", "right", "away", "up", "footprint")
 HEIGHTS = (0.25, 0.05)  # metres above and below the table that the two height channels reach
-FOOTPRINT = (
-    0.003  # metres that a pixel covers where the footprint channel is 0.5; 0 and 1 are an eighth and eight times
-)
+FOOTPRINT = 0.003  # metres that a pixel covers where its channel is 0.5; 0 and 1 are an eighth and eight times of it
 MIRRORED = CHANNELS.index("right")  # changes its sign in a mirror
 
 
@@ -31,7 +29,7 @@ def geometry_channels(
     >>> [f"{name} {value:.2f}" for name, value in zip(CHANNELS, g[4, 4])]
     ['height 0.54', 'height, fine 0.70', 'known 1.00', 'right 0.50', 'away 0.50', 'up 1.00', 'footprint 0.79']
     """
-    from labkit.support.geometry_kernels import fill_channels, inverse_depth  # numba takes its time to import
+    from labkit.support.geometry_kernels import fill_channels  # numba takes its time to import
 
     depth = np.ascontiguousarray(depth, np.float32)
     R, t = T_base_cam[:3, :3], T_base_cam[:3, 3]
@@ -50,6 +48,15 @@ def geometry_channels(
     single = [np.asarray(x, np.float32) for x in (to_normal, slant)]
     reach = np.array(HEIGHTS, np.float32)
     return fill_channels(depth, q, q_u, q_v, *single, np.float32(t[2] - table_z), reach, footprint)
+
+
+def inverse_depth(depth: Float[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
+    """Compute 1 / depth, float32; a pixel without depth gets the mean over the known of the 5 x 5 around it, else 0."""
+    known = (depth > 0.0).astype(np.float32)
+    q = np.divide(np.float32(1.0), depth, out=np.zeros_like(known), where=known > 0.0)
+    whole = {"ddepth": cv2.CV_32F, "ksize": (5, 5), "normalize": False, "borderType": cv2.BORDER_CONSTANT}
+    total, count = cv2.boxFilter(q, **whole), cv2.boxFilter(known, **whole)
+    return np.where(known > 0.0, q, total / np.maximum(count, 1.0))
 
 
 def mirrored(array: Num[np.ndarray, "*N H W D"]) -> Num[np.ndarray, "*N H W D"]:

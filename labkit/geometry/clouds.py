@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from labkit.support.validation import check_finite, check_points, check_shape
+from labkit.support.validation import check_finite, check_points, check_shape, check_whole, require
 
 Scalar = int | float | np.integer | np.floating
 
@@ -27,8 +27,7 @@ def centroid_and_covariance(
            [0., 0., 0.]])
     """
     P = _check_cloud("P", P)
-    if len(P) == 0:
-        raise ValueError("P: expected at least one point, got an empty cloud (0, 3)")
+    require("P", len(P) > 0, "at least one point", "an empty cloud (0, 3)")
     return _moments(P)
 
 
@@ -74,8 +73,7 @@ def principal_axes(P: Float[np.ndarray, "N 3"], tolerance: Scalar = 0.05) -> Pri
     >>> principal_axes(box[:3]).problem
     'only 3 points: at least 4 are needed for axes'
     """
-    if not 0.0 <= tolerance < 1.0:
-        raise ValueError(f"tolerance: expected a share in 0..1, got {tolerance}")
+    require("tolerance", 0.0 <= tolerance < 1.0, "a share in 0..1", tolerance)
     centroid, covariance = centroid_and_covariance(P)
     variances, axes = np.linalg.eigh(covariance)  # ascending
     variances, axes = np.maximum(variances[::-1], 0.0), axes[:, ::-1]  # rounding can leave -1e-20
@@ -143,9 +141,8 @@ def fit_plane(
     """
     P = _check_cloud("P", P).astype(np.float64)
     _check_reach("tolerance", tolerance, P)
-    _check_count("tries", tries, 1)
-    if len(P) < 3:
-        raise ValueError(f"P: expected at least three points, got {len(P)}")
+    check_whole("tries", tries, 1)
+    require("P", len(P) >= 3, "at least three points", len(P))
     rng = np.random.default_rng(seed)
     some = P[rng.permutation(len(P))[:3000]]  # enough to tell which of two planes holds more points
     a, b, c = some[rng.integers(len(some), size=(3, tries))]
@@ -153,8 +150,7 @@ def fit_plane(
     lengths = np.linalg.norm(normals, axis=1)
     spread = np.linalg.norm(b - a, axis=1) * np.linalg.norm(c - a, axis=1)
     usable = lengths > 1e-6 * spread + 1e-12  # not three points of a line
-    if not usable.any():
-        raise ValueError("P: expected points that span a plane, got points on a line")
+    require("P", usable.any(), "points that span a plane", "points on a line")
     normals = normals[usable] / lengths[usable, None]
     offsets = -(normals * a[usable]).sum(axis=1)
     votes = [np.count_nonzero(np.abs(some @ n + d) < tolerance) for n, d in zip(normals, offsets, strict=True)]
@@ -195,7 +191,7 @@ def inliers(P: Float[np.ndarray, "N 3"], radius: Scalar = 0.01, min_neighbours: 
 
     P = _check_cloud("P", P)
     _check_reach("radius", radius, P)
-    _check_count("min_neighbours", min_neighbours, 0)
+    check_whole("min_neighbours", min_neighbours, 0)
     order, points, cells = sort_into_cells(P, radius)
     keep = np.empty(len(P), bool)
     keep[order] = count_neighbours(points, *cells, radius, min_neighbours) >= min_neighbours
@@ -224,7 +220,7 @@ def cluster_indices(
 
     P = _check_cloud("P", P)
     _check_reach("gap", gap, P)
-    _check_count("min_points", min_points, 1)
+    check_whole("min_points", min_points, 1)
     order, points, cells = sort_into_cells(P, gap)
     group = np.empty(len(P), np.int64)
     group[order] = link_cells(points, *cells, gap)
@@ -238,12 +234,6 @@ def _check_cloud(name: str, P) -> Float[np.ndarray, "N 3"]:
 
 
 def _check_reach(name: str, reach, P: Float[np.ndarray, "N 3"]) -> None:
-    if not (np.ndim(reach) == 0 and np.isfinite(reach) and reach > 0.0):
-        raise ValueError(f"{name}: expected metres above 0, got {reach}")
+    require(name, np.ndim(reach) == 0 and np.isfinite(reach) and reach > 0.0, "metres above 0", reach)
     if len(P) and P.max() - P.min() > 1e6 * reach:  # the keys of the grid's cells would not fit in 64 bits
         raise ValueError(f"{name}: expected more than a millionth of the cloud's width, got {reach}")
-
-
-def _check_count(name: str, value, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name}: expected a whole number of at least {least}, got {value!r}")

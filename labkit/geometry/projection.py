@@ -17,6 +17,8 @@ from labkit.support.validation import (
     check_same_size,
     check_shape,
     check_T,
+    check_whole,
+    require,
 )
 
 Scalar = int | float | np.integer | np.floating
@@ -88,11 +90,9 @@ def backproject_to_base(
     """
     depth = _check_depth_images(check_shape("depth", depth, (None, None)))
     mask = check_shape("mask", mask, (None, None))
-    if mask.dtype.kind not in "iu":
-        raise ValueError(f"mask: expected integer labels, got dtype {mask.dtype}")
+    require("mask", mask.dtype.kind in "iu", "integer labels", f"dtype {mask.dtype}")
     check_same_size("depth", depth, "mask", mask)
-    if isinstance(target_class, bool) or not isinstance(target_class, int | np.integer) or target_class < 0:
-        raise ValueError(f"target_class: expected one class number, 0 or more, got {target_class!r}")
+    check_whole("target_class", target_class, 0)
     K, T_base_cam = check_K("K", K), check_T("T_base_cam", T_base_cam)
 
     chosen = np.flatnonzero((mask == target_class) & (depth > 0.0))  # NaN > 0 is False
@@ -142,8 +142,7 @@ def back_projection_jacobian(u: Scalar, v: Scalar, d: Scalar, K: Real[np.ndarray
     """
     for name, value in (("u", u), ("v", v), ("d", d)):
         check_finite(name, check_shape(name, value, ()))
-    if not d > 0.0:
-        raise ValueError(f"d: expected a depth in metres above 0, got {d}")
+    require("d", d > 0.0, "a depth in metres above 0", d)
     K_inv = np.linalg.inv(check_K("K", K))
     return np.column_stack([d * K_inv[:, 0], d * K_inv[:, 1], K_inv @ (u, v, 1.0)])
 
@@ -249,8 +248,7 @@ def _check_size(name: str, size) -> tuple[int, int]:
 
 def _check_depth_images(depth) -> Float32[np.ndarray, "*batch H W"]:
     depth = np.asarray(depth)
-    if depth.ndim < 2:
-        raise ValueError(f"depth: expected shape (H, W) or (..., H, W), got {depth.shape}")
+    require("depth", depth.ndim >= 2, "shape (H, W) or (..., H, W)", depth.shape)
     _check_size("depth", depth.shape[-2:])
     check_depth("depth", depth.reshape(-1, depth.shape[-1]))  # one tall image: what is checked is its numbers
     return np.ascontiguousarray(depth, dtype=np.float32)

@@ -4,5 +4,3 @@
 """
 
 from labkit.grasp.planner import Grasp, GraspPlan, Gripper, plan_grasps, principal_axis_grasp, top_down_grasp
-
-__all__ = ["Grasp", "GraspPlan", "Gripper", "plan_grasps", "principal_axis_grasp", "top_down_grasp"]

@@ -1,30 +1,13 @@
-"""A close look at grips, measured on the points themselves and compiled by numba. `planner` scores the numbers."""
+"""A close look at grips, measured on the points themselves and compiled by numba."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from labkit.grasp.search_kernels import GRIP, SLIPPERY, search
+from labkit.grasp.search_kernels import GRIP, SLIPPERY, Shortcomings, lack, search
 
 STEEPEST = 0.5  # tangent: between two faces that each lean by more than this to the same side, the target slips out
-
-# What is measured of a grip, in metres.
-MEASURES = np.dtype(
-    [
-        ("middle", float),  # of the jaws, along their closing direction
-        ("opening", float),  # of the jaws
-        ("depth", float),  # how far the tips reach below the top of what they touch
-        ("width", float),  # of the target there
-        ("clearance", float),  # air beside it
-        ("offset", float),  # from the target's middle
-        ("shadow", float),  # how far unseen things may stand up into fingers and palm
-        ("patch", float),  # how much of a pad touches, across
-        ("skew", float),  # how far apart, across, the two pads touch
-        ("unseen", float),  # how far the target may go on behind what the camera saw
-    ]
-)
-MEASURES = np.dtype((np.record, MEASURES))  # fields are attributes where nothing is compiled, too
 
 
 class Contact(NamedTuple):
@@ -45,10 +28,11 @@ class Contact(NamedTuple):
 def find_grips(target, scene, hidden, centre, yaws, lowest, hand, weights, enough, most):
     """Search, then measure grips in the order of their rough costs until `most` of them hold.
 
-    Returns GRIPs, their MEASURES, and counts of what was dropped and why.
+    Returns GRIPs; for each of them the middle of the jaws along their closing direction, their opening, and the cost;
+    and counts of what was dropped and why.
     """
     found, costs, dropped = search(target, scene, hidden, centre, yaws, lowest, hand, weights, enough)
-    grips, measures = np.empty(most, GRIP), np.zeros(most, MEASURES)
+    grips, places = np.empty(most, GRIP), np.empty((most, 3))
     T, H = np.empty_like(target), np.empty_like(hidden)
     n = 0
     for i in np.argsort(costs, kind="mergesort"):  # stable: equals stay in their order
@@ -57,10 +41,10 @@ def find_grips(target, scene, hidden, centre, yaws, lowest, hand, weights, enoug
         grip = found[i]
         turn(target, centre, grip, T)
         turn(hidden, centre, grip, H)
-        if measure(grip, T, H, hand, measures[n], dropped):
+        if measure(grip, T, H, hand, weights, enough, places[n], dropped):
             grips[n] = grip
             n += 1
-    return grips[:n], measures[:n], dropped
+    return grips[:n], places[:n], dropped
 
 
 @njit(cache=True, nogil=True)
@@ -74,8 +58,11 @@ def turn(points, centre, grip, out):
 
 
 @njit(cache=True, nogil=True)
-def measure(grip, T, H, hand, m, dropped):
-    """Measure a grip into `m`, given target and hidden points turned to it; say whether it fits and would hold."""
+def measure(grip, T, H, hand, weights, enough, place, dropped):
+    """Write middle, opening and cost of a grip into `place`, given target and hidden points turned to it.
+
+    The cost is the weighted sum of its shortcomings, each from 0 to 1. Says whether the grip fits and would hold.
+    """
     left, right, start, end = jaws(T, grip, hand)
     if not 0.0 < right - left <= hand.opening:
         return False
@@ -87,18 +74,25 @@ def measure(grip, T, H, hand, m, dropped):
         return False
     dark_left = shadow_height(H, grip.tip, hand.finger, left - hand.thickness, left)
     dark_right = shadow_height(H, grip.tip, hand.finger, right, right + hand.thickness)
-    m.middle, m.opening = (left + right) / 2, right - left
+    middle = (left + right) / 2
     dark_palm = shadow_height(
-        H, grip.tip + hand.palm, hand.palm_half, m.middle - hand.palm_reach, m.middle + hand.palm_reach
+        H, grip.tip + hand.palm, hand.palm_half, middle - hand.palm_reach, middle + hand.palm_reach
     )
-    m.depth = min(at_left.top, at_right.top)
-    m.width = end - start
-    m.clearance = min(start - left, right - end)
-    m.offset = np.sqrt(((start + end) / 2) ** 2 + grip.b**2)
-    m.shadow = (dark_left + dark_right) / 2 + dark_palm
-    m.patch = (at_left.patch + at_right.patch) / 2
-    m.skew = abs(at_left.middle - at_right.middle)
-    m.unseen = max(min(dark_left, at_left.rise), min(dark_right, at_right.rise))
+    offset = np.sqrt(((start + end) / 2) ** 2 + grip.b**2)
+    unseen = max(min(dark_left, at_left.rise), min(dark_right, at_right.rise))
+    shortcomings = Shortcomings(
+        shallow=lack(min(at_left.top, at_right.top), enough.shallow),
+        wide=1.0 - lack(end - start, enough.wide),
+        tight=lack(min(start - left, right - end), enough.tight),
+        offset=1.0 - lack(offset, enough.offset),
+        shadow=1.0 - lack((dark_left + dark_right) / 2 + dark_palm, enough.shadow),
+        short=lack((at_left.patch + at_right.patch) / 2, enough.short),
+        skew=1.0 - lack(abs(at_left.middle - at_right.middle), enough.skew),
+        unseen=1.0 - lack(unseen, enough.unseen),
+    )
+    place[0], place[1], place[2] = middle, right - left, 0.0
+    for i in range(len(weights)):
+        place[2] += weights[i] * shortcomings[i]
     return True
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from labkit.geometry import centroid_and_covariance
-from labkit.support.validation import check_finite, check_height, check_shape
+from labkit.support.validation import check_finite, check_height, check_shape, require
 
 # Metres that sensor and arm may be wrong by, whatever the gripper.
 TIP_CLEARANCE = 0.004  # of air between the tips and the table
@@ -75,15 +75,11 @@ class Gripper:
     def __post_init__(self):
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (np.ndim(value) == 0 and 0.0 <= value < 1.0) or (value == 0.0 and field.name != "tips_below_grasp"):
-                raise ValueError(
-                    f"{field.name}: expected metres above 0 and below 1, got {value}; multiply millimetres by 0.001"
-                )
+            fits = np.ndim(value) == 0 and 0.0 <= value < 1.0 and (value > 0.0 or field.name == "tips_below_grasp")
+            require(field.name, fits, "metres above 0 and below 1", f"{value}; multiply millimetres by 0.001")
         for smaller, larger in (("tip_thickness", "root_thickness"), ("pad_width", "finger_width")):
-            if getattr(self, smaller) > getattr(self, larger):
-                raise ValueError(
-                    f"{smaller}: expected at most {larger}, {getattr(self, larger)}, got {getattr(self, smaller)}"
-                )
+            value, most = getattr(self, smaller), getattr(self, larger)
+            require(smaller, value <= most, f"at most {larger}, {most}", value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,10 +216,8 @@ def _cloud(name: str, points) -> Float[np.ndarray, "N 3"]:
     points = np.ascontiguousarray(check_shape(name, points, (None, 3)), dtype=np.float64)
     if len(points) and not (points.min() >= -MAX_POSITION and points.max() <= MAX_POSITION):  # NaN fails too
         check_finite(name, points)
-        raise ValueError(
-            f"{name}: expected metres, got a coordinate of {np.abs(points).max():.6g}, which looks like millimetres: "
-            "multiply by 0.001"
-        )
+        most = np.abs(points).max()
+        raise ValueError(f"{name}: expected metres, got {most:.6g}, which looks like millimetres: multiply by 0.001")
     return points
 
 
@@ -263,18 +257,16 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     def find(scene, hidden):
         return find_grips(target, scene, hidden, centre, _yaws(target), lowest, hand, weights, enough, MEASURED)
 
-    grips, measures, dropped = find(near, hidden)
+    grips, places, dropped = find(near, hidden)
     if len(grips) == 0:
         alone, _, dropped_alone = find(target, hidden[:0])
         return _why_none(dropped, len(alone) > 0, dropped_alone, kernels)
-    scores = _score(measures, weights, enough)
-    best = np.argsort(-scores)[:RANKED]
-    grips, measures, scores = grips[best], measures[best], scores[best]
+    best = np.argsort(places[:, 2], kind="stable")[:RANKED]
+    grips, (a, opening, cost), b = grips[best], places[best].T, grips["b"][best]
     cos, sin = np.cos(grips["yaw"]), np.sin(grips["yaw"])
-    a, b = measures["middle"], grips["b"]
     xy = centre + np.stack([a * cos - b * sin, a * sin + b * cos], axis=1)
     T = _frames(grips["yaw"], xy, grips["tip"] + gripper.tips_below_grasp)
-    found = zip(T, measures["opening"].tolist(), scores.tolist(), strict=True)
+    found = zip(T, opening.tolist(), (1.0 - cost / sum(weights)).tolist(), strict=True)
     return [Grasp(T, width, score, number) for T, width, score in found]
 
 
@@ -325,21 +317,6 @@ def _yaws(target) -> Float[np.ndarray, "Y"]:
     _, _, degrees = cv2.minAreaRect(np.float32(target[:, :2] - target[0, :2]))
     axes = np.array([_principal_yaw(target), np.radians(degrees)])
     return np.concatenate([axes, axes + np.pi / 2, np.arange(FAN) * np.pi / FAN])
-
-
-def _score(m, weights, enough) -> Float[np.ndarray, "n"]:
-    """1 minus the weighted mean of the shortcomings, each from 0 to 1."""
-    shortcomings = type(weights)(
-        shallow=1.0 - m["depth"] / enough.shallow,
-        wide=m["width"] / enough.wide,
-        tight=1.0 - m["clearance"] / enough.tight,
-        offset=m["offset"] / enough.offset,
-        shadow=m["shadow"] / enough.shadow,
-        short=1.0 - m["patch"] / enough.short,
-        skew=m["skew"] / enough.skew,
-        unseen=m["unseen"] / enough.unseen,
-    )
-    return 1.0 - np.array(weights) @ np.clip(shortcomings, 0.0, 1.0) / sum(weights)
 
 
 def _why_none(dropped, fits_alone: bool, dropped_alone, kernels) -> str:

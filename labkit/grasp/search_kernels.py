@@ -102,18 +102,6 @@ def middle_of_area(points, cell):
 
 
 @njit(cache=True, nogil=True)
-def points_near(points, x, y, radius):
-    """Keep the points of a square around (x, y)."""
-    keep = np.empty(len(points), np.int64)
-    n = 0
-    for i in range(len(points)):
-        if abs(points[i, 0] - x) < radius and abs(points[i, 1] - y) < radius:
-            keep[n] = i
-            n += 1
-    return points[keep[:n]]
-
-
-@njit(cache=True, nogil=True)
 def hidden_points(scene, x, y, radius, cell, camera, floor):
     """Bound from above what the camera cannot see: one point (K, 3) per cell without a reading, if above `floor`.
 
@@ -158,7 +146,7 @@ def surroundings(target, scene, camera, lowest, hand):
     """
     centre = middle_of_area(target, hand.cell)
     radius = (hand.columns + 1) / 2 * hand.cell
-    around = points_near(scene, centre[0], centre[1], radius)
+    around = scene[(np.abs(scene[:, 0] - centre[0]) < radius) & (np.abs(scene[:, 1] - centre[1]) < radius)]
     hidden = np.empty((0, 3))
     if len(camera):
         hidden = hidden_points(around, centre[0], centre[1], radius, hand.cell, camera, lowest)

@@ -7,6 +7,8 @@ import importlib.util
 import inspect
 import os
 
+from labkit.support.validation import require
+
 
 @contextlib.contextmanager
 def silent(descriptor: int = 2):
@@ -46,8 +48,7 @@ class Client:
         function = getattr(pybullet, name)
         if not inspect.isbuiltin(function):
             return function
-        if self.number < 0:
-            raise ValueError(f"{name}: expected an open simulation, got one that close() has ended")
+        require(name, self.number >= 0, "an open simulation", "one that close() has ended")
         bound = functools.partial(function, physicsClientId=self.number)
         setattr(self, name, bound)
         return bound
@@ -71,4 +72,4 @@ class Client:
             with self.quiet():
                 pybullet.disconnect(self.number)
         self.__dict__.clear()  # methods bound to this simulation would act on the next one of the same number
-        self.number = -1
+        self.number, self.egl = -1, False

@@ -30,7 +30,7 @@ from labkit.sim.planning import (
     trajectory,
 )
 from labkit.sim.world import TIME_STEP, World
-from labkit.support.validation import check_finite, check_shape, check_T
+from labkit.support.validation import check_finite, check_shape, check_T, require
 
 ARM_JOINTS = tuple(range(7))
 FINGER_JOINTS = (9, 10)
@@ -81,8 +81,7 @@ class Panda:
     """
 
     def __init__(self, world: World):
-        if world.robot is None:
-            raise ValueError("world: expected a scene with a robot, got a spec with robot=False")
+        require("world", world.robot is not None, "a scene with a robot", "a spec with robot=False")
         self.world = world
         self._target = self.q  # the joint angles last sent to the motors
         self._opening = self.opening  # what the hand is to keep to while open, metres
@@ -131,8 +130,7 @@ class Panda:
         closes there. Raises ValueError if the plan does not begin where the arm is.
         """
         off = np.abs(plan.transit[0][0] - self.q).max()
-        if off > 0.05:
-            raise ValueError(f"plan: expected one that begins at the arm's joints, got one that is {off:.2f} rad off")
+        require("plan", off <= 0.05, "one that begins at the arm's joints", f"one that is {off:.2f} rad off")
         self._opening, self._gripping = plan.opening, False
         if not all(self._follow_or_back_off(leg) for leg in plan.transit):
             return "blocked on the way over"

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit.sim.spec import ObjectSpec, Part
 from labkit.support.files import write_atomically
+from labkit.support.validation import require
 
 ROUND = 32  # facets around a cylinder
 LENGTHS = {"box": 3, "cylinder": 2, "sphere": 1}
@@ -34,8 +35,7 @@ def data_path() -> Path:
 def urdf_path(urdf: str) -> Path:
     """The file of a URDF of pybullet_data. Raises ValueError if there is none."""
     path = data_path() / urdf
-    if not path.is_file():
-        raise ValueError(f"urdf: expected a file of pybullet_data such as 'duck_vhacd.urdf', got {urdf!r}")
+    require("urdf", path.is_file(), "a file of pybullet_data such as 'duck_vhacd.urdf'", repr(urdf))
     return path
 
 
@@ -59,8 +59,7 @@ def _points_of(part: Part) -> Float[np.ndarray, "V 3"]:
         if size.size < 12 or size.size % 3:
             raise ValueError(f"part.size: expected at least four points x, y, z in a row, got {size.size} numbers")
         return size.reshape(-1, 3)
-    if part.kind not in LENGTHS:
-        raise ValueError(f"part.kind: expected one of {sorted([*LENGTHS, 'hull'])}, got {part.kind!r}")
+    require("part.kind", part.kind in LENGTHS, f"one of {sorted([*LENGTHS, 'hull'])}", repr(part.kind))
     if size.shape != (LENGTHS[part.kind],) or not size.min() > 0.0:
         raise ValueError(f"part.size: expected {LENGTHS[part.kind]} lengths above 0 for a {part.kind}, got {part.size}")
     if part.kind == "box":

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from labkit.labels import CLASSES, OBSTACLE, TARGET
-from labkit.support.validation import check_finite, check_shape, check_T
+from labkit.support.validation import check_finite, check_shape, check_T, require
 
 Vector = tuple[float, ...]
 
@@ -69,19 +69,15 @@ class ObjectSpec:
     friction: float = 0.8
 
     def __post_init__(self):
-        if (self.urdf is None) == (not self.parts):
-            raise ValueError(
-                f"object {self.name!r}: expected either a urdf or parts, got {self.urdf!r} and {self.parts!r}"
-            )
+        named = f"object {self.name!r}"
+        require(named, (self.urdf is None) != (not self.parts), "either a urdf or parts", (self.urdf, self.parts))
         if self.class_id not in (TARGET, OBSTACLE):
             raise ValueError(f"class_id: expected {TARGET} (target) or {OBSTACLE} (obstacle), got {self.class_id!r}")
         check_finite("position", check_shape("position", self.position, (3,)))
         length = np.linalg.norm(check_finite("orientation", check_shape("orientation", self.orientation, (4,))))
-        if abs(length - 1.0) > 0.01:
-            raise ValueError(f"orientation: expected a unit quaternion x, y, z, w, got one of length {length:.3g}")
+        require("orientation", abs(length - 1.0) <= 0.01, "a unit quaternion x, y, z, w", f"one of length {length:.3g}")
         for name in ("mass", "scale"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name}: expected a number above 0, got {getattr(self, name)}")
+            require(name, 0.0 < getattr(self, name) < np.inf, "a number above 0", getattr(self, name))
 
 
 @dataclass(frozen=True)
@@ -112,10 +108,8 @@ class Camera:
             raise ValueError(f'renderer: expected "tiny" or "egl", got {self.renderer!r}')
         T = check_T("T_base_cam", self.T_base_cam)
         object.__setattr__(self, "T_base_cam", tuple(map(tuple, T.tolist())))
-        if not 0.0 < self.fov_y < np.pi:
-            raise ValueError(
-                f"fov_y: expected radians between 0 and pi, got {self.fov_y}; np.radians makes them of degrees"
-            )
+        got = f"{self.fov_y}; np.radians makes them of degrees"
+        require("fov_y", 0.0 < self.fov_y < np.pi, "radians between 0 and pi", got)
         if not 0.0 < self.near < self.far < np.inf:
             raise ValueError(f"near, far: expected 0 < near < far in metres, got {self.near} and {self.far}")
 
@@ -167,15 +161,11 @@ class SceneSpec:
 
     def __post_init__(self):
         names = [thing.name for thing in self.objects]
-        if len(set(names)) < len(names):
-            raise ValueError(f"objects: expected unique names, got {names}")
+        require("objects", len(set(names)) == len(names), "unique names", names)
         for thing in self.objects:
             off = np.abs(np.subtract(thing.position[:2], self.table.centre)) > np.array(self.table.size[:2]) / 2
-            if off.any():
-                raise ValueError(
-                    f"objects: expected {thing.name!r} over the table, {self.table.size[:2]} m around "
-                    f"{self.table.centre}, got position {thing.position}"
-                )
+            where = f"{self.table.size[:2]} m around {self.table.centre}"
+            require("objects", not off.any(), f"{thing.name!r} over the table, {where}", f"position {thing.position}")
 
     def __repr__(self) -> str:
         return f"SceneSpec({self.config}, seed {self.seed}: {', '.join(thing.name for thing in self.objects)})"

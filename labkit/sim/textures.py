@@ -5,6 +5,7 @@ from jaxtyping import Float, UInt8
 from scipy.ndimage import gaussian_filter
 
 from labkit.sim.spec import Texture
+from labkit.support.validation import require
 
 SIZE = 128
 
@@ -17,24 +18,14 @@ def paint(texture: Texture) -> UInt8[np.ndarray, "128 128 3"]:
     >>> paint(Texture("plain", colour_a=(1.0, 0.0, 0.0)))[0, 0].tolist()
     [255, 0, 0]
     """
-    if texture.kind not in KINDS:
-        raise ValueError(f"texture.kind: expected one of {sorted(KINDS)}, got {texture.kind!r}")
+    require("texture.kind", texture.kind in KINDS, f"one of {sorted(KINDS)}", repr(texture.kind))
     v, u = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     mix = KINDS[texture.kind](u, v, texture.scale, np.random.default_rng(texture.seed))[..., None]
     colour = (1.0 - mix) * np.asarray(texture.colour_a) + mix * np.asarray(texture.colour_b)
     return np.round(255.0 * np.clip(colour, 0.0, 1.0)).astype(np.uint8)
 
 
-def _plain(u, v, scale, rng) -> Float[np.ndarray, "H W"]:
-    return np.zeros_like(u)
-
-
-def _checker(u, v, scale, rng) -> Float[np.ndarray, "H W"]:
-    return ((np.floor(u * scale) + np.floor(v * scale)) % 2).astype(float)
-
-
-def _stripes(u, v, scale, rng) -> Float[np.ndarray, "H W"]:
-    angle = rng.uniform(0.0, np.pi)
+def _stripes(u, v, scale, angle) -> Float[np.ndarray, "H W"]:
     return 0.5 + 0.5 * np.sin(2.0 * np.pi * scale * (np.cos(angle) * u + np.sin(angle) * v))
 
 
@@ -62,23 +53,19 @@ def _speckle(u, v, scale, rng) -> Float[np.ndarray, "H W"]:
     return (field > np.quantile(field, 0.8)).astype(float)
 
 
-def _dots(u, v, scale, rng) -> Float[np.ndarray, "H W"]:
-    return ((u * scale % 1.0 - 0.5) ** 2 + (v * scale % 1.0 - 0.5) ** 2 < 0.09).astype(float)
-
-
 def _bricks(u, v, scale, rng) -> Float[np.ndarray, "H W"]:
-    row = np.floor(v * scale)
-    across = (u * scale / 2.0 + 0.5 * (row % 2)) % 1.0
+    across = (u * scale / 2.0 + 0.5 * (np.floor(v * scale) % 2)) % 1.0
     return ((across < 0.05) | (v * scale % 1.0 < 0.1)).astype(float)
 
 
+# From where in the picture (u, v in 0..1), how fine, and a generator: how much of the second colour.
 KINDS = {
-    "plain": _plain,
-    "checker": _checker,
-    "stripes": _stripes,
+    "plain": lambda u, v, scale, rng: np.zeros_like(u),
+    "checker": lambda u, v, scale, rng: (np.floor(u * scale) + np.floor(v * scale)) % 2,
+    "stripes": lambda u, v, scale, rng: _stripes(u, v, scale, rng.uniform(0.0, np.pi)),
     "wood": _wood,
     "clouds": _clouds,
     "speckle": _speckle,
-    "dots": _dots,
+    "dots": lambda u, v, scale, rng: (u * scale % 1.0 - 0.5) ** 2 + (v * scale % 1.0 - 0.5) ** 2 < 0.09,
     "bricks": _bricks,
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
@@ -17,6 +17,7 @@ from labkit.sim.kinematics import HOME, PANDA_URDF
 from labkit.sim.shapes import as_file, data_path, object_mesh, part_mesh, parts_as_obj, urdf_path
 from labkit.sim.spec import Camera, ObjectSpec, SceneSpec, Texture
 from labkit.sim.textures import paint
+from labkit.support.validation import require
 
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7
@@ -78,8 +79,7 @@ class World:
 
     def pose(self, name: str) -> Float[np.ndarray, "4 4"]:
         """The true pose of an object now, T_base_object. Raises ValueError if there is no such object."""
-        if name not in self.bodies:
-            raise ValueError(f"name: expected one of {sorted(self.bodies)}, got {name!r}")
+        require("name", name in self.bodies, f"one of {sorted(self.bodies)}", repr(name))
         body = self.bodies[name]
         # PyBullet speaks of the centre of mass; an object's frame is where its mesh is drawn.
         T_base_mass = _pose_matrix(*self.client.getBasePositionAndOrientation(body))
@@ -103,8 +103,7 @@ class World:
         the spec's. Raises ValueError for an empty size.
         """
         width, height = size
-        if min(size) < 1:
-            raise ValueError(f"size: expected width and height of at least 1, got {size}")
+        require("size", min(size) >= 1, "width and height of at least 1", size)
         camera = camera or self.spec.camera
         light = self.spec.light
         with self.client.quiet():
@@ -136,18 +135,6 @@ class World:
             instances=instances,
             table_z=self.spec.table.z,
         )
-
-    def silhouette(self, name: str, size: tuple[int, int] = (320, 240)) -> Bool[np.ndarray, "H W"]:
-        """The pixels that an object would cover if no other object stood before it; the simulation stays as it is."""
-        number = 1 + [thing.name for thing in self.spec.objects].index(name)
-        state = self.client.saveState()
-        for other, body in self.bodies.items():
-            if other != name:
-                self.client.resetBasePositionAndOrientation(body, (0.0, 0.0, -100.0), (0.0, 0.0, 0.0, 1.0))
-        mask = self.render(size).instances == number
-        self.client.restoreState(state)
-        self.client.removeState(state)
-        return mask
 
     def _label(self, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Turn the renderer's body numbers (-1 for nothing) into labels and instances."""

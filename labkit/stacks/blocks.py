@@ -8,6 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 
+from labkit.support.validation import require
+
 
 @dataclass(frozen=True)
 class Block:
@@ -60,8 +62,7 @@ class Diagram:
         for block in self.blocks:
             result = block.function(*(signals[name] for name in block.inputs))
             results = (result,) if len(block.outputs) == 1 else tuple(result)
-            if len(results) != len(block.outputs):
-                raise ValueError(f"{block.name}: expected {len(block.outputs)} outputs, got {len(results)}")
+            require(block.name, len(results) == len(block.outputs), f"{len(block.outputs)} outputs", len(results))
             signals.update(zip(block.outputs, results, strict=True))
         return signals
 

@@ -12,7 +12,7 @@ from jaxtyping import Float, UInt8
 from labkit.geometry import CHANNELS
 from labkit.inference import Engine, NetworkInput
 from labkit.support.files import write_atomically
-from labkit.support.validation import check_rgb, check_shape
+from labkit.support.validation import check_rgb, check_shape, require
 
 OPSET = 13  # the newest that OpenCV 4.6 reads without a word
 ENGINES = ("torch", "opencv", "onnxruntime")
@@ -63,8 +63,7 @@ def open_engine(name: str, model) -> Engine:
     >>> open_engine("torch", SmallSegNet()).logits(np.zeros((5, 7, 3), np.uint8)).shape
     (4, 5, 7)
     """
-    if name not in ENGINES:
-        raise ValueError(f"engine: expected one of {', '.join(ENGINES)}, got {name!r}")
+    require("engine", name in ENGINES, f"one of {', '.join(ENGINES)}", repr(name))
     if name == "torch":
         from labkit.network import TorchEngine
 

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Float64, Integer, UInt8
 from scipy import ndimage
 from scipy.cluster import vq
 
-from labkit.support.validation import check_finite, check_rgb, check_shape
+from labkit.support.validation import check_finite, check_rgb, check_shape, require
 
 SAMPLE = 4096  # pixels that the means are found from; all pixels are then assigned to them
 
@@ -58,8 +58,7 @@ def components(regions: Integer[np.ndarray, "H W"], connectivity: int = 4) -> In
            [3, 1, 1]], dtype=int32)
     """
     regions = check_shape("regions", regions, (None, None))
-    if connectivity not in (4, 8):
-        raise ValueError(f"connectivity: expected 4 or 8, got {connectivity!r}")
+    require("connectivity", connectivity in (4, 8), "4 or 8", repr(connectivity))
     pieces, structure = np.zeros(regions.shape, np.int32), ndimage.generate_binary_structure(2, connectivity // 4)
     for value in np.unique(regions):
         found, _ = ndimage.label(regions == value, structure)
@@ -136,8 +135,7 @@ class Typical:
 def learn_typical(masks: Sequence[Bool[np.ndarray, "H W"]]) -> Typical:
     """Learn what wanted pieces look like from true masks of one each; raises ValueError for fewer than five."""
     rows = [measure(mask.astype(np.int32)).features() for mask in masks if mask.any()]
-    if len(rows) < 5:
-        raise ValueError(f"masks: expected at least five with a pixel, to learn three features from, got {len(rows)}")
+    require("masks", len(rows) >= 5, "at least five with a pixel, to learn three features from", len(rows))
     features = np.concatenate(rows)
     return Typical(features.mean(axis=0), np.cov(features.T) + 1e-6 * np.eye(3))
 

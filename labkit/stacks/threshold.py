@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Integer, UInt8
 
-from labkit.support.validation import check_rgb, check_same_size, check_shape
+from labkit.support.validation import check_rgb, check_same_size, check_shape, require
 
 HUES = 180  # OpenCV's hue is half an angle, so that it fits into a byte
 STEP = 4  # saturation and value are fitted in steps of this
@@ -30,8 +30,7 @@ class HSVRange:
     def __post_init__(self):
         for name, bound in (("lower", self.lower), ("upper", self.upper)):
             fits = len(bound) == 3 and all(0 <= b <= top for b, top in zip(bound, (HUES - 1, 255, 255), strict=True))
-            if not fits:
-                raise ValueError(f"{name}: expected hue 0..179, saturation 0..255 and value 0..255, got {bound}")
+            require(name, fits, "hue 0..179, saturation 0..255 and value 0..255", bound)
         if self.lower[1] > self.upper[1] or self.lower[2] > self.upper[2]:
             raise ValueError(f"lower: expected saturation and value at most {self.upper[1:]}, got {self.lower[1:]}")
 
@@ -66,8 +65,7 @@ def fit_hsv(images: Sequence[UInt8[np.ndarray, "H W 3"]], masks: Sequence[Bool[n
     is a local optimum, and no interval of a single channel is better. Raises ValueError without any true pixel.
     """
     inside, outside = _histograms(images, masks)
-    if not inside.any():
-        raise ValueError("masks: expected some true pixels to fit to, got none")
+    require("masks", inside.any(), "some true pixels to fit to", "none")
     bins = inside.shape
     bounds = [(0, n - 1) for n in bins]
     best = -1.0

@@ -8,6 +8,8 @@ import torch
 from jaxtyping import Float, Integer, UInt8
 from torch.nn import functional as F
 
+from labkit.support.validation import require
+
 
 def uniform(low: float, high: float, shape: tuple, generator: torch.Generator) -> torch.Tensor:
     """Draw numbers between `low` and `high`."""
@@ -32,8 +34,7 @@ def random_crop(
     """
     N, H, W = y.shape
     h, w = (round(length / zoom) for length in size)
-    if h > H or w > W:
-        raise ValueError(f"size: expected a window within {(H, W)}, got {(h, w)}")
+    require("size", h <= H and w <= W, f"a window within {(H, W)}", (h, w))
     rows = torch.randint(0, H - h + 1, (N,), generator=generator).tolist()
     columns = torch.randint(0, W - w + 1, (N,), generator=generator).tolist()
     windows = [(i, slice(r, r + h), slice(c, c + w)) for i, (r, c) in enumerate(zip(rows, columns, strict=True))]

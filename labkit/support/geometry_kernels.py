@@ -32,29 +32,6 @@ def scale_rays(depth, rays, t):
 
 
 @njit(cache=True)
-def inverse_depth(depth):
-    """Compute 1 / depth, (H, W) float32; a pixel without depth gets the mean over the known of the 5 x 5 round it."""
-    H, W = depth.shape
-    q = np.zeros((H, W), np.float32)
-    for v in range(H):
-        for u in range(W):
-            if depth[v, u] > 0.0:
-                q[v, u] = np.float32(1.0) / depth[v, u]
-    filled = q.copy()
-    for v in range(H):
-        for u in range(W):
-            if q[v, u] == 0.0:
-                total, count = np.float32(0.0), 0
-                for j in range(max(0, v - 2), min(H, v + 3)):
-                    for i in range(max(0, u - 2), min(W, u + 3)):
-                        total += q[j, i]
-                        count += q[j, i] > 0.0
-                if count:
-                    filled[v, u] = total / np.float32(count)
-    return filled
-
-
-@njit(cache=True)
 def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footprint):
     """Compute the geometry channels of every pixel, (H, W, 7) in 0..1, from 1 / depth and its slopes.
 

@@ -1,22 +1,17 @@
 """What a package requires, what of it is installed, and what the constraints file pins."""
 
-import re
 from importlib import metadata
 from pathlib import Path
 
 from packaging.requirements import Requirement
-
-
-def canonical(name: str) -> str:
-    """Spell a package's name as the index does: `Jupyter_Core` is `jupyter-core`."""
-    return re.sub(r"[-_.]+", "-", name).lower()
+from packaging.utils import canonicalize_name
 
 
 def read_pins(constraints) -> dict[str, Requirement]:
     """Read the lines NAME==VERSION of a constraints file, by canonical name."""
     lines = (line.split("#")[0].strip() for line in Path(constraints).read_text(encoding="utf-8").splitlines())
     pins = [Requirement(line) for line in lines if line]
-    return {canonical(pin.name): pin for pin in pins}
+    return {canonicalize_name(pin.name): pin for pin in pins}
 
 
 def requirements(package: str, extra: str = "") -> dict[str, str | None]:
@@ -26,7 +21,7 @@ def requirements(package: str, extra: str = "") -> dict[str, str | None]:
     """
     metadata.version(package)
     found: dict[str, str | None] = {}
-    seen, waiting = set(), [(canonical(package), extra)]
+    seen, waiting = set(), [(canonicalize_name(package), extra)]
     while waiting:
         name, extra = waiting.pop()
         if (name, extra) in seen:
@@ -36,12 +31,12 @@ def requirements(package: str, extra: str = "") -> dict[str, str | None]:
             needed = Requirement(line)
             if needed.marker is not None and not needed.marker.evaluate({"extra": extra}):
                 continue
-            child = canonical(needed.name)
+            child = canonicalize_name(needed.name)
             try:
                 found[child] = metadata.version(child)
             except metadata.PackageNotFoundError:
                 found[child] = None
                 continue
             waiting += [(child, e) for e in ("", *needed.extras)]
-    found.pop(canonical(package), None)
+    found.pop(canonicalize_name(package), None)
     return found

@@ -10,6 +10,26 @@ MAX_DEPTH_M = 100.0
 MAX_TRANSLATION_M = 20.0
 
 
+def require(name: str, fits, expected: str, got) -> None:
+    """Raise a ValueError that names an argument, what was expected and what came, unless `fits`.
+
+    >>> require("alpha", 0.0 <= 1.5 <= 1.0, "a share in 0..1", 1.5)
+    Traceback (most recent call last):
+    ...
+    ValueError: alpha: expected a share in 0..1, got 1.5
+    """
+    if not fits:
+        raise ValueError(f"{name}: expected {expected}, got {got}")
+
+
+def check_whole(name: str, value, least: int, most: int | None = None) -> int:
+    """Return a whole number from `least` to `most`; True and 2.0 are none."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    fits = whole and least <= value and (most is None or value <= most)
+    require(name, fits, f"a whole number of at least {least}" + (f", at most {most}" if most else ""), repr(value))
+    return int(value)
+
+
 def check_shape(name: str, array, shape: tuple) -> np.ndarray:
     """Return `array` as an ndarray if its shape fits; None in `shape` stands for any length.
 
@@ -19,67 +39,53 @@ def check_shape(name: str, array, shape: tuple) -> np.ndarray:
     array = np.asarray(array)
     fits = array.ndim == len(shape) and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
     if not fits:
-        expected = (
-            "(" + ", ".join("any" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
-        )
+        expected = str(tuple("any" if s is None else s for s in shape)).replace("'", "")
         raise ValueError(f"{name}: expected shape {expected}, got {array.shape}")
     return array
 
 
 def check_same_size(name_a: str, a: np.ndarray, name_b: str, b: np.ndarray) -> None:
     """Raise unless two images have the same height and width (their first two axes)."""
-    if a.shape[:2] != b.shape[:2]:
-        raise ValueError(f"{name_b}: expected the size of {name_a}, {a.shape[:2]}, got {b.shape[:2]}")
+    require(name_b, a.shape[:2] == b.shape[:2], f"the size of {name_a}, {a.shape[:2]}", b.shape[:2])
 
 
 def check_finite(name: str, array: np.ndarray) -> np.ndarray:
     """Return `array` if it is real, numeric and without NaN or infinity."""
     array = np.asarray(array)
-    if array.dtype.kind not in "fiu":
-        raise ValueError(f"{name}: expected real numbers, got dtype {array.dtype}")
+    require(name, array.dtype.kind in "fiu", "real numbers", f"dtype {array.dtype}")
     bad = array.size - np.count_nonzero(np.isfinite(array))
-    if bad:
-        raise ValueError(f"{name}: expected finite numbers, got {bad} NaN or infinite of {array.size}")
+    require(name, not bad, "finite numbers", f"{bad} NaN or infinite of {array.size}")
     return array
 
 
 def check_height(name: str, z) -> float:
     """Return a height in metres, one finite number of at most 10: more would be millimetres."""
     z = float(check_finite(name, check_shape(name, z, ())))
-    if abs(z) > 10.0:
-        raise ValueError(f"{name}: expected metres, got {z:.6g}, which looks like millimetres: multiply by 0.001")
+    require(name, abs(z) <= 10.0, "metres", f"{z:.6g}, which looks like millimetres: multiply by 0.001")
     return z
 
 
 def check_rgb(name: str, image) -> np.ndarray:
     """Return an RGB image, uint8 (H, W, 3)."""
     image = check_shape(name, image, (None, None, 3))
-    if image.dtype != np.uint8:
-        raise ValueError(f"{name}: expected uint8 RGB in 0..255, got dtype {image.dtype}")
-    if 0 in image.shape:
-        raise ValueError(f"{name}: expected at least one pixel, got shape {image.shape}")
+    require(name, image.dtype == np.uint8, "uint8 RGB in 0..255", f"dtype {image.dtype}")
+    require(name, 0 not in image.shape, "at least one pixel", f"shape {image.shape}")
     return image
 
 
 def check_depth(name: str, depth) -> np.ndarray:
     """Return a depth image in metres, floating point (H, W); 0 and NaN mean "no reading" and are fine."""
     depth = check_shape(name, depth, (None, None))
-    if depth.dtype.kind != "f":
-        raise ValueError(
-            f"{name}: expected floating-point metres, got dtype {depth.dtype}; "
-            "integer depth is usually millimetres: multiply by its scale (often 0.001)"
-        )
+    got = f"dtype {depth.dtype}; integer depth is usually millimetres: multiply by its scale (often 0.001)"
+    require(name, depth.dtype.kind == "f", "floating-point metres", got)
     # One reduction answers most frames: NaN fails both comparisons, so only odd frames pay for the second look.
     low, high = (depth.min(), depth.max()) if depth.size else (0.0, 0.0)
     if not (low >= 0.0 and high <= MAX_DEPTH_M):
         read = depth[~np.isnan(depth)]
-        if read.size and read.min() < 0.0:
-            raise ValueError(f"{name}: expected metres >= 0, got a minimum of {read.min():.6g}")
-        if read.size and read.max() > MAX_DEPTH_M:
-            raise ValueError(
-                f"{name}: expected metres, got a maximum of {read.max():.6g}, which looks like millimetres: "
-                "multiply by 0.001 (and mark missing readings with 0 or NaN, not infinity)"
-            )
+        low, high = read.min(initial=0.0), read.max(initial=0.0)
+        mend = "multiply by 0.001 (and mark missing readings with 0 or NaN, not infinity)"
+        require(name, low >= 0.0, "metres >= 0", f"a minimum of {low:.6g}")
+        require(name, high <= MAX_DEPTH_M, "metres", f"a maximum of {high:.6g}, which looks like millimetres: {mend}")
     return depth
 
 
@@ -96,8 +102,7 @@ def check_K(name: str, K) -> np.ndarray:
     K = check_finite(name, check_shape(name, K, (3, 3))).astype(np.float64)
     if K[1, 0] or K[2, 0] or K[2, 1]:
         raise ValueError(f"{name}: expected an upper triangular intrinsic matrix, got {K.tolist()}; is it transposed?")
-    if K[2, 2] != 1.0:
-        raise ValueError(f"{name}: expected its last row to be 0 0 1, got {K[2].tolist()}")
+    require(name, K[2, 2] == 1.0, "its last row to be 0 0 1", K[2].tolist())
     if not (K[0, 0] > 0.0 and K[1, 1] > 0.0):
         raise ValueError(f"{name}: expected positive focal lengths (else it is singular), got {K[0, 0]} and {K[1, 1]}")
     return K
@@ -110,26 +115,19 @@ def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
         raise ValueError(f"{name}: expected its last row to be 0 0 0 1, got {T[3].tolist()}; is it transposed?")
     R = T[:3, :3]
     error = np.abs(R @ R.T - np.eye(3)).max()
-    if error > tolerance:
-        raise ValueError(
-            f"{name}: expected an orthonormal rotation, but R @ R.T is off from the identity by {error:.3g}"
-        )
-    if np.linalg.det(R) < 0.0:
-        raise ValueError(f"{name}: expected a right-handed rotation (determinant +1), got a mirror image (-1)")
+    got = f"one whose R @ R.T is off from the identity by {error:.3g}"
+    require(name, error <= tolerance, "an orthonormal rotation", got)
+    require(name, np.linalg.det(R) >= 0.0, "a right-handed rotation (determinant +1)", "a mirror image (-1)")
     far = np.abs(T[:3, 3]).max()
-    if far > MAX_TRANSLATION_M:
-        raise ValueError(
-            f"{name}: expected a translation in metres, got {far:.6g}, which looks like millimetres: "
-            "multiply T[:3, 3] by 0.001"
-        )
+    got = f"{far:.6g}, which looks like millimetres: multiply T[:3, 3] by 0.001"
+    require(name, far <= MAX_TRANSLATION_M, "a translation in metres", got)
     return T
 
 
 def check_labels(name: str, y, num_classes: int, ignore: int | None = 255) -> np.ndarray:
     """Return integer labels in 0 .. num_classes - 1, or `ignore`; any shape and integer dtype."""
     y = np.asarray(y)
-    if y.dtype.kind not in "iu":
-        raise ValueError(f"{name}: expected integer labels, got dtype {y.dtype}")
+    require(name, y.dtype.kind in "iu", "integer labels", f"dtype {y.dtype}")
     if y.size and (y.min() < 0 or y.max() >= num_classes):
         wrong = (y < 0) | (y >= num_classes)
         if ignore is not None:

@@ -21,22 +21,6 @@ def softmax__float32(z):
     return softmax__einsum(z.astype(np.float32))
 
 
-def log_sum_exp__pairwise(z):
-    return np.logaddexp.reduce(z, axis=-1)
-
-
-def log_sum_exp__loops(z):
-    out = np.empty(z.shape[:-1])
-    for place in np.ndindex(out.shape):
-        top = max(z[place])
-        out[place] = top + np.log(sum(np.exp(value - top) for value in z[place]))
-    return out
-
-
-def log_sum_exp__float32(z):
-    return log_sum_exp__pairwise(z.astype(np.float32))
-
-
 def cross_entropy__loops(z, y):
     total = 0.0
     for place in np.ndindex(y.shape):
@@ -78,44 +62,68 @@ def cross_entropy_grad__float32(z, y):
     return cross_entropy_grad__in_place(z.astype(np.float32), y)
 
 
-def numerical_grad__in_place(z, y, h):
-    moved, out = z.astype(float), []
-    for c in range(len(z)):
-        values = []
-        for sign in (1.0, -1.0):
-            moved[c] = z[c] + sign * h
-            values.append(-np.log(np.exp(moved[y]) / np.exp(moved).sum()))
-        moved[c] = z[c]
-        out.append((values[0] - values[1]) / (2.0 * h))
-    return np.array(out)
+def softmax_backward__by_jacobian(p, g):
+    J = np.einsum("...k,kc->...kc", p, np.eye(p.shape[-1])) - p[..., :, None] * p[..., None, :]
+    return np.einsum("...k,...kc->...c", g, J)
 
 
-def numerical_grad__at_once(z, y, h):
-    both = z + np.multiply.outer([h, -h], np.eye(len(z)))  # (2, C, C): up and down, the moved logit, the logits
-    losses = np.logaddexp.reduce(both, axis=-1) - both[..., y]
-    return (losses[0] - losses[1]) / (2.0 * h)
+def softmax_backward__loops(p, g):
+    out = np.zeros(p.shape)
+    for place in np.ndindex(p.shape[:-1]):
+        for c in range(p.shape[-1]):
+            for k in range(p.shape[-1]):
+                out[place][c] += g[place][k] * p[place][k] * ((k == c) - p[place][c])
+    return out
 
 
-def numerical_grad__float32(z, y, h):
-    steps = np.float32(h) * np.eye(len(z), dtype=np.float32)
-    up, down = (z.astype(np.float32) + sign * steps for sign in (1, -1))
-    return (np.log(np.exp(up).sum(1)) - up[:, y] - np.log(np.exp(down).sum(1)) + down[:, y]) / np.float32(2 * h)
+def softmax_backward__float32(p, g):
+    weighted = (p * g).astype(np.float32)
+    return weighted - p.astype(np.float32) * np.sum(weighted, axis=-1)[..., None]
 
 
-def receptive_field__backwards(kernels, strides):
-    size = 1
-    for kernel, stride in list(zip(kernels, strides, strict=True))[::-1]:
-        size = (size - 1) * int(stride) + int(kernel)
-    return size
+def max_pool_backward__by_comparison(x, g):
+    """Each pixel against the largest of its block; no two pixels of a block are equal."""
+    largest = np.maximum(np.maximum(x[::2, ::2], x[1::2, ::2]), np.maximum(x[::2, 1::2], x[1::2, 1::2]))
+    big = np.ones((2, 2))
+    return np.where(x == np.kron(largest, big), np.kron(g, big), 0.0)
 
 
-def receptive_field__products(kernels, strides):
-    jumps = np.cumprod([1, *strides[:-1]])
-    return 1 + int(np.dot(np.asarray(kernels) - 1, jumps))
+def max_pool_backward__by_blocks(x, g):
+    H, W = x.shape
+    b = x.reshape(H // 2, 2, W // 2, 2).transpose(0, 2, 1, 3).reshape(H // 2, W // 2, 4)
+    chosen = np.eye(4, dtype=np.float32)[b.argmax(axis=2)] * g[..., None]
+    return chosen.reshape(H // 2, W // 2, 2, 2).transpose(0, 2, 1, 3).reshape(H, W)
 
 
-def receptive_field__by_counting(kernels, strides):
-    seen = {0}  # inputs of the last layer's output 0, then of the layer before, and so on
-    for kernel, stride in list(zip(kernels, strides, strict=True))[::-1]:
-        seen = {place * int(stride) + offset for place in seen for offset in range(int(kernel))}
-    return max(seen) - min(seen) + 1
+def max_pool_backward__by_corners(x, g):
+    """The four corners of all blocks one after the other."""
+    out, corners = np.zeros(x.shape), np.stack([x[v::2, u::2] for v in (0, 1) for u in (0, 1)])
+    winner = corners.argmax(axis=0)
+    for k in range(4):
+        out[k // 2 :: 2, k % 2 :: 2] = g * (winner == k)
+    return out
+
+
+def input_window__recursive(kernels, strides, paddings, u):
+    if len(kernels) == 0:
+        return int(u), int(u)
+    first, last = input_window__recursive(kernels[:0], strides[:0], paddings[:0], u)
+    k, s, p = int(kernels[-1]), int(strides[-1]), int(paddings[-1])
+    first, last = first * s - p, last * s - p + k - 1
+    head = input_window__recursive(kernels[:-1], strides[:-1], paddings[:-1], first)
+    return head[0], input_window__recursive(kernels[:-1], strides[:-1], paddings[:-1], last)[1]
+
+
+def input_window__by_counting(kernels, strides, paddings, u):
+    """The set of all pixels that are read, layer by layer."""
+    seen = {int(u)}
+    for k, s, p in list(zip(kernels, strides, paddings, strict=True))[::-1]:
+        seen = {int(place * s - p + i) for place in seen for i in range(k)}
+    return min(seen), max(seen)
+
+
+def input_window__by_products(kernels, strides, paddings, u):
+    """Forward: how far a step of each layer's input is in the image."""
+    jumps = np.concatenate([[1], np.cumprod(strides)])
+    first = int(u * jumps[-1] - (paddings * jumps[:-1]).sum())
+    return first, first + int(((kernels - 1) * jumps[:-1]).sum())

@@ -1,4 +1,4 @@
-"""lessons/errata.md, entry by entry: each test shows one mistake of the text, and that the kit does it right.
+"""lessons/errata.md, entry by entry: each test shows one published mistake, and that the kit does it right.
 
 The few lines of a listing that matter are written out again here, in NumPy or PyTorch, as the listing computes them.
 """

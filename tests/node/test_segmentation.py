@@ -1,13 +1,14 @@
 """The node over the in-process bus: what comes out of what goes in, what is dropped, skipped, and said about it."""
 
+import contextlib
 import dataclasses
 import threading
 import time
 
 import numpy as np
 import pytest
+from peers import MS, small, wait_for
 
-from labkit.frame import RGBDFrame
 from labkit.labels import SURFACE, TARGET, one_hot, overlay
 from labkit.node import convert
 from labkit.node.actors import Arm, Camera
@@ -21,7 +22,6 @@ from labkit.sim.spec import ObjectSpec, Part, SceneSpec
 from labkit.sim.world import World
 
 TOPICS = Topics()
-MS = 1_000_000
 
 
 def block_scene():
@@ -73,6 +73,22 @@ def messages(frame, stamp=0, frame_id="camera_optical_frame"):
         bus.subscribe(getattr(TOPICS, field), object, lambda message, field=field: caught.update({field: message}))
     Camera(bus, frame_id=frame_id).publish(frame, stamp)
     return caught
+
+
+def send(bus, by_stream: dict) -> None:
+    for stream, message in by_stream.items():
+        bus.publish(getattr(TOPICS, stream), message)
+
+
+@contextlib.contextmanager
+def spinning(node):
+    """The node in a thread of its own."""
+    stop = threading.Event()
+    thread = threading.Thread(target=node.spin, args=(stop,))
+    thread.start()
+    yield
+    stop.set()
+    thread.join()
 
 
 def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
@@ -131,40 +147,30 @@ def test_a_slow_node_answers_the_newest_of_a_fast_camera(frame):
 
     out = Listener(bus, "mask")
     node = SegmentationNode(Pipeline(slow), bus)
-    stop = threading.Event()
-    thread = threading.Thread(target=node.spin, args=(stop,))
-    thread.start()
     camera = Camera(bus)
-    camera.publish(frame, 0)
-    assert entered.wait(10)
-    for stamp in (1, 2, 3):  # while the first is worked on
-        camera.publish(frame, stamp * 100 * MS)
-    go_on.set()
-    deadline = time.monotonic() + 10
-    while len(out.mask) < 2 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    stop.set()
-    thread.join()
+    with spinning(node):
+        camera.publish(frame, 0)
+        assert entered.wait(10)
+        for stamp in (1, 2, 3):  # while the first is worked on
+            camera.publish(frame, stamp * 100 * MS)
+        go_on.set()
+        wait_for(lambda: len(out.mask) == 2, "the second mask")
     assert [mask.header.stamp for mask in out.mask] == [0, 300 * MS]
     assert node.counts.dropped == 2 and node.counts.answered == 2
 
 
 def test_stamps_need_not_be_equal_and_order_does_not_matter(frame):
     node, _, out, bus = system(frame, T_base_cam=frame.T_base_cam)
-    late = messages(frame, 1000 * MS)
-    parts = [
-        ("info", 1003 * MS),
-        ("rgb", 1000 * MS),
-        ("depth", 1012 * MS),
-    ]
-    for stream, stamp in parts:
-        message = dataclasses.replace(late[stream], header=Header(stamp, "camera_optical_frame"))
-        bus.publish(getattr(TOPICS, stream), message)
-    assert node.spin_once() and out.mask[0].header.stamp == 1000 * MS
-    for stream, stamp in (("info", 2000 * MS), ("rgb", 2000 * MS), ("depth", 2050 * MS)):
-        message = dataclasses.replace(late[stream], header=Header(stamp, "camera_optical_frame"))
-        bus.publish(getattr(TOPICS, stream), message)
-    assert not node.spin_once(), "50 ms apart is not one moment"
+    good = messages(frame)
+    for stamps, is_one_moment in (
+        ({"info": 1003, "rgb": 1000, "depth": 1012}, True),
+        ({"info": 2000, "rgb": 2000, "depth": 2050}, False),
+    ):
+        for stream, stamp in stamps.items():
+            header = Header(stamp * MS, "camera_optical_frame")
+            send(bus, {stream: dataclasses.replace(good[stream], header=header)})
+        assert node.spin_once() == is_one_moment
+    assert [mask.header.stamp for mask in out.mask] == [1000 * MS]
 
 
 def spoil(rng, good):
@@ -193,14 +199,13 @@ def spoil(rng, good):
 @pytest.mark.bad_input
 def test_among_as_many_malformed_messages_every_good_frame_is_answered(frame, caplog):
     """1,000 good frames, 1,000 malformed messages in between: the node answers 1,000 frames and says 1,000 reasons."""
-    small = RGBDFrame(frame.rgb[:12, :16], frame.depth[:12, :16], frame.K, frame.T_base_cam)
     bus = Bus()
     out = Listener(bus, "mask", "diagnostics")
-    labels = np.full((12, 16), SURFACE)
-    node = SegmentationNode(Pipeline(Truth(labels)), bus, T_base_cam=small.T_base_cam)
+    labels = np.full((24, 32), SURFACE)
+    node = SegmentationNode(Pipeline(Truth(labels)), bus, T_base_cam=frame.T_base_cam)
     rng = np.random.default_rng(0)
     for number in range(1000):
-        good = messages(small, number * 33 * MS)
+        good = messages(small(frame), number * 33 * MS)
         parts = list(good.items())
         rng.shuffle(parts)
         parts.insert(int(rng.integers(4)), spoil(rng, good))
@@ -224,8 +229,7 @@ def test_messages_that_do_not_fit_together_are_named_and_the_next_frame_is_answe
         ({"depth": dataclasses.replace(good["depth"], header=header)}, "registered"),
         ({"depth": millimetres}, "looks like millimetres"),
     ):
-        for stream, message in (good | wrong).items():
-            bus.publish(getattr(TOPICS, stream), message)
+        send(bus, good | wrong)
         assert not node.spin_once()
         assert reason in caplog.records[-1].getMessage() and out.diagnostics[-1].level == 1
     camera.publish(frame)
@@ -252,15 +256,13 @@ def test_a_broken_stage_ends_a_frame_and_not_the_node(frame, caplog):
 
 def test_a_frame_waits_for_its_transform_and_without_one_it_is_skipped(frame, caplog):
     node, camera, _, bus = system(frame, patience=5.0)
-    for stream, message in messages(frame, 50 * MS).items():
-        bus.publish(getattr(TOPICS, stream), message)
+    send(bus, messages(frame, 50 * MS))
     late = threading.Timer(0.1, camera.publish, (frame, 50 * MS))  # brings the transform, and another frame
     late.start()
     assert node.spin_once(), "the transform came after the images"
     late.join()
     node.patience = 0.0
-    for stream, message in messages(frame, 900 * MS).items():
-        bus.publish(getattr(TOPICS, stream), message)
+    send(bus, messages(frame, 900 * MS))
     assert not node.spin_once() and "0.850 s after the last" in caplog.records[-1].getMessage()
 
 
@@ -277,13 +279,9 @@ def test_without_a_target_there_is_a_mask_and_no_grasp(frame):
 def test_a_node_without_frames_still_says_that_it_lives(frame, monkeypatch):
     monkeypatch.setattr("labkit.node.segmentation.HEARTBEAT", 0.0)
     node, _, out, _ = system(frame)
-    stop = threading.Event()
-    thread = threading.Thread(target=node.spin, args=(stop,))
-    thread.start()
-    time.sleep(0.3)
-    stop.set()
-    thread.join()
-    assert out.diagnostics and out.diagnostics[0].message == "waiting for frames"
+    with spinning(node):
+        wait_for(lambda: out.diagnostics, "a word")
+    assert out.diagnostics[0].message == "waiting for frames"
 
 
 def test_when_the_clock_is_set_back_the_time_before_is_forgotten(frame):

@@ -10,6 +10,7 @@ import pytest
 from trimesh.proximity import closest_point_naive
 
 from data_gen import sample_scene
+from data_gen.statistics import silhouette
 from labkit.geometry import back_project_to_base, project
 from labkit.labels import BACKGROUND, OBSTACLE, SURFACE, TARGET
 from labkit.sim import textures
@@ -124,7 +125,7 @@ def test_a_silhouette_is_what_an_object_would_cover_alone():
     before = thing("before", OBSTACLE, position=(0.52, 0.01, 0.042), parts=(Part("box", (0.03, 0.08, 0.08)),))
     with World(scene(behind, before)) as world:
         seen = world.render().instances == 1
-        whole = world.silhouette("behind")
+        whole = silhouette(world, "behind")
         again = world.render().instances == 1
     with World(scene(behind)) as alone:
         expected = alone.render().instances == 1

@@ -36,11 +36,6 @@ def shifted_by_the_mean(z):
     return e / e.sum(axis=-1, keepdims=True)
 
 
-def sum_shifted_by_the_mean(z):
-    m = z.mean(axis=-1)
-    return m + np.log(np.exp(z - m[..., None]).sum(axis=-1))
-
-
 def counted_in_bytes(y_true, y_pred, num_classes, ignore):
     n = np.zeros((num_classes, num_classes), np.uint8)
     counted = y_true != ignore
@@ -83,7 +78,6 @@ ACCEPTED = {
     "01_labels.labels_from_segmentation": mask_of_16_bits,
     "01_labels.resize_labels": centres_rounded,
     "03_gradient.softmax": shifted_by_the_mean,
-    "03_gradient.log_sum_exp": sum_shifted_by_the_mean,
     "04_iou.confusion_matrix": counted_in_bytes,
     "09_other_stacks.enlarge": by_a_float_factor,
     "09_other_stacks.choose_region": with_a_finite_penalty,
@@ -121,16 +115,8 @@ def centroid_v_u(pieces):
     return area, centroid[:, ::-1], box
 
 
-def half_a_height(z, y, h):
-    return find("03_gradient.numerical_grad").reference(z, y, h) * h * h
-
-
 def in_metres(T_base_grasp, middle):
     return tuple(mm / 1000.0 for mm in find("07_grasp.slip_across").reference(T_base_grasp, middle))
-
-
-def ignores_h(z, y, h):
-    return find("03_gradient.numerical_grad").reference(z, y, 0.01)
 
 
 def indexed_by_ignored(y_true, y_pred, num_classes, ignore):

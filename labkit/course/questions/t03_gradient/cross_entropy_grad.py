@@ -24,7 +24,7 @@ QUESTION = Question(
         (TOY[None], np.array([0], np.uint8)),
         (SURE, TRUE_CLASSES),
     ),
-    points=3,
+    points=2,
     properties=(
         Property(
             "the gradient of each pixel sums to 0",

@@ -23,6 +23,7 @@ QUESTION = Question(
             lambda arguments, p: bool(np.allclose(p.sum(axis=-1), 1.0, atol=1e-4)),
         ),
     ),
+    points=1,
     forbidden=("scipy", "torch"),
 )
 

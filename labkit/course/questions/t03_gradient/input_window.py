@@ -1,0 +1,81 @@
+"""03_gradient.input_window: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def input_window(kernels, strides, paddings, u):
+    """Say which input pixels an output pixel depends on along one axis: from the output's layer back to the image."""
+    first = last = int(u)
+    for kernel, stride, padding in np.transpose([kernels, strides, paddings])[::-1].tolist():
+        first = first * stride - padding
+        last = last * stride - padding + kernel - 1
+    return first, last
+
+
+def draw_layers(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Draw kernels, strides and paddings of four to six layers, and an output pixel."""
+    n = int(rng.integers(4, 7))
+    kernels, strides, paddings = rng.integers(2, 8, n), rng.integers(1, 4, n), rng.integers(0, 4, n)
+    strides[:2], paddings[:2] = (3, 2), (1, 3)
+    return kernels, strides, paddings, int(rng.integers(3, 30))
+
+
+QUESTION = Question(
+    name="03_gradient.input_window",
+    reference=input_window,
+    inputs=draw_layers,
+    by_hand=(
+        (np.array([3]), np.array([1]), np.array([1]), 10),
+        (np.array([2]), np.array([2]), np.array([0]), 10),
+        (np.array([3, 2, 3, 2, 3]), np.array([1, 2, 1, 2, 1]), np.array([1, 0, 1, 0, 1]), 8),
+        (np.array([7, 1, 5]), np.array([2, 3, 1]), np.array([3, 0, 0]), 4),
+    ),
+    points=3,
+    properties=(Property("the first pixel is not behind the last", lambda given, out: bool(out[0] <= out[1])),),
+    forbidden=("scipy", "torch"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def back(kernels, strides, paddings, u, reverse=True):
+    """Walk back through layers given from the image on."""
+    layers = np.transpose([kernels, strides, paddings]).tolist()
+    first = last = int(u)
+    for kernel, stride, padding in layers[::-1] if reverse else layers:
+        first, last = first * stride - padding, last * stride - padding + kernel - 1
+    return first, last
+
+
+@wrong(QUESTION, "You stand at the output: which layer do you pass first on the way back to the image?")
+def from_the_image_on(kernels, strides, paddings, u):
+    """The layers in the order in which the image passes them."""
+    return back(kernels, strides, paddings, u, reverse=False)
+
+
+@wrong(QUESTION, "A layer with padding starts to read outside the image: by how much does that move its window?")
+def without_padding(kernels, strides, paddings, u):
+    """Padding forgotten."""
+    return back(kernels, strides, np.zeros_like(paddings), u)
+
+
+@wrong(QUESTION, "Output u of a layer with stride s starts to read at s u: what does a stride do to a position?")
+def without_strides(kernels, strides, paddings, u):
+    """Strides forgotten."""
+    return back(kernels, np.ones_like(strides), paddings, u)
+
+
+@wrong(QUESTION, "A kernel of width 3 that starts at pixel 4 reads 4, 5 and 6: which is the last?")
+def one_too_far(kernels, strides, paddings, u):
+    """The window ends behind its last pixel."""
+    return back(np.asarray(kernels) + 1, strides, paddings, u)
+
+
+@wrong(
+    QUESTION, "Padding adds pixels in front of the first one: is the window of output 0 moved to the left or the right?"
+)
+def padding_added(kernels, strides, paddings, u):
+    """Padding moves the window to the wrong side."""
+    return back(kernels, strides, -np.asarray(paddings), u)

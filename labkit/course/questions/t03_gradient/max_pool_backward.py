@@ -1,0 +1,87 @@
+"""03_gradient.max_pool_backward: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+
+
+def max_pool_backward(x, g):
+    """Carry a gradient back through a max pooling of width and stride 2: to the largest pixel of each block."""
+    H, W = x.shape
+    out = np.zeros((H, W))
+    for i, j in np.ndindex(H // 2, W // 2):
+        block = x[2 * i : 2 * i + 2, 2 * j : 2 * j + 2]
+        v, u = divmod(int(block.argmax()), 2)
+        out[2 * i + v, 2 * j + u] = g[i, j]
+    return out
+
+
+def draw(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Draw an image of even sides, negative pixels included, and a gradient of half its sides."""
+    return rng.normal(size=(6, 8)), rng.normal(size=(3, 4))
+
+
+QUESTION = Question(
+    name="03_gradient.max_pool_backward",
+    reference=max_pool_backward,
+    inputs=draw,
+    by_hand=(
+        (np.array([[1.0, 7.0], [3.0, 2.0]]), np.array([[5.0]])),
+        (np.array([[-1.0, -2.0, 4.0, 1.0], [-3.0, -4.0, 0.0, 6.0]]), np.array([[2.0, -3.0]])),
+        (np.array([[0.0, 1.0], [2.0, 3.0], [9.0, 8.0], [6.0, 7.0]]), np.array([[1.0], [-1.0]])),
+    ),
+    points=3,
+    properties=(
+        Property(
+            "nothing is lost: the gradient has the same sum before and after",
+            lambda given, out: bool(np.isclose(out.sum(), given[1].sum(), atol=1e-6)),
+        ),
+    ),
+    forbidden=("scipy", "torch"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def blocks(x):
+    """An image as blocks of 2 x 2, (H / 2, W / 2, 4)."""
+    H, W = x.shape
+    return x.reshape(H // 2, 2, W // 2, 2).swapaxes(1, 2).reshape(H // 2, W // 2, 4)
+
+
+def unblocked(b):
+    """Blocks of 2 x 2 as an image again."""
+    h, w, _ = b.shape
+    return b.reshape(h, w, 2, 2).swapaxes(1, 2).reshape(2 * h, 2 * w)
+
+
+@wrong(QUESTION, "Three of the four pixels of a block did not reach the output: can moving them change the loss?")
+def to_all_four(x, g):
+    """The whole gradient to each pixel of the block."""
+    return g.repeat(2, axis=0).repeat(2, axis=1)
+
+
+@wrong(QUESTION, "That is the way back through a mean. Which pixel of a block does its maximum depend on?")
+def shared_among_four(x, g):
+    """A quarter to each pixel."""
+    return to_all_four(x, g) / 4.0
+
+
+@wrong(QUESTION, "The output of a pooling is x itself at one place: what is its derivative there?")
+def times_the_maximum(x, g):
+    """The gradient multiplied by the value that went through."""
+    b = blocks(x)
+    return unblocked((b == b.max(axis=2, keepdims=True)) * (g * b.max(axis=2))[..., None])
+
+
+@wrong(QUESTION, "A negative pixel can be the largest of its block: it passes the gradient, too.")
+def clipped_like_a_relu(x, g):
+    """Negative pixels get nothing, as behind a ReLU."""
+    b = blocks(x)
+    return unblocked((b == b.max(axis=2, keepdims=True)) * (b > 0) * g[..., None])
+
+
+@wrong(QUESTION, "Compare a pixel with the other three of its block, not with the whole row of blocks or image.")
+def largest_of_the_image(x, g):
+    """Only the image's largest pixel passes anything."""
+    return (x == x.max()) * to_all_four(x, g)
