@@ -5,30 +5,33 @@ import numpy as np
 from labkit.course.questions.t06_back_projection import columns
 from labkit.course.questions.t06_back_projection.back_project import holes, rays
 
-# ---------- intrinsics
+# ---------- cropped_intrinsics
 
 
-def intrinsics_product(fov_y, width, height):
-    f = 0.5 * height / np.tan(0.5 * fov_y)
-    centre = np.eye(3)
-    centre[:2, 2] = 0.5 * width, 0.5 * height - 1.0
-    return centre @ np.diag([f, f, 1.0])
+def cropped_by_hand(K, left, top, scale):
+    new = K.copy()
+    new[0] = scale * K[0]
+    new[1] = scale * K[1]
+    new[0, 2] = scale * (K[0, 2] - left + 0.5) - 0.5
+    new[1, 2] = scale * (K[1, 2] - top + 0.5) - 0.5
+    return new
 
 
-def intrinsics_float32(fov_y, width, height):
-    K = np.eye(3, dtype=np.float32)
-    K[0, 0] = K[1, 1] = np.float32(height) / (2 * np.sin(fov_y / 2) / np.cos(fov_y / 2))
-    K[0, 2], K[1, 2] = width / 2, (height - 2) / 2
-    return K
+def cropped_by_steps(K, left, top, scale):
+    def shift(right, down):
+        return np.array([[1.0, 0.0, right], [0.0, 1.0, down], [0.0, 0.0, 1.0]])
+
+    return shift(-0.5, -0.5) @ np.diag([scale, scale, 1.0]) @ shift(0.5 - left, 0.5 - top) @ K
 
 
-def intrinsics_torch(fov_y, width, height):
+def cropped_torch(K, left, top, scale):
     import torch
 
-    f = height / (2.0 * torch.tan(torch.tensor(fov_y / 2.0)))
-    return torch.diag(torch.stack([f, f, torch.tensor(1.0)])) + torch.tensor(
-        [[0.0, 0.0, width / 2.0], [0.0, 0.0, height / 2.0 - 1.0], [0.0, 0.0, 0.0]]
-    )
+    K = torch.from_numpy(K)
+    corner = torch.tensor([left - 0.5, top - 0.5], dtype=torch.float64)
+    new = torch.eye(3, dtype=torch.float64)
+    new[:2, :2], new[:2, 2] = scale * K[:2, :2], scale * (K[:2, 2] - corner) - 0.5
+    return new
 
 
 # ---------- back_project
@@ -65,67 +68,81 @@ def back_project_torch(depth, K):
     return torch.stack([z * (u - K[0, 2]) / K[0, 0], z * (v - K[1, 2]) / K[1, 1], z], dim=-1).numpy()
 
 
-# ---------- transform_points
+# ---------- undistort
 
 
-def transform_homogeneous(T, P):
-    P_h = np.concatenate([P, np.ones_like(P[..., :1])], axis=-1)
-    return (T @ P_h.reshape(-1, 4).T).T[:, :3].reshape(P.shape)
+def undistort_newton(pixels, K, k):
+    f, c = np.array([K[0, 0], K[1, 1]]), np.array([K[0, 2], K[1, 2]])
+    x = (pixels - c) / f
+    seen = np.hypot(*x.T)
+    r = seen.copy()
+    for _ in range(30):
+        r -= (r + k[0] * r**3 + k[1] * r**5 - seen) / (1 + 3 * k[0] * r**2 + 5 * k[1] * r**4)
+    return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
 
 
-def transform_einsum(T, P):
-    return np.einsum("ij,...j->...i", T[:3, :3], P) + T[:3, 3]
+def undistort_roots(pixels, K, k):
+    out = []
+    for pixel in pixels:
+        x = np.linalg.solve(K, [*pixel, 1.0])[:2]
+        seen = np.linalg.norm(x)
+        roots = np.roots([k[1], 0, k[0], 0, 1, -seen])
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        r = min(real[real >= 0], default=0.0)
+        out.append((K @ [*(x * (r / seen if seen else 1.0)), 1.0])[:2])
+    return np.array(out)
 
 
-def transform_loops(T, P):
-    out = np.empty_like(P)
-    for place in np.ndindex(P.shape[:-1]):
-        for i in range(3):
-            out[place][i] = sum(T[i, j] * P[place][j] for j in range(3)) + T[i, 3]
-    return out
+def undistort_halving(pixels, K, k):
+    f, c = np.diag(K)[:2], K[:2, 2]
+    x = (pixels - c) / f
+    low, high = np.zeros(len(x)), np.ones(len(x))
+    for _ in range(60):
+        middle = (low + high) / 2
+        s2 = (middle[:, None] * x * 1.3) ** 2 @ np.ones(2)
+        too_far = middle * 1.3 * (1 + k[0] * s2 + k[1] * s2**2) > 1
+        low, high = np.where(too_far, low, middle), np.where(too_far, middle, high)
+    return c + f * x * 1.3 * high[:, None]
 
 
-def transform_torch(T, P):
+# ---------- fit_plane
+
+
+def plane_by_eigenvectors(P, sigma):
+    w = sigma**-2.0
+    centre = np.average(P, axis=0, weights=w)
+    normal = np.linalg.eigh(np.cov(P.T, aweights=w, ddof=0))[1][:, 0]
+    normal *= 1 if normal[2] > 0 else -1
+    return normal, normal @ centre
+
+
+def plane_loops(P, sigma):
+    total = sum(1 / s**2 for s in sigma)
+    centre = sum(p / s**2 for p, s in zip(P, sigma, strict=True)) / total
+    scatter = np.zeros((3, 3))
+    for p, s in zip(P, sigma, strict=True):
+        scatter += np.outer(p - centre, p - centre) / s**2
+    values, vectors = np.linalg.eig(scatter)
+    normal = vectors[:, values.real.argmin()].real
+    return normal * np.sign(normal[2]), abs(normal[2]) / normal[2] * (normal @ centre)
+
+
+def plane_torch(P, sigma):
     import torch
 
-    T, P = torch.as_tensor(T), torch.as_tensor(P)
-    return (P @ T[:3, :3].mT + T[:3, 3]).float()
-
-
-# ---------- back_projection_jacobian
-
-
-def jacobian_closed_form(u, v, d, K):
-    return np.stack(columns(u, v, d, K), axis=1)
-
-
-def jacobian_differences(u, v, d, K):
-    def P(x):
-        return x[2] * np.linalg.solve(K, np.array([x[0], x[1], 1.0]))
-
-    x = np.array([u, v, d], np.float64)
-    steps = np.eye(3) * (0.5, 0.5, 1e-3)
-    return np.stack([(P(x + h) - P(x - h)) / (2.0 * h.sum()) for h in steps], axis=1)
-
-
-def jacobian_torch(u, v, d, K):
-    import torch
-
-    K_inv = torch.linalg.inv(torch.as_tensor(K, dtype=torch.float64))
-    x = torch.tensor([u, v, d], dtype=torch.float64)
-    return torch.autograd.functional.jacobian(lambda x: x[2] * K_inv @ torch.stack([x[0], x[1], x[0] * 0 + 1]), x)
-
-
-def jacobian_float32(u, v, d, K):
-    K_inv = np.linalg.inv(K.astype(np.float32))
-    return np.concatenate([d * K_inv[:, :2], K_inv @ np.array([[u], [v], [1.0]], np.float32)], axis=1)
+    P, w = torch.from_numpy(P), torch.from_numpy(sigma) ** -2
+    centre = (w[:, None] * P).sum(0) / w.sum()
+    Q = P - centre
+    normal = torch.linalg.eigh(Q.T @ (w[:, None] * Q)).eigenvectors[:, 0]
+    normal = normal if normal[2] > 0 else -normal
+    return normal.numpy(), torch.dot(normal, centre).item()
 
 
 # ---------- height_noise
 
 
 def height_noise_covariance(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    J = T_base_cam[:3, :3] @ jacobian_closed_form(u, v, d, K)
+    J = T_base_cam[:3, :3] @ np.stack(columns(u, v, d, K), axis=1)
     Sigma = J @ np.diag([sigma_pixel**2, sigma_pixel**2, sigma_depth**2]) @ J.T
     return float(np.sqrt(Sigma[2, 2]))
 
@@ -138,7 +155,7 @@ def height_noise_loops(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
 
 
 def height_noise_einsum(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    J = jacobian_closed_form(u, v, d, K)
+    J = np.stack(columns(u, v, d, K), axis=1)
     r, sigma = T_base_cam[2, :3], np.array([sigma_pixel, sigma_pixel, sigma_depth])
     return np.sqrt(np.einsum("i,ij,j,kj,k->", r, J, sigma**2, J, r))
 
@@ -153,9 +170,9 @@ def height_noise_torch(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
 
 
 ALTERNATIVES = {
-    "intrinsics": (intrinsics_product, intrinsics_float32, intrinsics_torch),
+    "cropped_intrinsics": (cropped_by_hand, cropped_by_steps, cropped_torch),
+    "undistort": (undistort_newton, undistort_roots, undistort_halving),
     "back_project": (back_project_closed_form, back_project_loops, back_project_einsum, back_project_torch),
-    "transform_points": (transform_homogeneous, transform_einsum, transform_loops, transform_torch),
-    "back_projection_jacobian": (jacobian_closed_form, jacobian_differences, jacobian_torch, jacobian_float32),
+    "fit_plane": (plane_by_eigenvectors, plane_loops, plane_torch),
     "height_noise": (height_noise_covariance, height_noise_loops, height_noise_einsum, height_noise_torch),
 }

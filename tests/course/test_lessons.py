@@ -23,7 +23,6 @@ LESSONS = sorted(ROOT.glob("lessons/*.ipynb"))
 SOLUTIONS = sorted(ROOT.glob("solutions/*/*.ipynb"))
 PENDING = {
     "01": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
-    "06": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
 }
 MOST_MINUTES, MOST_LAB_MINUTES, WORDS_PER_MINUTE, NEW = 50, 105, 200, 0.6
 

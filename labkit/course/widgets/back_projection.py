@@ -98,7 +98,8 @@ def name_that_bug(frame: RGBDFrame) -> Explorer:
     wide = {"layout": ipywidgets.Layout(width="420px"), "indent": False}
     boxes = {bug: ipywidgets.Checkbox(False, description=text, **wide) for bug, text in BUGS.items()}
     mystery = ipywidgets.IntSlider(0, min=0, max=len(MYSTERIES) - 1, description="mystery")
-    return Explorer(draw, boxes | {"mystery": mystery}, size=(8.0, 3.6))
+    stills = ({"swapped": True}, {"ray": True})
+    return Explorer(draw, boxes | {"mystery": mystery}, size=(8.0, 3.6), stills=stills)
 
 
 def noisy_points(
@@ -153,4 +154,4 @@ def depth_noise(K: Float[np.ndarray, "3 3"], height: int, width: int) -> Explore
         "sigma_pixel": ipywidgets.FloatSlider(0.5, min=0.0, max=4.0, step=0.25, description="noise (px)"),
         "sigma_depth": ipywidgets.FloatSlider(10.0, min=0.0, max=25.0, step=1.0, description="noise (mm)"),
     }
-    return Explorer(draw, controls, size=(8.0, 3.4))
+    return Explorer(draw, controls, size=(8.0, 3.4), stills=({"u": width // 2}, {"u": width - 20}))

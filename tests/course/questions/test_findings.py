@@ -93,9 +93,10 @@ def test_what_was_accepted_by_mistake_is_refused(name):
         assert not judge(find(name), ACCEPTED[name], seed).passed
 
 
-def centre_at_half(fov_y, width, height):
-    f = height / (2.0 * np.tan(fov_y / 2.0))
-    return np.array([[f, 0.0, width / 2.0], [0.0, f, height / 2.0], [0.0, 0.0, 1.0]])
+def rows_from_one(K, left, top, scale):
+    K = find("06_back_projection.cropped_intrinsics").reference(K, left, top, scale)
+    K[1, 2] += 1.0
+    return K
 
 
 def grad_of_the_other_sign(z, y):
@@ -126,7 +127,7 @@ def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
 
 
 NAMED = [
-    ("06_back_projection.intrinsics", centre_at_half, "entry at [1, 2]. There: Yours are too large by 1"),
+    ("06_back_projection.cropped_intrinsics", rows_from_one, "entry at [1, 2]. There: Yours are too large by 1"),
     ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "The sign is the other one"),
     ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),
     ("04_iou.confusion_matrix", bitten_off, "y_true and y_pred were without their last row"),

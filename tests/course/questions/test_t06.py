@@ -1,27 +1,68 @@
-"""The references of topic 06 are the kit's own geometry, and the simulator's K."""
+"""The references of topic 06 against the kit's geometry, OpenCV, resized pictures and a search for the best plane."""
 
+import cv2
 import numpy as np
+import pytest
+from scipy.optimize import minimize
 
 from labkit import geometry
 from labkit.course.questions.question import of_topic
-from labkit.sim import world
 
 QUESTIONS = of_topic("06_back_projection")
+SEEDS = pytest.mark.parametrize("seed", range(5))
 
 
-def height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+def drawn(name, seed):
+    """The reference of a question, and arguments."""
+    return QUESTIONS[name].reference, QUESTIONS[name].inputs(np.random.default_rng(seed))
+
+
+@SEEDS
+def test_points_are_the_kits(seed):
+    back_project, (depth, K) = drawn("back_project", seed)
+    np.testing.assert_allclose(back_project(depth, K), geometry.back_project(depth, K), rtol=1e-5)
+
+
+@SEEDS
+def test_the_lens_is_taken_back_as_opencv_does_it(seed):
+    undistort, (pixels, K, k) = drawn("undistort", seed)
+    stop = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
+    expected = cv2.undistortPoints(pixels[:, None], K, np.array([*k, 0.0, 0.0]), P=K, criteria=stop)[:, 0]
+    np.testing.assert_allclose(undistort(pixels, K, k), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.25, 0.5, 3.0])
+def test_a_crop_is_resized_as_opencv_does_it(scale):
+    """An image that holds each pixel's place says after cropping and resizing where each new pixel was."""
+    K = np.array([[50.0, 0.0, 31.0], [0.0, 60.0, 20.0], [0.0, 0.0, 1.0]])
+    v, u = np.mgrid[0:48, 0:64].astype(np.float64)
+    cropped = np.dstack([u, v])[8:, 12:]
+    how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+    before = cv2.resize(cropped, None, fx=scale, fy=scale, interpolation=how)
+    new = QUESTIONS["cropped_intrinsics"].reference(K, 12, 8, scale)
+    row, column = 5, 6
+    pixel = np.array([*before[row, column], 1.0])
+    np.testing.assert_allclose(np.linalg.solve(new, [column, row, 1.0]), np.linalg.solve(K, pixel), atol=1e-6)
+
+
+@SEEDS
+def test_no_plane_fits_better(seed):
+    fit_plane, (P, sigma) = drawn("fit_plane", seed)
+    n, d = fit_plane(P, sigma)
+
+    def misfit(x):
+        return np.sum(((P @ x[:3] - x[3]) / np.linalg.norm(x[:3]) / sigma) ** 2)
+
+    best = minimize(misfit, [*n + 0.05, d + 0.05], tol=1e-12).x
+    np.testing.assert_allclose([*n, d], best / np.linalg.norm(best[:3]), atol=1e-4)
+
+
+@SEEDS
+def test_the_height_noise_is_the_kits(seed):
+    height_noise, (u, v, d, K, T_base_cam, sigma_pixel, sigma_depth) = drawn("height_noise", seed)
     R = T_base_cam[:3, :3]
     Sigma = R @ geometry.back_projection_noise(u, v, d, K, sigma_pixel, sigma_depth) @ R.T
-    return np.sqrt(Sigma[2, 2])
-
-
-KIT = {
-    "intrinsics": world.intrinsics,
-    "back_project": geometry.back_project,
-    "transform_points": geometry.transform_points,
-    "back_projection_jacobian": geometry.back_projection_jacobian,
-    "height_noise": height_noise,
-}
+    assert height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth) == pytest.approx(np.sqrt(Sigma[2, 2]))
 
 
 def test_the_height_noise_by_hand():

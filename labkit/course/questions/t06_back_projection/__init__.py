@@ -1,4 +1,4 @@
-"""Questions of topic 06: K, points from pixels, rigid transforms, the Jacobian, and depth noise of a height."""
+"""Questions of topic 06: K of a crop, a lens taken back, points from pixels, a plane, and the noise of a height."""
 
 import numpy as np
 

@@ -34,7 +34,6 @@ QUESTION = Question(
             np.array([[4.0, 0.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]),
         ),
     ),
-    points=3,
     properties=(
         Property(
             "the third coordinate, z, is the depth itself, and NaN where there is no reading",

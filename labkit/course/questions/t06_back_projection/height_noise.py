@@ -3,8 +3,7 @@
 import numpy as np
 
 from labkit.course.questions.question import Question, wrong
-from labkit.course.questions.t06_back_projection import K_SMALL, pixel, pose, straight_ahead
-from labkit.course.questions.t06_back_projection.back_projection_jacobian import back_projection_jacobian
+from labkit.course.questions.t06_back_projection import K_SMALL, columns, pixel, pose, straight_ahead
 
 
 def height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
@@ -45,7 +44,7 @@ QUESTION = Question(
 
 def shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     """Give how far u, v and d each move the height, one standard deviation."""
-    J = back_projection_jacobian(u, v, d, K)
+    J = np.stack(columns(u, v, d, K), axis=1)
     return T_base_cam[2, :3] @ J * np.array([sigma_pixel, sigma_pixel, sigma_depth])
 
 
@@ -67,5 +66,5 @@ def ray_straight_ahead(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
 
 @wrong(QUESTION, "You have the whole error of the point; only its component along the base frame's z is asked for.")
 def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    J = back_projection_jacobian(u, v, d, K)
+    J = np.stack(columns(u, v, d, K), axis=1)
     return np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth))

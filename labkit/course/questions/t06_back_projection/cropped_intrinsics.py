@@ -1,0 +1,63 @@
+"""06_back_projection.cropped_intrinsics: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t06_back_projection import camera
+
+
+def cropped_intrinsics(K, left, top, scale):
+    """K of an image that was cropped, and then resized; the centre of the first pixel is at u = v = 0 in both."""
+    half = (scale - 1.0) / 2.0
+    crop_and_resize = np.array([[scale, 0.0, half - scale * left], [0.0, scale, half - scale * top], [0.0, 0.0, 1.0]])
+    return crop_and_resize @ K
+
+
+QUESTION = Question(
+    name="06_back_projection.cropped_intrinsics",
+    reference=cropped_intrinsics,
+    inputs=lambda rng: (
+        camera(rng, 120, 160),
+        int(rng.integers(5, 40)),
+        int(rng.integers(41, 60)),
+        float(rng.choice([0.25, 0.5, 2.0, 3.0])),
+    ),
+    by_hand=(
+        (np.array([[200.0, 0.0, 160.0], [0.0, 300.0, 119.0], [0.0, 0.0, 1.0]]), 40, 20, 1.0),  # cropped alone
+        (
+            np.array([[200.0, 0.0, 9.5], [0.0, 300.0, 7.5], [0.0, 0.0, 1.0]]),
+            0,
+            0,
+            0.5,
+        ),  # 20 x 16: 4.5, 3.5 is the middle
+        (np.array([[200.0, 0.0, 0.0], [0.0, 300.0, 0.0], [0.0, 0.0, 1.0]]), 0, 0, 2.0),  # the first pixel's centre
+    ),
+    rtol=1e-6,
+    properties=(
+        Property("the last row of K is 0, 0, 1", lambda arguments, K: np.array_equal(np.asarray(K)[2], [0, 0, 1])),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def with_centre(K, scale, cx, cy):
+    return np.array([[scale * K[0, 0], 0.0, cx], [0.0, scale * K[1, 1], cy], [0.0, 0.0, 1.0]])
+
+
+@wrong(
+    QUESTION, "Halve a row of two pixels: their centres are at 0 and 1, the new pixel covers both. Where is its centre?"
+)
+def centres_forgotten(K, left, top, scale):
+    return with_centre(K, scale, scale * (K[0, 2] - left), scale * (K[1, 2] - top))
+
+
+@wrong(QUESTION, "First cropped, then resized: left and top count pixels of the image before it was resized.")
+def resized_first(K, left, top, scale):
+    half = (scale - 1.0) / 2.0
+    return with_centre(K, scale, scale * K[0, 2] + half - left, scale * K[1, 2] + half - top)
+
+
+@wrong(QUESTION, "What was at column `left` is at column 0 of the crop: do columns grow or shrink?")
+def added(K, left, top, scale):
+    return cropped_intrinsics(K, -left, -top, scale)

@@ -1,0 +1,89 @@
+"""06_back_projection.undistort: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.t06_back_projection import K_SMALL, camera
+
+
+def undistort(pixels, K, k):
+    """Find where the pixels would be without the lens, whose distortion is (x, y) -> (1 + k1 r^2 + k2 r^4) (x, y)."""
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = (pixels - c) / f
+    ideal = seen
+    for _ in range(100):
+        r2 = (ideal**2).sum(axis=1, keepdims=True)
+        ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+    return c + f * ideal
+
+
+def distort(pixels, K, k):
+    """What the lens does to the pixels of a camera without distortion."""
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    x = (pixels - c) / f
+    r2 = (x**2).sum(axis=1, keepdims=True)
+    return c + f * x * (1.0 + k[0] * r2 + k[1] * r2**2)
+
+
+def _seen_pixels(rng):
+    """Draw a camera, a lens that bends in or out, and pixels that it sees up to 35 degrees off its axis."""
+    K, k = camera(rng, 120, 160), np.array([rng.choice([-0.25, 0.3]), rng.uniform(0.04, 0.1)])
+    angle, r = rng.uniform(0.0, 2.0 * np.pi, 9), rng.uniform(0.2, 0.7, 9)
+    ideal = K[:2, 2] + np.diagonal(K)[:2] * np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
+    return distort(ideal, K, k), K, k
+
+
+QUESTION = Question(
+    name="06_back_projection.undistort",
+    reference=undistort,
+    inputs=_seen_pixels,
+    by_hand=(
+        (np.array([[2.1, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.0])),  # 0.5 (1 + 0.4 * 0.25) = 0.55
+        (np.array([[1.0, 2.02]]), K_SMALL, np.array([0.0, 0.16])),  # 0.5 (1 + 0.16 * 0.0625) = 0.505
+        (np.array([[3.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
+    ),
+    rtol=1e-5,
+    points=4,
+    properties=(
+        Property(
+            "the principal point stays where it is",
+            lambda arguments, pixels: np.allclose(
+                np.asarray(pixels)[np.all(arguments[0] == arguments[1][:2, 2], axis=1)], arguments[1][:2, 2], atol=1e-3
+            ),
+        ),
+    ),
+    forbidden=("cv2", "scipy"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "You bent the pixels a second time: the lens did it once, and you are to take it back.")
+def bent_again(pixels, K, k):
+    return distort(pixels, K, k)
+
+
+@wrong(
+    QUESTION,
+    "Put your answer into the lens: does the given pixel come out? r is the ideal point's radius, not the seen one's.",
+)
+def radius_as_seen(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = (pixels - c) / f
+    r2 = (seen**2).sum(axis=1, keepdims=True)
+    return c + f * seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+
+
+@wrong(QUESTION, "r is a radius without a unit, at depth 1: where do you go from pixels to x and y, and back?")
+def normalised(pixels, K, k):
+    return (undistort(pixels, K, k) - K[:2, 2]) / np.diagonal(K)[:2]
+
+
+@wrong(QUESTION, "k1 stands beside r squared and k2 beside r to the fourth.")
+def powers_too_low(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = ideal = (pixels - c) / f
+    for _ in range(100):
+        r = np.linalg.norm(ideal, axis=1, keepdims=True)
+        ideal = seen / (1.0 + k[0] * r + k[1] * r**2)
+    return c + f * ideal
