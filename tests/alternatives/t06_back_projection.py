@@ -5,10 +5,8 @@ import numpy as np
 from labkit.course.questions.t06_back_projection import columns
 from labkit.course.questions.t06_back_projection.back_project import holes, rays
 
-# ---------- cropped_intrinsics
 
-
-def cropped_by_hand(K, left, top, scale):
+def cropped_intrinsics__by_hand(K, left, top, scale):
     new = K.copy()
     new[0] = scale * K[0]
     new[1] = scale * K[1]
@@ -17,14 +15,14 @@ def cropped_by_hand(K, left, top, scale):
     return new
 
 
-def cropped_by_steps(K, left, top, scale):
+def cropped_intrinsics__by_steps(K, left, top, scale):
     def shift(right, down):
         return np.array([[1.0, 0.0, right], [0.0, 1.0, down], [0.0, 0.0, 1.0]])
 
     return shift(-0.5, -0.5) @ np.diag([scale, scale, 1.0]) @ shift(0.5 - left, 0.5 - top) @ K
 
 
-def cropped_torch(K, left, top, scale):
+def cropped_intrinsics__torch(K, left, top, scale):
     import torch
 
     K = torch.from_numpy(K)
@@ -34,14 +32,11 @@ def cropped_torch(K, left, top, scale):
     return new
 
 
-# ---------- back_project
-
-
-def back_project_closed_form(depth, K):
+def back_project__closed_form(depth, K):
     return holes(depth) * rays(depth.shape, K)
 
 
-def back_project_loops(depth, K):
+def back_project__loops(depth, K):
     P = np.full((*depth.shape, 3), np.nan)
     K_inv = np.linalg.inv(K)
     for v in range(depth.shape[0]):
@@ -51,7 +46,7 @@ def back_project_loops(depth, K):
     return P
 
 
-def back_project_einsum(depth, K):
+def back_project__einsum(depth, K):
     H, W = depth.shape
     pixels = np.stack([*np.meshgrid(np.arange(W), np.arange(H)), np.ones((H, W))])
     P = np.einsum("hw,ij,jhw->hwi", np.nan_to_num(depth), np.linalg.inv(K), pixels)
@@ -59,7 +54,7 @@ def back_project_einsum(depth, K):
     return P
 
 
-def back_project_torch(depth, K):
+def back_project__torch(depth, K):
     import torch
 
     depth, K = torch.as_tensor(depth, dtype=torch.float32), torch.as_tensor(K, dtype=torch.float32)
@@ -68,10 +63,7 @@ def back_project_torch(depth, K):
     return torch.stack([z * (u - K[0, 2]) / K[0, 0], z * (v - K[1, 2]) / K[1, 1], z], dim=-1).numpy()
 
 
-# ---------- undistort
-
-
-def undistort_newton(pixels, K, k):
+def undistort__newton(pixels, K, k):
     f, c = np.array([K[0, 0], K[1, 1]]), np.array([K[0, 2], K[1, 2]])
     x = (pixels - c) / f
     seen = np.hypot(*x.T)
@@ -81,7 +73,7 @@ def undistort_newton(pixels, K, k):
     return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
 
 
-def undistort_roots(pixels, K, k):
+def undistort__roots(pixels, K, k):
     out = []
     for pixel in pixels:
         x = np.linalg.solve(K, [*pixel, 1.0])[:2]
@@ -93,7 +85,7 @@ def undistort_roots(pixels, K, k):
     return np.array(out)
 
 
-def undistort_halving(pixels, K, k):
+def undistort__halving(pixels, K, k):
     f, c = np.diag(K)[:2], K[:2, 2]
     x = (pixels - c) / f
     low, high = np.zeros(len(x)), np.ones(len(x))
@@ -105,10 +97,7 @@ def undistort_halving(pixels, K, k):
     return c + f * x * 1.3 * high[:, None]
 
 
-# ---------- fit_plane
-
-
-def plane_by_eigenvectors(P, sigma):
+def fit_plane__by_eigenvectors(P, sigma):
     w = sigma**-2.0
     centre = np.average(P, axis=0, weights=w)
     normal = np.linalg.eigh(np.cov(P.T, aweights=w, ddof=0))[1][:, 0]
@@ -116,7 +105,7 @@ def plane_by_eigenvectors(P, sigma):
     return normal, normal @ centre
 
 
-def plane_loops(P, sigma):
+def fit_plane__loops(P, sigma):
     total = sum(1 / s**2 for s in sigma)
     centre = sum(p / s**2 for p, s in zip(P, sigma, strict=True)) / total
     scatter = np.zeros((3, 3))
@@ -127,7 +116,7 @@ def plane_loops(P, sigma):
     return normal * np.sign(normal[2]), abs(normal[2]) / normal[2] * (normal @ centre)
 
 
-def plane_torch(P, sigma):
+def fit_plane__torch(P, sigma):
     import torch
 
     P, w = torch.from_numpy(P), torch.from_numpy(sigma) ** -2
@@ -138,41 +127,29 @@ def plane_torch(P, sigma):
     return normal.numpy(), torch.dot(normal, centre).item()
 
 
-# ---------- height_noise
-
-
-def height_noise_covariance(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+def height_noise__covariance(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = T_base_cam[:3, :3] @ np.stack(columns(u, v, d, K), axis=1)
     Sigma = J @ np.diag([sigma_pixel**2, sigma_pixel**2, sigma_depth**2]) @ J.T
     return float(np.sqrt(Sigma[2, 2]))
 
 
-def height_noise_loops(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+def height_noise__loops(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     total = 0.0
     for column, sigma in zip(columns(u, v, d, K), (sigma_pixel, sigma_pixel, sigma_depth), strict=True):
         total += (sum(T_base_cam[2, i] * column[i] for i in range(3)) * sigma) ** 2
     return total**0.5
 
 
-def height_noise_einsum(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+def height_noise__einsum(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = np.stack(columns(u, v, d, K), axis=1)
     r, sigma = T_base_cam[2, :3], np.array([sigma_pixel, sigma_pixel, sigma_depth])
     return np.sqrt(np.einsum("i,ij,j,kj,k->", r, J, sigma**2, J, r))
 
 
-def height_noise_torch(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+def height_noise__torch(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     import torch
 
     x = torch.tensor([u, v, d], dtype=torch.float64, requires_grad=True)
     K_inv, r = torch.linalg.inv(torch.as_tensor(K).double()), torch.as_tensor(T_base_cam[2, :3]).double()
     (r @ (x[2] * K_inv @ torch.stack([x[0], x[1], torch.ones_like(x[0])]))).backward()
     return (x.grad * torch.tensor([sigma_pixel, sigma_pixel, sigma_depth], dtype=torch.float64)).norm().item()
-
-
-ALTERNATIVES = {
-    "cropped_intrinsics": (cropped_by_hand, cropped_by_steps, cropped_torch),
-    "undistort": (undistort_newton, undistort_roots, undistort_halving),
-    "back_project": (back_project_closed_form, back_project_loops, back_project_einsum, back_project_torch),
-    "fit_plane": (plane_by_eigenvectors, plane_loops, plane_torch),
-    "height_noise": (height_noise_covariance, height_noise_loops, height_noise_einsum, height_noise_torch),
-}
