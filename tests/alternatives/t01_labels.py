@@ -58,32 +58,28 @@ def one_hot_torch(y, C):
     return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
 
 
-# ---------- from_one_hot
+# ---------- labels_from_colours
 
 
-def from_one_hot_sum(Y):
-    classes = np.arange(Y.shape[-1])
-    return (Y * classes).sum(axis=-1) + 255 * (Y.sum(axis=-1) == 0)
+def colours_loops(rgb, palette):
+    """Pixel by pixel, in a dictionary of colours."""
+    names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
+    return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
 
 
-def from_one_hot_loops(Y):
-    y = np.full(Y.shape[:-1], 255, np.uint8)
-    for *place, c in np.argwhere(Y):
-        y[tuple(place)] = c
+def colours_class_by_class(rgb, palette):
+    y = np.full(rgb.shape[:2], 255, np.uint8)
+    for c, colour in enumerate(palette):
+        y[(rgb == colour).all(axis=2)] = c
     return y
 
 
-def from_one_hot_einsum(Y):
-    C = Y.shape[-1]
-    y = np.einsum("...c,c->...", Y.astype(int), np.arange(1, C + 1)) - 1
-    return np.where(y < 0, 255, y)
-
-
-def from_one_hot_torch(Y):
-    import torch
-
-    Y = torch.as_tensor(Y)
-    return torch.where(Y.sum(-1) > 0, Y.to(torch.float32).argmax(-1), 255)
+def colours_as_numbers(rgb, palette):
+    """Each colour as one number of 24 bits."""
+    weights = np.array([65536, 256, 1])
+    picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
+    found = picture[..., None] == table
+    return (found * np.arange(len(table))).sum(axis=-1) + 255 * ~found.any(axis=-1)
 
 
 # ---------- class_shares
@@ -149,7 +145,7 @@ def resize_torch(y, height, width):
 ALTERNATIVES = {
     "labels_from_segmentation": (labels_modulo, labels_loops, labels_by_body, labels_torch),
     "one_hot": (one_hot_eye, one_hot_loops, one_hot_planes, one_hot_torch),
-    "from_one_hot": (from_one_hot_sum, from_one_hot_loops, from_one_hot_einsum, from_one_hot_torch),
+    "labels_from_colours": (colours_loops, colours_class_by_class, colours_as_numbers),
     "class_shares": (shares_loops, shares_one_hot, shares_float32, shares_torch),
     "resize_labels": (resize_integers, resize_loops, resize_take, resize_torch),
 }

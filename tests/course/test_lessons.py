@@ -1,7 +1,4 @@
-"""What makes a lesson readable and a lab worth doing, measured: minutes, new steps, numbers in prose, endings, words.
-
-Topics of which a rule does not hold yet stand in PENDING; a topic that stands there without need fails, too.
-"""
+"""What makes a lesson readable and a lab worth doing: minutes, new steps, numbers in prose, endings, words."""
 
 import ast
 import re
@@ -21,9 +18,6 @@ from labkit.course.questions.question import TOPICS
 ROOT = Path(__file__).parents[2]
 LESSONS = sorted(ROOT.glob("lessons/*.ipynb"))
 SOLUTIONS = sorted(ROOT.glob("solutions/*/*.ipynb"))
-PENDING = {
-    "01": {"minutes", "new steps", "marks", "ending", "schematic", "words"},
-}
 MOST_MINUTES, MOST_LAB_MINUTES, WORDS_PER_MINUTE, NEW = 50, 105, 200, 0.6
 
 
@@ -38,21 +32,10 @@ def topic_of(path: Path) -> str:
     return path.stem[:2]
 
 
-def pending(rule: str, topic: str) -> bool:
-    """Whether a topic is excused from a rule."""
-    return rule in PENDING.get(topic, ())
-
-
-def holds(rule: str, paths: list[Path], complaints) -> None:
-    """Fail for the topics of which a rule does not hold, those excused that are pending; excused in vain fails, too."""
-    found = {}
-    for path in paths:
-        if said := complaints(path):
-            found.setdefault(topic_of(path), []).append(f"{path.relative_to(ROOT)}: {said}")
-    wrong = [line for topic, lines in found.items() if not pending(rule, topic) for line in lines]
+def holds(paths: list[Path], complaint) -> None:
+    """Fail with what a rule has against each notebook; complaint: function of a path to words, empty if it holds."""
+    wrong = [f"{path.relative_to(ROOT)}: {said}" for path in paths if (said := complaint(path))]
     assert not wrong, "\n".join(wrong)
-    done = sorted({topic_of(path) for path in paths if pending(rule, topic_of(path))} - found.keys())
-    assert not done, f"the rule {rule!r} holds for {done}: take it out of PENDING there"
 
 
 def prose(path: Path) -> str:
@@ -90,7 +73,7 @@ def test_a_lesson_is_read_in_fifty_minutes_and_says_so():
             return f"takes {needed:.0f} minutes"
         return "" if said and abs(said[0] - needed) <= 5 else f"takes {needed:.0f} minutes, says {said[:1]}"
 
-    holds("minutes", LESSONS, complaint)
+    holds(LESSONS, complaint)
 
 
 def test_a_labs_minutes_are_the_sum_of_its_tasks():
@@ -104,7 +87,7 @@ def test_a_labs_minutes_are_the_sum_of_its_tasks():
             return f"tasks {tasks} add up to {sum(tasks)}, the beginning says {said} minutes in all"
         return ""
 
-    holds("lab minutes", SOLUTIONS, complaint)
+    holds(SOLUTIONS, complaint)
 
 
 # ---------------------------------------------------------------------------------------------- new steps
@@ -198,7 +181,7 @@ def test_half_of_a_labs_points_ask_for_a_step_that_no_lesson_shows():
                         + ", ".join(f"{name} {value:.2f}" for name, value in like.items()))  # fmt: skip
         return "; ".join(said)
 
-    holds("new steps", SOLUTIONS, complaint)
+    holds(SOLUTIONS, complaint)
 
 
 def test_likeness_sees_through_names_and_numbers_and_not_through_operations():
@@ -273,7 +256,7 @@ def test_numbers_of_prose_are_those_of_the_outputs():
         few = [] if len(MARK.findall(prose(path))) >= 3 else ["fewer than three marked numbers"]
         return "; ".join([*marked_wrong(path), *few])
 
-    holds("marks", LESSONS, complaint)
+    holds(LESSONS, complaint)
 
 
 @pytest.mark.parametrize(
@@ -307,7 +290,7 @@ def test_a_lesson_ends_with_a_recap_five_questions_and_what_to_read():
         said += [] if len(works) >= 3 else [f"{len(works)} works by author, title and year to read next"]
         return "; ".join(said)
 
-    holds("ending", LESSONS, complaint)
+    holds(LESSONS, complaint)
 
 
 def test_each_lesson_opens_with_a_schematic():
@@ -316,7 +299,7 @@ def test_each_lesson_opens_with_a_schematic():
         shown = re.findall(r"!\[([^\]]{40,})\]\((schematics/\w+\.svg)\)", first)
         return "" if shown and all((path.parent / file).is_file() for _, file in shown) else "none, or not described"
 
-    holds("schematic", LESSONS, complaint)
+    holds(LESSONS, complaint)
 
 
 def test_the_schematics_are_as_the_code_beside_them_draws_them():
@@ -324,7 +307,7 @@ def test_the_schematics_are_as_the_code_beside_them_draws_them():
     assert done.returncode == 0, done.stdout + done.stderr
     shown = {file for path in LESSONS for file in re.findall(r"\((schematics/\w+\.svg)\)", prose(path))}
     drawn = {path.relative_to(ROOT / "lessons").as_posix() for path in ROOT.glob("lessons/schematics/*.svg")}
-    assert not [name for name in drawn - shown if not pending("schematic", Path(name).name[:2])]
+    assert drawn == shown
 
 
 # -------------------------------------------------------------------------------------------------- words
@@ -353,7 +336,7 @@ def refused(text: str) -> list[str]:
 
 
 def test_notebooks_and_pages_use_none_of_the_refused_words():
-    holds("words", [*LESSONS, *SOLUTIONS], lambda path: "; ".join(refused(prose(path))))
+    holds([*LESSONS, *SOLUTIONS], lambda path: "; ".join(refused(prose(path))))
     pages = [ROOT / "README.md", *{*ROOT.glob("docs/*.md")} - {ROOT / "docs/style.md"}]
     assert not [f"{page.name}: {word}" for page in pages for word in refused(page.read_text())]
 

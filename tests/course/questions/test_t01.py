@@ -20,7 +20,12 @@ def resize_labels(y, height, width):
 
 KIT = {
     "one_hot": labels.one_hot,
-    "from_one_hot": labels.from_one_hot,
     "class_shares": class_shares,
     "resize_labels": resize_labels,
 }
+
+
+def test_colours_are_the_kits():
+    y = np.random.default_rng(0).integers(0, 4, (5, 7)).astype(np.uint8)
+    y[2, 3] = 255
+    assert np.array_equal(QUESTIONS["labels_from_colours"].reference(labels.colorize(y), labels.PALETTE), y)

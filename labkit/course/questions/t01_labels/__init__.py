@@ -1,4 +1,4 @@
-"""Questions of topic 01: labels from a renderer's mask, one-hot tensors, shares of the classes, resizing."""
+"""Questions of topic 01: labels from a renderer's mask and from colours, one-hot tensors, shares, resizing."""
 
 import numpy as np
 

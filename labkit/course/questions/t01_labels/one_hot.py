@@ -18,7 +18,7 @@ QUESTION = Question(
     by_hand=((np.array([[0, 2]], np.uint8), 3), (np.array([[1, 255], [0, 3], [2, 2]], np.uint8), 5)),
     rtol=0.0,
     atol=0.0,
-    points=2,
+    points=1,
     properties=(
         Property(
             "over the last axis it sums to 1, and to 0 where the pixel is ignored",

@@ -38,7 +38,7 @@ QUESTION = Question(
     ),
     rtol=0.0,
     atol=0.0,
-    points=3,
+    points=4,
     properties=(
         Property(
             "no label is there that was not there before",

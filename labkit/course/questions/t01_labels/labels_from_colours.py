@@ -1,0 +1,84 @@
+"""01_labels.labels_from_colours: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.questions.question import Question, wrong
+
+
+def labels_from_colours(rgb, palette):
+    """Turn a coloured label picture back into labels; a colour that no class has becomes 255."""
+    same = (rgb[:, :, None, :] == palette).all(axis=-1)
+    return np.where(same.any(axis=-1), same.argmax(axis=-1), 255)
+
+
+def _picture(rng):
+    """Draw a palette whose colours share channels and brightness, and a picture with pixels between two colours."""
+    a, b, c = (int(value) for value in rng.choice(np.arange(20, 240, 10), 3, replace=False))
+    palette = np.array([[a, b, c], [c, a, b], [b, c, a], [a, c, b], [c, b, a]], np.uint8)
+    y = rng.integers(0, 5, (int(rng.integers(4, 7)), int(rng.integers(8, 11))))
+    rgb = palette[y].astype(int)
+    between = rng.random(y.shape) < 0.25
+    between[0, 0] = True
+    rgb[between] = (3 * rgb[between] + palette[(y[between] + 1) % 5]) // 4
+    return rgb.astype(np.uint8), palette
+
+
+_PALETTE = np.array([[0, 0, 0], [0, 0, 255], [255, 0, 0], [0, 255, 0]], np.uint8)
+
+
+QUESTION = Question(
+    name="01_labels.labels_from_colours",
+    reference=labels_from_colours,
+    inputs=_picture,
+    by_hand=(
+        (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
+        (np.array([[[0, 0, 0], [0, 255, 0]], [[0, 0, 254], [255, 255, 255]]], np.uint8), _PALETTE),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    forbidden=("labkit",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def matches(rgb, palette):
+    """Which channels of which class's colour each pixel has, (H, W, C, 3)."""
+    return rgb[:, :, None, :] == palette
+
+
+def first_of(same, otherwise=255):
+    """The first class that holds, (H, W, C) -> (H, W)."""
+    return np.where(same.any(axis=-1), same.argmax(axis=-1), otherwise)
+
+
+@wrong(QUESTION, "A mixed colour has no class: the nearest one may belong to a class that was never there.")
+def nearest_colour(rgb, palette):
+    """Whatever colour lies nearest."""
+    distance = ((rgb[:, :, None, :].astype(float) - palette) ** 2).sum(axis=-1)
+    return distance.argmin(axis=-1)
+
+
+@wrong(QUESTION, "Two colours are the same if all three channels are: is one of them enough in yours?")
+def any_channel(rgb, palette):
+    """One channel that fits is taken for all."""
+    return first_of(matches(rgb, palette).any(axis=-1))
+
+
+@wrong(QUESTION, "Different colours can be equally bright: compare the channels, not their sum.")
+def by_brightness(rgb, palette):
+    """The sum of the channels compared."""
+    return first_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
+
+
+@wrong(QUESTION, "argmax of a row that is all False is 0: is an unknown colour background?")
+def unknown_becomes_0(rgb, palette):
+    """Unknown colours become class 0."""
+    return first_of(matches(rgb, palette).all(axis=-1), 0)
+
+
+@wrong(QUESTION, "Which channel comes first in an RGB image?")
+def blue_first(rgb, palette):
+    """The picture read as BGR."""
+    return first_of(matches(rgb[..., ::-1], palette).all(axis=-1))
