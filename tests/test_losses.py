@@ -124,6 +124,7 @@ def test_inverse_weights_are_those_that_scikit_learn_calls_balanced():
 @given(hnp.arrays(np.float64, 4, elements=st.floats(0.01, 1.0)), hnp.arrays(np.float64, 4, elements=st.floats(0.1, 50)))
 def test_dividing_by_the_weights_undoes_them(p, w):
     p = p / p.sum()
+    np.testing.assert_allclose(losses.weighted_optimum(p, w), p * w / (p @ w), atol=1e-12)
     np.testing.assert_allclose(losses.weighted_optimum(losses.weighted_optimum(p, w), 1 / w), p, atol=1e-12)
     np.testing.assert_allclose(losses.weighted_optimum(p, np.full(4, 7.0)), p, atol=1e-12)
 
