@@ -4,15 +4,13 @@ import numpy as np
 
 from labkit.course.questions.t01_labels.labels_from_segmentation import numbers_and_seen
 
-# ---------- labels_from_segmentation
 
-
-def labels_modulo(segmentation, class_of_body):
+def labels_from_segmentation__modulo(segmentation, class_of_body):
     with_nothing = np.append(class_of_body, np.uint8(0))
     return with_nothing[np.where(segmentation < 0, -1, segmentation % (1 << 24))]
 
 
-def labels_loops(segmentation, class_of_body):
+def labels_from_segmentation__loops(segmentation, class_of_body):
     labels = np.zeros(segmentation.shape, np.uint8)
     for place, value in np.ndenumerate(segmentation):
         if value != -1:
@@ -20,26 +18,23 @@ def labels_loops(segmentation, class_of_body):
     return labels
 
 
-def labels_by_body(segmentation, class_of_body):
+def labels_from_segmentation__by_body(segmentation, class_of_body):
     body, seen = numbers_and_seen(segmentation)
     return sum((seen & (body == number)) * int(c) for number, c in enumerate(class_of_body))
 
 
-def labels_torch(segmentation, class_of_body):
+def labels_from_segmentation__torch(segmentation, class_of_body):
     import torch
 
     s, table = torch.as_tensor(segmentation.astype(np.int64)), torch.as_tensor(class_of_body.astype(np.int64))
     return torch.where(s < 0, 0, table[torch.bitwise_and(s.clamp(min=0), 0xFFFFFF)])
 
 
-# ---------- one_hot
-
-
-def one_hot_eye(y, C):
+def one_hot__eye(y, C):
     return np.vstack([np.eye(C, dtype=np.uint8), np.zeros((1, C), np.uint8)])[np.where(y == 255, C, y)]
 
 
-def one_hot_loops(y, C):
+def one_hot__loops(y, C):
     Y = np.zeros((*y.shape, C), np.uint8)
     for place, c in np.ndenumerate(y):
         if c != 255:
@@ -47,34 +42,31 @@ def one_hot_loops(y, C):
     return Y
 
 
-def one_hot_planes(y, C):
+def one_hot__planes(y, C):
     return np.stack([y == c for c in range(C)], axis=-1).astype(int)
 
 
-def one_hot_torch(y, C):
+def one_hot__torch(y, C):
     import torch
 
     y = torch.as_tensor(y.astype(np.int64))
     return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
 
 
-# ---------- labels_from_colours
-
-
-def colours_loops(rgb, palette):
+def labels_from_colours__loops(rgb, palette):
     """Pixel by pixel, in a dictionary of colours."""
     names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
     return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
 
 
-def colours_class_by_class(rgb, palette):
+def labels_from_colours__class_by_class(rgb, palette):
     y = np.full(rgb.shape[:2], 255, np.uint8)
     for c, colour in enumerate(palette):
         y[(rgb == colour).all(axis=2)] = c
     return y
 
 
-def colours_as_numbers(rgb, palette):
+def labels_from_colours__as_numbers(rgb, palette):
     """Each colour as one number of 24 bits."""
     weights = np.array([65536, 256, 1])
     picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
@@ -82,10 +74,7 @@ def colours_as_numbers(rgb, palette):
     return (found * np.arange(len(table))).sum(axis=-1) + 255 * ~found.any(axis=-1)
 
 
-# ---------- class_shares
-
-
-def shares_loops(y, C):
+def class_shares__loops(y, C):
     n = [0] * C
     for c in y.ravel().tolist():
         if c != 255:
@@ -93,33 +82,30 @@ def shares_loops(y, C):
     return np.array([count / sum(n) for count in n])
 
 
-def shares_one_hot(y, C):
-    n = np.einsum("vuc->c", one_hot_eye(y, C).astype(np.float64))
+def class_shares__one_hot(y, C):
+    n = np.einsum("vuc->c", one_hot__eye(y, C).astype(np.float64))
     return n / n.sum()
 
 
-def shares_float32(y, C):
+def class_shares__float32(y, C):
     return np.stack([np.mean(y[y != 255] == c, dtype=np.float32) for c in range(C)])
 
 
-def shares_torch(y, C):
+def class_shares__torch(y, C):
     import torch
 
     n = torch.bincount(torch.as_tensor(y[y != 255].astype(np.int64)), minlength=C).float()
     return n / n.sum()
 
 
-# ---------- resize_labels
-
-
-def resize_integers(y, height, width):
+def resize_labels__integers(y, height, width):
     H, W = y.shape
     rows = (2 * np.arange(height) + 1) * H // (2 * height)
     columns = (2 * np.arange(width) + 1) * W // (2 * width)
     return y[np.ix_(rows, columns)]
 
 
-def resize_loops(y, height, width):
+def resize_labels__loops(y, height, width):
     (H, W), out = y.shape, np.empty((height, width), y.dtype)
     for i in range(height):
         for j in range(width):
@@ -127,25 +113,16 @@ def resize_loops(y, height, width):
     return out
 
 
-def resize_take(y, height, width):
+def resize_labels__take(y, height, width):
     H, W = y.shape
     rows = np.floor((np.arange(height) + 0.5) * H / height).astype(np.intp)
     return y.take(rows, axis=0).take(np.floor((np.arange(width) + 0.5) * W / width).astype(np.intp), axis=1)
 
 
-def resize_torch(y, height, width):
+def resize_labels__torch(y, height, width):
     import torch
 
     H, W = y.shape
     rows = torch.div((2 * torch.arange(height) + 1) * H, 2 * height, rounding_mode="floor")
     columns = torch.div((2 * torch.arange(width) + 1) * W, 2 * width, rounding_mode="floor")
     return torch.as_tensor(y)[rows][:, columns]
-
-
-ALTERNATIVES = {
-    "labels_from_segmentation": (labels_modulo, labels_loops, labels_by_body, labels_torch),
-    "one_hot": (one_hot_eye, one_hot_loops, one_hot_planes, one_hot_torch),
-    "labels_from_colours": (colours_loops, colours_class_by_class, colours_as_numbers),
-    "class_shares": (shares_loops, shares_one_hot, shares_float32, shares_torch),
-    "resize_labels": (resize_integers, resize_loops, resize_take, resize_torch),
-}
