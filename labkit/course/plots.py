@@ -70,3 +70,29 @@ def cloud(figure: Figure, clouds: Mapping[str, Float[np.ndarray, "_ 3"]], sizes:
     side.set_title("from the side")
     above.legend(fontsize=8, markerscale=3)
     return above, side
+
+
+def certainty(reports: Mapping[str, Mapping]) -> Figure:
+    """Draw whether a network's certainty is worth its name: a reliability diagram, and what declining gains.
+
+    reports: name -> a report of `labkit evaluate --json`, of which `calibration`, `declining` and `trials` are drawn.
+    On the left, points on the diagonal are honest and points below it boast; on the right, a curve that falls from left
+    to right belongs to a robot that knows when it does not know. Topic 07.
+
+    >>> report = {"calibration": [(0.1, 0.2, 50)], "declining": [(0.9, 0.5, 1.0), (0.4, 1.0, 0.8)], "trials": 10}
+    >>> [axes.get_ylabel() for axes in certainty({"test": report}).axes]
+    ['share that are targets', 'of these lifted (%)']
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.6))
+    left.plot([0, 1], [0, 1], color="0.6", linewidth=1, label="calibrated")
+    for (name, report), (marker, dashes) in zip(reports.items(), (("o", "-"), ("s", "--"), ("^", ":")), strict=False):
+        said, true, _ = np.array(report["calibration"]).T
+        left.plot(said, true, marker=marker, linestyle=dashes, label=name)
+        _, tried, lifts = np.array(report["declining"]).T
+        label = f"{name}, {report['trials']} scenes"
+        right.plot(100 * tried, 100 * lifts, marker=marker, linestyle=dashes, label=label)
+    left.set(xlabel="the network's probability of target", ylabel="share that are targets", aspect="equal")
+    right.set(xlabel="surest scenes tried (%)", ylabel="of these lifted (%)", xlim=(0, 103))
+    left.legend(fontsize=8)
+    right.legend(fontsize=8)
+    return figure
