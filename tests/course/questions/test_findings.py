@@ -74,7 +74,14 @@ def stamps_of_32_bits(a, b, slop):
     return find("08_node.pair_stamps").reference(a, b, slop)
 
 
+def gradient_by_one_maximum(z, y):
+    e = np.exp(z - z.max())
+    p = e / e.sum(axis=-1, keepdims=True)
+    return np.where(y[..., None] == 255, 0.0, p - (y[..., None] == np.arange(z.shape[-1])))
+
+
 ACCEPTED = {
+    "03_gradient.cross_entropy_grad": gradient_by_one_maximum,
     "01_labels.labels_from_segmentation": mask_of_16_bits,
     "01_labels.resize_labels": centres_rounded,
     "03_gradient.softmax": shifted_by_the_mean,

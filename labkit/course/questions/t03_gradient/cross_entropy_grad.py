@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.questions.question import Property, Question, wrong
-from labkit.course.questions.t03_gradient import SURE, TOY, TRUE_CLASSES, random_pixels, softmax_over_pixels
+from labkit.course.questions.t03_gradient import SURE, TOY, random_pixels, softmax_over_pixels
 from labkit.course.questions.t03_gradient.softmax import softmax
 
 
@@ -22,7 +22,7 @@ QUESTION = Question(
     by_hand=(
         (TOY[None], np.array([1], np.uint8)),
         (TOY[None], np.array([0], np.uint8)),
-        (SURE, TRUE_CLASSES),
+        (SURE, np.array([0, 2], np.uint8)),  # the darker pixel counts: one maximum for both is not enough
     ),
     points=2,
     properties=(
