@@ -53,7 +53,10 @@ def encode(value: object) -> bytes:
     arrays = [as_array(part) for part in (value if several else (value,))]
     head = bytes([ord("V"), len(arrays) if several else ONE])
     for array in arrays:
-        if array.ndim > MOST_AXES or array.nbytes > MOST_BYTES:
+        length = array.itemsize  # of an empty array, too: its longest axis becomes bytes once it is summed
+        for n in array.shape:
+            length *= max(n, 1)
+        if array.ndim > MOST_AXES or length > MOST_BYTES:
             return b"B"
         code = DTYPES.index(array.dtype.str[1:].replace("b1", "?"))
         head += struct.pack(f"<BB{array.ndim}q", code, array.ndim, *array.shape)

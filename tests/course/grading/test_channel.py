@@ -86,6 +86,7 @@ def test_a_reply_with_a_byte_more_or_less_is_refused(array, data):
     [
         b"V\xff" + struct.pack("<BB2q", 11, 2, 2**33, 2**31),  # overflows 64 bits
         b"V\xff" + struct.pack("<BB2q", 11, 2, -1, -1) + bytes(8),
+        b"V\xff" + struct.pack("<BB2q", 11, 2, 2**33, 0),  # nothing, whose sums along an axis are 64 GB
         b"V\xff" + struct.pack("<BB", 12, 0) + bytes(8),  # no such dtype
         b"V\xff" + struct.pack("<BB9q", 1, 9, *[1] * 9) + bytes(1),
         b"V\x11" + struct.pack("<BB", 1, 0) * 17 + bytes(17),
