@@ -12,7 +12,14 @@ from labkit.frame import RGBDFrame
 from labkit.grasp import GraspPlan, Gripper
 from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
 from labkit.network import SmallSegNet
-from labkit.pipeline import WORKSPACE, Pipeline, class_probabilities, most_probable, segment_rgb_image
+from labkit.pipeline import (
+    WORKSPACE,
+    Pipeline,
+    class_probabilities,
+    most_probable,
+    refine_labels,
+    segment_rgb_image,
+)
 from labkit.sim.world import World
 
 
@@ -94,9 +101,12 @@ def test_no_target_and_no_depth_are_no_grasp_with_a_reason(frame):
 
 
 def test_run_is_perceive_and_then_locate(frame):
-    pipeline = Pipeline(SmallSegNet().eval())
-    labels, probabilities = pipeline.perceive(frame)
-    assert np.array_equal(labels, probabilities.argmax(axis=-1))
+    network = SmallSegNet().eval()
+    plain, probabilities = Pipeline(network, crf=False).perceive(frame)
+    assert np.array_equal(plain, probabilities.argmax(axis=-1))
+    pipeline = Pipeline(network)
+    labels, _ = pipeline.perceive(frame)
+    assert np.array_equal(labels, refine_labels(probabilities, frame)), "a network's labels are refined"
     p, q = pipeline.run(frame), pipeline.locate(frame, labels, probabilities)
     assert np.array_equal(p.labels, labels) and np.array_equal(p.probabilities, probabilities)
     assert p.certainty == q.certainty and p.plan.reason == q.plan.reason

@@ -16,11 +16,12 @@ ROOT = Path(__file__).resolve().parents[2]  # the checkout, when labkit is insta
 NEEDED_GB = 2.0  # free disk for a data set to train on, checkpoints and pictures
 NEEDED_RENDER_MM = 0.1
 
-# Who needs the packages of an extra; the peers of `make bench` have an environment of their own.
+# Who needs the packages of an extra; `make bench` and `make site` have environments of their own.
 USERS = {
     "course": "`make lab` needs",
     "instructor": "`labkit release` and `labkit grade` need",
     "stacks": "`labkit export` and the engines of topic 09 need",
+    "cluster": "`--dask` needs",
     "test": "`make test` needs",
 }
 

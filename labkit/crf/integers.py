@@ -60,8 +60,10 @@ def quantise(crf: PottsCRF) -> IntegerPotts:
     H, W, C = crf.shape
     offsets = np.array(crf.offsets)
     size, largest = measure(crf.unary, crf.weights, offsets, np.inf), crf.weights.max()
-    highest = 1.01 * size.constant if 0.0 < 1.01 * size.constant < largest else np.inf
-    if highest < largest:
+    highest = max(1.01 * size.constant, size.smallest)  # where one class is the cheapest everywhere, `constant` is 0
+    if highest >= largest:
+        highest = np.inf
+    else:
         size = measure(crf.unary, crf.weights, offsets, highest)
     dtype, scale = integer_scale(min(largest, highest), size.typical / crf.unary.size, size.smallest)
     step = grid_steps(crf.offsets, W)

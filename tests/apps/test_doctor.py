@@ -59,7 +59,10 @@ def test_a_missing_package_is_wrong_unless_only_an_extra_needs_it():
 
 
 def test_this_environment_has_every_package_at_its_pin():
-    assert doctor.USERS.keys() == set(packages.metadata.metadata("labkit").get_all("Provides-Extra")) - {"bench"}
+    assert doctor.USERS.keys() == set(packages.metadata.metadata("labkit").get_all("Provides-Extra")) - {
+        "bench",
+        "site",
+    }
     findings = {finding.name: finding for finding in doctor.check_packages()}
     assert findings["packages"].state == findings["[test]"].state == OK, findings
     assert "at their pinned versions" in findings["packages"].found

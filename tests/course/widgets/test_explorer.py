@@ -57,7 +57,7 @@ EXPLORERS = {
         lambda: stacks.colour_range(FRAME.rgb, FRAME.labels == 1),
         {"first": 30, "last": 90, "saturation": 120, "value": (40, 200)},
     ),
-    "memory": (lambda: stacks.memory(np.arange(12.0).reshape(2, 2, 3)), {"v": 1, "u": 2, "layout": "NHWC"}),
+    "memory": (lambda: stacks.memory(np.arange(12.0).reshape(2, 2, 3)), {"v": 1, "u": 2, "layout": "NCHW"}),
 }
 
 
