@@ -44,8 +44,8 @@ def in_process(frame) -> str:
     """Milliseconds of Pipeline.run and of the node around it, alternately."""
     rows = []
     for name, options in (
-        ("UNet, mirrored", {}),
-        ("UNet, onnxruntime, once", {"engine": "onnxruntime", "mirror": False}),
+        ("UNet, mirrored", {"mirror": True, "crf": False}),
+        ("UNet, onnxruntime, once", {"engine": "onnxruntime", "crf": False}),
     ):
         pipeline = Pipeline(load_model(weights_path("unet")), **options)
         bus = Bus()
@@ -77,8 +77,8 @@ def over_ros(frame) -> str:
     os.environ.update(
         ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_HOME=folder, ROS_LOG_DIR=folder
     )
-    fast = ["--engine", "onnxruntime", "--no-mirror"]
-    command = [sys.executable, "-m", "labkit.apps.cli", "node", "--ros", *fast]
+    fast = ["--engine", "onnxruntime", "--no-crf"]
+    command = [sys.executable, "-m", "labkit.apps.cli", "node", "--ros1", "--model", "unet", *fast]
     master = subprocess.Popen([sys.executable, "-c", MASTER, str(port)])
     node = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     try:
