@@ -235,7 +235,7 @@ def _check_pair(y_true, y_pred, num_classes) -> tuple[np.ndarray, np.ndarray]:
     check_whole("num_classes", num_classes, 1, IGNORE)
     y_true, y_pred = np.asarray(y_true), np.asarray(y_pred)
     for name, y in (("y_true", y_true), ("y_pred", y_pred)):
-        require(name, y.dtype.kind in "iu", "integer labels", f"dtype {y.dtype}")
+        require(name, y.dtype.kind in "iu", "integer labels", lambda y=y: f"dtype {y.dtype}")
     require("y_pred", y_true.shape == y_pred.shape, f"the shape of y_true, {y_true.shape}", y_pred.shape)
     return y_true, y_pred
 

@@ -13,20 +13,23 @@ MAX_TRANSLATION_M = 20.0
 def require(name: str, fits, expected: str, got) -> None:
     """Raise a ValueError that names an argument, what was expected and what came, unless `fits`.
 
+    got: what came, or a function that says it; checks that run for each frame find their words only when needed.
+
     >>> require("alpha", 0.0 <= 1.5 <= 1.0, "a share in 0..1", 1.5)
     Traceback (most recent call last):
     ...
     ValueError: alpha: expected a share in 0..1, got 1.5
     """
     if not fits:
-        raise ValueError(f"{name}: expected {expected}, got {got}")
+        raise ValueError(f"{name}: expected {expected}, got {got() if callable(got) else got}")
 
 
 def check_whole(name: str, value, least: int, most: int | None = None) -> int:
     """Return a whole number from `least` to `most`; True and 2.0 are none."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    fits = whole and least <= value and (most is None or value <= most)
-    require(name, fits, f"a whole number of at least {least}" + (f", at most {most}" if most else ""), repr(value))
+    if not (whole and least <= value and (most is None or value <= most)):
+        up_to = f", at most {most}" if most else ""
+        raise ValueError(f"{name}: expected a whole number of at least {least}{up_to}, got {value!r}")
     return int(value)
 
 
@@ -52,7 +55,7 @@ def check_same_size(name_a: str, a: np.ndarray, name_b: str, b: np.ndarray) -> N
 def check_finite(name: str, array: np.ndarray) -> np.ndarray:
     """Return `array` if it is real, numeric and without NaN or infinity."""
     array = np.asarray(array)
-    require(name, array.dtype.kind in "fiu", "real numbers", f"dtype {array.dtype}")
+    require(name, array.dtype.kind in "fiu", "real numbers", lambda: f"dtype {array.dtype}")
     bad = array.size - np.count_nonzero(np.isfinite(array))
     require(name, not bad, "finite numbers", f"{bad} NaN or infinite of {array.size}")
     return array
@@ -76,8 +79,8 @@ def check_rgb(name: str, image) -> np.ndarray:
 def check_depth(name: str, depth) -> np.ndarray:
     """Return a depth image in metres, floating point (H, W); 0 and NaN mean "no reading" and are fine."""
     depth = check_shape(name, depth, (None, None))
-    got = f"dtype {depth.dtype}; integer depth is usually millimetres: multiply by its scale (often 0.001)"
-    require(name, depth.dtype.kind == "f", "floating-point metres", got)
+    advice = "integer depth is usually millimetres: multiply by its scale (often 0.001)"
+    require(name, depth.dtype.kind == "f", "floating-point metres", lambda: f"dtype {depth.dtype}; {advice}")
     # One reduction answers most frames: NaN fails both comparisons, so only odd frames pay for the second look.
     low, high = (depth.min(), depth.max()) if depth.size else (0.0, 0.0)
     if not (low >= 0.0 and high <= MAX_DEPTH_M):
@@ -102,7 +105,7 @@ def check_K(name: str, K) -> np.ndarray:
     K = check_finite(name, check_shape(name, K, (3, 3))).astype(np.float64)
     if K[1, 0] or K[2, 0] or K[2, 1]:
         raise ValueError(f"{name}: expected an upper triangular intrinsic matrix, got {K.tolist()}; is it transposed?")
-    require(name, K[2, 2] == 1.0, "its last row to be 0 0 1", K[2].tolist())
+    require(name, K[2, 2] == 1.0, "its last row to be 0 0 1", K[2].tolist)
     if not (K[0, 0] > 0.0 and K[1, 1] > 0.0):
         raise ValueError(f"{name}: expected positive focal lengths (else it is singular), got {K[0, 0]} and {K[1, 1]}")
     return K
@@ -111,23 +114,27 @@ def check_K(name: str, K) -> np.ndarray:
 def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
     """Return a rigid transform in SE(3) as float64 (4, 4): orthonormal, right-handed, last row 0 0 0 1, in metres."""
     T = check_finite(name, check_shape(name, T, (4, 4))).astype(np.float64)
-    if np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() > tolerance:
-        raise ValueError(f"{name}: expected its last row to be 0 0 0 1, got {T[3].tolist()}; is it transposed?")
+    x, y, z, last = T.tolist()
+    if max(map(abs, last[:3])) > tolerance or abs(last[3] - 1.0) > tolerance:
+        raise ValueError(f"{name}: expected its last row to be 0 0 0 1, got {last}; is it transposed?")
     R = T[:3, :3]
     error = np.abs(R @ R.T - np.eye(3)).max()
-    got = f"one whose R @ R.T is off from the identity by {error:.3g}"
-    require(name, error <= tolerance, "an orthonormal rotation", got)
-    require(name, np.linalg.det(R) >= 0.0, "a right-handed rotation (determinant +1)", "a mirror image (-1)")
-    far = np.abs(T[:3, 3]).max()
-    got = f"{far:.6g}, which looks like millimetres: multiply T[:3, 3] by 0.001"
-    require(name, far <= MAX_TRANSLATION_M, "a translation in metres", got)
+    require(
+        name, error <= tolerance, "an orthonormal rotation", lambda: f"R @ R.T off from the identity by {error:.3g}"
+    )
+    third = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])  # the row x cross y
+    turns_right = third[0] * z[0] + third[1] * z[1] + third[2] * z[2] >= 0.0
+    require(name, turns_right, "a right-handed rotation (determinant +1)", "a mirror image (-1)")
+    far = max(abs(x[3]), abs(y[3]), abs(z[3]))
+    mend = "which looks like millimetres: multiply T[:3, 3] by 0.001"
+    require(name, far <= MAX_TRANSLATION_M, "a translation in metres", lambda: f"{far:.6g}, {mend}")
     return T
 
 
 def check_labels(name: str, y, num_classes: int, ignore: int | None = 255) -> np.ndarray:
     """Return integer labels in 0 .. num_classes - 1, or `ignore`; any shape and integer dtype."""
     y = np.asarray(y)
-    require(name, y.dtype.kind in "iu", "integer labels", f"dtype {y.dtype}")
+    require(name, y.dtype.kind in "iu", "integer labels", lambda: f"dtype {y.dtype}")
     if y.size and (y.min() < 0 or y.max() >= num_classes):
         wrong = (y < 0) | (y >= num_classes)
         if ignore is not None:
