@@ -12,6 +12,8 @@ import json
 import tempfile
 import types
 from collections.abc import Callable, Iterable
+from contextlib import suppress
+from glob import glob
 from pathlib import Path
 
 import numpy as np
@@ -116,13 +118,11 @@ def descendants(pid: int) -> set[int]:
     """Processes below one, by the kernel's lists of children."""
     found, waiting = set(), [pid]
     while waiting:
-        try:
-            tasks = list(Path(f"/proc/{waiting.pop()}/task").iterdir())
-            children = [int(child) for task in tasks for child in (task / "children").read_text().split()]
-        except OSError:
-            continue
-        found |= set(children)
-        waiting += children
+        for thread in glob(f"/proc/{waiting.pop()}/task/*/children"):
+            with suppress(OSError):  # this thread has ended since it was listed; the children of others still count
+                children = {int(child) for child in Path(thread).read_text().split()} - found
+                found |= children
+                waiting += children
     return found
 
 
