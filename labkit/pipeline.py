@@ -260,8 +260,8 @@ def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
     low, high = p.min(), p.max()
     total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
     fits = low >= -1e-3 and high <= 1.001 and np.abs(total - 1.0).max() <= 0.01
-    got = f"{low:.4g} to {high:.4g}; are they scores?"
-    require("probabilities", fits, "numbers in 0..1 that sum to 1 at each pixel", got)
+    expected = "numbers in 0..1 that sum to 1 at each pixel"
+    require("probabilities", fits, expected, lambda: f"{low:.4g} to {high:.4g}; are they scores?")
     return p if p.dtype.kind == "f" else p.astype(np.float32)
 
 

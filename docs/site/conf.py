@@ -88,10 +88,10 @@ def modules() -> list[str]:
 
 def lesson_of(number: str) -> str | None:
     """The page of a topic's first lesson, given its two digits."""
-    return next(iter(written("lessons", ".ipynb")[i] for i, page in enumerate(LESSONS) if f"/{number}_" in page), None)
+    return next((page for page in LESSONS if f"/{number}_" in page), None)
 
 
-LESSONS = written("lessons", ".ipynb")
+LESSONS, MODULES = written("lessons", ".ipynb"), modules()
 TOPIC = re.compile(r"\bTopics? ((?:\d\d(?:_\w+)?(?:, | and )?)+)")
 derived: dict[str, set[str]] = defaultdict(set)  # lesson's page -> modules whose docstrings cite its topic
 
@@ -101,7 +101,7 @@ def write_reference() -> None:
     out = ROOT / "out" / "reference"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
-    for name in modules():
+    for name in MODULES:
         module = importlib.import_module(name)
         text = " ".join(
             [
@@ -116,7 +116,7 @@ def write_reference() -> None:
         title = f"``{name}``"
         text = f"{title}\n{'=' * len(title)}\n\n.. automodule:: {name}\n"
         if hasattr(module, "__path__"):  # its names are documented where they are written
-            inside = [other for other in modules() if other.rpartition(".")[0] == name]
+            inside = [other for other in MODULES if other.rpartition(".")[0] == name]
             text += "   :no-members:\n\n" + "\n".join(f"* :doc:`{other}`" for other in inside) + "\n"
         (out / f"{name}.rst").write_text(text)
 
@@ -127,7 +127,7 @@ def contents() -> str:
         "Lessons": [*LESSONS, "lessons/errata"],
         "Labs": written("labs", ".ipynb"),
         **{name: [page for page in pages if (ROOT / f"{page}.md").exists()] for name, pages in GUIDES.items()},
-        "Reference": [f"out/reference/{name}" for name in modules()],
+        "Reference": [f"out/reference/{name}" for name in MODULES],
     }
     trees = [
         "\n".join(["", "```{toctree}", ":hidden:", f":caption: {name}", *(f"/{page}" for page in pages), "```", ""])
@@ -151,7 +151,7 @@ def links_that_lead_somewhere(text: str, folder: Path) -> str:
             return words
         place = str(path.relative_to(ROOT))
         module = place.removesuffix(".py").removesuffix("/").replace("/", ".").removesuffix(".__init__")
-        if module in REFERENCE:
+        if module in MODULES:
             return f"[{words}](/out/reference/{module}.rst)"
         shown = path.suffix in (".md", ".ipynb") and any(path.match(str(ROOT / p)) for p in include_patterns)
         return f"[{words}](/{place}{anchor or ''})" if shown and path.exists() else words
@@ -239,7 +239,6 @@ def finish(app, error) -> None:
         shutil.copy(script, Path(app.outdir) / "_static" / "plotly.min.js")
 
 
-REFERENCE = set(modules())
 write_reference()
 
 

@@ -1,12 +1,13 @@
 """A folder of somebody's labelled RGB-D pictures, to train on: `labkit train FOLDER --init unet_rgbd`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from labkit.apps.perceive import Intrinsics, on_table, read_frame, read_intrinsics
-from labkit.frame import RGBDFrame, read_image
+from labkit.frame import read_image
 from labkit.labels import CLASSES, IGNORE
 
 
@@ -45,4 +46,4 @@ class PictureFolder(Sequence):
         if not np.isin(labels, [*range(len(CLASSES)), IGNORE]).all():
             values = np.unique(labels)[:6].tolist()
             raise ValueError(f"mask: expected classes 0 to {len(CLASSES) - 1}, or {IGNORE}, in {mask}, got {values}")
-        return RGBDFrame(frame.rgb, frame.depth, frame.K, frame.T_base_cam, labels, table_z=0.0)
+        return replace(frame, labels=labels)

@@ -7,7 +7,7 @@ import base64
 import html
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -146,7 +146,7 @@ def on_table(frame: RGBDFrame) -> tuple[RGBDFrame, Plane]:
     """Find the table in a frame's depth, and give the frame with the base frame laid on it; its table_z is 0."""
     P = back_project(frame.depth, frame.K)
     plane = fit_plane(P[np.isfinite(P[..., 2])])
-    return RGBDFrame(frame.rgb, frame.depth, frame.K, base_on_table(plane), table_z=0.0), plane
+    return replace(frame, T_base_cam=base_on_table(plane), table_z=0.0), plane
 
 
 def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
@@ -195,7 +195,7 @@ def perceive(
     if T_base_cam is None:
         frame, plane = on_table(frame)
     else:
-        frame = RGBDFrame(frame.rgb, frame.depth, frame.K, T_base_cam, table_z=table_z)
+        frame = replace(frame, T_base_cam=T_base_cam, table_z=table_z)
     pipeline = Pipeline(model, workspace=WORKSPACE, gripper=gripper)
     return Seen(frame, pipeline.run(frame) if labels is None else pipeline.locate(frame, labels), plane)
 

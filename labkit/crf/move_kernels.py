@@ -13,6 +13,12 @@ RING = 255
 
 
 @njit(cache=True, nogil=True)
+def pair_weight(weights, n, m, k, K):
+    """The weight between pixel n and its neighbour m, the k-th of K, kept at the pixel that counts it forward."""
+    return weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+
+
+@njit(cache=True, nogil=True)
 def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
     """Ask of each pixel: keep your label (the source's side), or take `alpha`?
 
@@ -31,7 +37,7 @@ def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
         taking = unary[n, alpha] - unary[n, labels[n]]
         for k in range(K):
             m = n + step[k]
-            w = weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+            w = pair_weight(weights, n, m, k, K)
             capacity[n, k] = 0
             if w == 0:
                 continue
@@ -67,7 +73,7 @@ def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
             for k in range(K):
                 m = n + step[k]
                 if labels[m] in (alpha, beta):
-                    capacity[n, k] = weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+                    capacity[n, k] = pair_weight(weights, n, m, k, K)
                     if 2 * k < K and labels[m] != labels[n]:
                         present += capacity[n, k]
     return present
@@ -92,7 +98,7 @@ def persistency_test(unary, weights, step, labels, free, nodes, graph):
         saved = 0
         for k in range(K):
             m = n + step[k]
-            w = weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
+            w = pair_weight(weights, n, m, k, K)
             capacity[n, k] = 0
             if w == 0:
                 continue

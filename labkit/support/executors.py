@@ -1,6 +1,8 @@
 """Where many equal jobs run: in this process, in several, or on the workers of a Dask cluster."""
 
 import multiprocessing
+import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -39,10 +41,10 @@ def executor_for(workers: int = 1, dask: str | None = None) -> Iterator[Executor
 
 
 def one_thread() -> None:
-    """Workers share the cores among themselves, not each with all threads of PyTorch."""
-    import torch
-
-    torch.set_num_threads(1)
+    """Workers share the cores among themselves, not each with all threads of PyTorch; most jobs never load it."""
+    os.environ["OMP_NUM_THREADS"] = "1"  # what a PyTorch that is loaded later reads
+    if torch := sys.modules.get("torch"):
+        torch.set_num_threads(1)
 
 
 def kit_version() -> str:

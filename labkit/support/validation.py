@@ -57,7 +57,7 @@ def check_finite(name: str, array: np.ndarray) -> np.ndarray:
     array = np.asarray(array)
     require(name, array.dtype.kind in "fiu", "real numbers", lambda: f"dtype {array.dtype}")
     bad = array.size - np.count_nonzero(np.isfinite(array))
-    require(name, not bad, "finite numbers", f"{bad} NaN or infinite of {array.size}")
+    require(name, not bad, "finite numbers", lambda: f"{bad} NaN or infinite of {array.size}")
     return array
 
 
