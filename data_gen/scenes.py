@@ -26,8 +26,8 @@ class SceneConfig:
 
     Ranges are (low, high): distance in metres, elevation in radians above the table (several ranges are drawn from with
     equal chance), roll about the line of sight up to so many radians. hard: object proportions and models that training
-    never sees. wide: every other object is of `data_gen.wide`'s proportions. fov_y: of the camera, radians. renderer:
-    as in `labkit.sim.spec.Camera`.
+    never sees. wide: every other object is of `data_gen.wide`'s proportions. fov_y: of the camera, radians. renderer,
+    sensor: as in `labkit.sim.spec.Camera`.
     """
 
     stream: int
@@ -41,6 +41,7 @@ class SceneConfig:
     obstacles: tuple[int, int] = (3, 8)
     fov_y: tuple[float, float] = (0.55, 0.85)
     renderer: str = "tiny"
+    sensor: str = "exact"
 
 
 CONFIGS = {
@@ -61,7 +62,13 @@ CONFIGS = {
         obstacles=(3, 9),
     ),
     "other": SceneConfig(
-        stream=4, elevations=((1.20, 1.50),), distance=(0.45, 0.75), roll=3.1, fov_y=(0.95, 1.25), renderer="egl"
+        stream=4,
+        elevations=((1.20, 1.50),),
+        distance=(0.45, 0.75),
+        roll=3.1,
+        fov_y=(0.95, 1.25),
+        renderer="egl",
+        sensor="stereo",
     ),
 }
 
@@ -71,8 +78,8 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
 
     config: "train", "test" (the same distribution, other scenes), "hard" (shapes, textures and viewpoints that are not
     in train), "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data) or
-    "other" (test's objects as another camera sees them: from overhead, wide-angled, drawn by another renderer).
-    Raises ValueError for a negative seed or an unknown config.
+    "other" (test's objects as another camera sees them: from overhead, wide-angled, drawn by another renderer, with
+    depth of a stereo pair). Raises ValueError for a negative seed or an unknown config.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
@@ -152,6 +159,7 @@ def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects
             roll=rng.uniform(-kind.roll, kind.roll),
             fov_y=float(rng.uniform(*kind.fov_y)),
             renderer=kind.renderer,
+            sensor=kind.sensor,
         )
         T_cam_base = np.linalg.inv(np.array(camera.T_base_cam))
         P_cam = targets @ T_cam_base[:3, :3].T + T_cam_base[:3, 3]

@@ -11,7 +11,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from labkit.apps.trials import in_order
-from labkit.geometry.sensor import StereoSensor, perturbed
+from labkit.geometry.sensor import perturbed
 from labkit.labels import CLASSES, TARGET
 from labkit.metrics import (
     boundary_counts,
@@ -51,9 +51,9 @@ def run_trial(
 ) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
-    spec: a SceneSpec; those of the config "other" are seen by another sensor, StereoSensor. model: as in Pipeline, or
-    the path of weights; None for true masks. crf: as in Pipeline. perturb: depth as a sensor measures it and
-    a camera pose that is off (labkit.geometry.sensor.perturbed), the same for every model. No reachable candidate is a
+    spec: a SceneSpec. model: as in Pipeline, or the path of weights; None for true masks. crf: as in Pipeline. perturb:
+    depth as a sensor measures it and a camera pose that is off (labkit.geometry.sensor.perturbed), the same for every
+    model. No reachable candidate is a
     failure, and so is lifting anything but a target. Only the score reads the simulator's truth. Raises ValueError for
     a CRF on true masks.
     """
@@ -67,8 +67,6 @@ def run_trial(
     with World(spec) as world:
         with timed(seconds, "render"):
             frame = world.render(size)
-        if spec.config == "other":
-            frame = StereoSensor().apply(frame, np.random.default_rng([spec.seed, 3]))
         if perturb:
             frame = perturbed(frame, np.random.default_rng([spec.seed, 2]))
         perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)

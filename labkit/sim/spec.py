@@ -95,6 +95,7 @@ class Camera:
     """A pinhole camera: its pose in the base frame, (4, 4), kept row by row, and its vertical field of view.
 
     renderer: "tiny", PyBullet's own, or "egl", OpenGL without a window: other shading, softer shadows, another K.
+    sensor: "exact" depth, or "stereo", as labkit.geometry.sensor.StereoSensor measures it.
     """
 
     T_base_cam: Sequence[Sequence[float]] | Float[np.ndarray, "4 4"]
@@ -102,10 +103,11 @@ class Camera:
     near: float = 0.1
     far: float = 6.0
     renderer: str = "tiny"
+    sensor: str = "exact"
 
     def __post_init__(self):
-        if self.renderer not in ("tiny", "egl"):
-            raise ValueError(f'renderer: expected "tiny" or "egl", got {self.renderer!r}')
+        require("renderer", self.renderer in ("tiny", "egl"), '"tiny" or "egl"', repr(self.renderer))
+        require("sensor", self.sensor in ("exact", "stereo"), '"exact" or "stereo"', repr(self.sensor))
         T = check_T("T_base_cam", self.T_base_cam)
         object.__setattr__(self, "T_base_cam", tuple(map(tuple, T.tolist())))
         got = f"{self.fov_y}; np.radians makes them of degrees"

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
+from labkit.geometry.sensor import StereoSensor
 from labkit.labels import BACKGROUND, SURFACE
 from labkit.sim.client import Client, pybullet
 from labkit.sim.kinematics import HOME, PANDA_URDF
@@ -97,10 +98,10 @@ class World:
         return {name: self.pose(name) for name in self.bodies}
 
     def render(self, size: tuple[int, int] = (320, 240), camera: Camera | None = None) -> RGBDFrame:
-        """Take an exact RGB-D image of `size` = (width, height), with true labels and instances.
+        """Take an RGB-D image of `size` = (width, height), with true labels and instances.
 
-        Depth is 0 where the camera sees nothing. Instances number the objects of the spec from 1. `camera` defaults to
-        the spec's. Raises ValueError for an empty size.
+        Depth is what the camera's sensor reads, 0 where it sees nothing. Instances number the objects of the spec from
+        1. `camera` defaults to the spec's. Raises ValueError for an empty size.
         """
         width, height = size
         require("size", min(size) >= 1, "width and height of at least 1", size)
@@ -126,7 +127,7 @@ class World:
         buffer = np.asarray(buffer, dtype=np.float64).reshape(height, width)
         bodies = np.asarray(segmentation).reshape(height, width)
         labels, instances = self._label(bodies)
-        return RGBDFrame(
+        frame = RGBDFrame(
             rgb=np.ascontiguousarray(np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]),
             depth=np.where(bodies < 0, 0.0, metres(buffer, camera.near, camera.far)).astype(np.float32),
             K=intrinsics(camera.fov_y, width, height, camera.renderer),
@@ -135,6 +136,9 @@ class World:
             instances=instances,
             table_z=self.spec.table.z,
         )
+        if camera.sensor == "stereo":
+            frame = StereoSensor().apply(frame, np.random.default_rng([self.spec.seed, 3]))
+        return frame
 
     def _label(self, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Turn the renderer's body numbers (-1 for nothing) into labels and instances."""

@@ -36,6 +36,21 @@ def points_of(frame, mask):
 EGL = pytest.mark.debian("libegl1", "libgl1-mesa-dri")
 
 
+def test_a_stereo_camera_reads_what_both_eyes_see_to_a_part_of_a_pixel_of_disparity():
+    exact = Camera.looking_at((0.5, 0.0, 0.0), 0.7, 0.5, 0.8)
+    with World(scene(thing(), camera=exact)) as world:
+        stereo = dataclasses.replace(exact, sensor="stereo")
+        truth, seen, again = (world.render(camera=camera) for camera in (exact, stereo, stereo))
+    assert seen.rgb.tobytes() == truth.rgb.tobytes() and seen.labels.tobytes() == truth.labels.tobytes()
+    assert seen.depth.tobytes() == again.depth.tobytes()
+    read = seen.depth > 0
+    assert 0.9 < read[truth.depth > 0].mean() < 1.0 and not read[truth.depth == 0].any()
+    off = seen.K[0, 0] * 0.05 * (1 / seen.depth[read] - 1 / truth.depth[read])
+    assert 0.02 < off.std() < 0.12 and np.abs(off).max() < 0.5  # pixels
+    with pytest.raises(ValueError, match="^sensor: expected .*stereo.*, got 'sonar'$"):
+        dataclasses.replace(exact, sensor="sonar")
+
+
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (201, 161)])
 @pytest.mark.parametrize(("seed", "renderer"), [(0, "tiny"), (1, "tiny"), pytest.param(0, "egl", marks=EGL)])
 def test_a_rendered_plane_is_a_plane(size, seed, renderer, capfd):
