@@ -47,7 +47,7 @@ def test_a_stereo_camera_reads_what_both_eyes_see_to_a_part_of_a_pixel_of_dispar
     assert 0.9 < read[truth.depth > 0].mean() < 1.0 and not read[truth.depth == 0].any()
     off = seen.K[0, 0] * 0.05 * (1 / seen.depth[read] - 1 / truth.depth[read])
     assert 0.02 < off.std() < 0.12 and np.abs(off).max() < 0.5  # pixels
-    with pytest.raises(ValueError, match="^sensor: expected .*stereo.*, got 'sonar'$"):
+    with pytest.raises(ValueError, match=r"^sensor: expected .*stereo.*, got 'sonar'$"):
         dataclasses.replace(exact, sensor="sonar")
 
 
