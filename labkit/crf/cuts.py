@@ -14,13 +14,14 @@ import numpy as np
 from jaxtyping import Bool, Integer
 
 from labkit.crf.energy import MapResult, PottsCRF
-from labkit.crf.exact import NEAR
 from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import Graph, max_flow, new_forest
 from labkit.crf.messages import _trws
 from labkit.crf.move_kernels import RING, SINK, expansion_move, swap_move
 
-START_SWEEPS = 4
+START_SWEEPS = 6
+# How far flow is pushed on without search trees, in pixels: from a good start the ways are shorter than in one cut.
+NEAR = 3
 
 
 def expansion(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> MapResult:
@@ -69,13 +70,14 @@ def swap(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> Map
 
 
 def try_in_turn(moves: list[Callable[[], bool]]) -> int:
-    """Make the moves in turn until a whole round of them changes nothing; return how many were tried.
+    """Make the moves in turn until none of them changes anything; return how many were tried.
 
-    Each change lowers the integer energy, so that this ends.
+    A move that has just been made finds nothing more to change, so the others alone are tried after it. Each change
+    lowers the integer energy, so that this ends.
     """
     tried = unchanged = 0
     for move in cycle(moves):
-        unchanged = 0 if move() else unchanged + 1
+        unchanged = 1 if move() else unchanged + 1
         tried += 1
         if unchanged == len(moves):
             break
