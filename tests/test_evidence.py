@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MASKS = {"UNetRGBD": "", "true masks": "_truth"}
 KINDS = {"test": "test", "hard": "hard", "test, perturbed": "test_perturbed", "hard, perturbed": "hard_perturbed"}
-KINDS["other (100 scenes)"] = "other"
+KINDS["other"] = "other"
 
 
 def rows(page: str) -> list[tuple[str, str, list[float]]]:
