@@ -183,6 +183,7 @@ def test_a_column_of_depths_must_be_transposed():
     with pytest.raises(ValueError, match="broadcast"):
         rays * d_vec
     assert (rays * d_vec.T)[2].tolist() == d_vec[:, 0].tolist()
+    assert (rays[:, :3] * d_vec[:3])[2].tolist() == [2, 2, 2]  # three pixels: no error, and rows are scaled
 
 
 def test_png_holds_no_single_precision_metres(tmp_path):
