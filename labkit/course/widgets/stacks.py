@@ -109,7 +109,7 @@ def memory(scores: Float[np.ndarray, "C H W"]) -> Explorer:
             x, y = place % (H * W), -c
             axes.add_patch(Rectangle((x, y), 1, 1, fc=PALETTE[c] / 255, ec="white", alpha=0.75))
             axes.text(x + 0.5, y + 0.42, f"{number:.0f}", ha="center", va="center", color="white", fontsize=9)
-            axes.text(x + 0.06, y + 0.8, f"{row % H},{place % W}", fontsize=5.5, color="white")
+            axes.text(x + 0.06, y + 0.76, f"{row % H}, {place % W}", fontsize=7, color="white")
         for place in read:
             axes.add_patch(Rectangle((place % (H * W), -(place // (H * W))), 1, 1, fill=False, ec="black", lw=3))
         values = ", ".join(f"{data[place]:.0f}" for place in read)
