@@ -284,7 +284,8 @@ def test_the_clock_of_a_simulator_is_followed_and_what_was_before_its_restart_is
             wait_for(lambda: blind.transport.wanted(ROS_TOPICS.rgb), "the node")
             blind.camera.publish(small(frame), 10**11)
             wait_for(lambda: inside.node.counts.failed == 1, "the refusal")
-            assert any("no transform between" in m.message for m in peer.heard["diagnostics"])
+            words = "no transform between"
+            wait_for(lambda: any(words in m.message for m in peer.heard["diagnostics"]), "its words")
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
