@@ -2,7 +2,8 @@
 
 A run is a function of its configuration and its data. Step s of it draws its randomness from (seed, s) and the order of
 epoch e from (seed, e), so that nothing has to be replayed: weights, optimiser and the number of steps done are all
-that a checkpoint holds, and a resumed run ends where an undisturbed one does.
+that a checkpoint holds, and a resumed run ends where an undisturbed one does. Processes that torchrun started share
+each step's batch (`labkit.support.ranks`), and go through the same losses as one process.
 """
 
 import copy
@@ -13,6 +14,7 @@ import signal
 import threading
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -21,16 +23,18 @@ from torch import nn
 from torch.nn import functional as F
 from tqdm.auto import tqdm
 
-from labkit.frame import RGBDFrame
-from labkit.geometry import back_project_to_base
 from labkit.geometry.augment import augment_frames
-from labkit.labels import CLASSES, IGNORE, SURFACE
+from labkit.geometry.images import ImagesInMemory, too_large
+from labkit.labels import CLASSES, IGNORE
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
+from labkit.support import ranks
 from labkit.support.augment import augment
 from labkit.support.files import write_atomically
-from labkit.support.validation import check_labels, check_rgb, require
+from labkit.support.validation import require
+
+AHEAD = 8  # steps that a file of images is read ahead
 
 
 @dataclass(frozen=True)
@@ -104,85 +108,14 @@ def fine_tuning(model: str, validated: bool) -> TrainConfig:
     return replace(RECIPES[model], epochs=60, lr=1e-3, weights="sqrt" if validated else "none", val_every=20)
 
 
-class ImagesInMemory:
-    """Images and labels of a dataset, decoded once and kept as bytes: 4,000 of 320x240 take 1.2 GB, 2.4 with depth.
-
-    dataset: a sequence of (rgb uint8 (H, W, 3), labels (H, W)), arrays or tensors, or of RGBDFrame with labels.
-    rgb: uint8 tensor (N, H, W, 3); y: uint8 tensor (N, H, W). depth: keep the frames themselves, too, for a network
-    that looks at geometry; one that does not state its table's height gets that of the pixels labelled surface. Raises
-    ValueError if the dataset is empty or has no frames though depth is asked for, its images differ in size, or a label
-    is out of range.
-    """
-
-    def __init__(
-        self,
-        dataset: Sequence,
-        num_classes: int = len(CLASSES),
-        name: str = "dataset",
-        progress: bool = True,
-        depth: bool = False,
-    ):
-        require(name, len(dataset) > 0, "at least one image", "none")
-        self.frames: list[RGBDFrame] = []
-        for i in tqdm(range(len(dataset)), desc=f"reading {name}", unit="image", disable=not progress):
-            item = dataset[i]
-            rgb, y = image_and_labels(f"{name}[{i}]", item)
-            if i == 0:
-                self.rgb = torch.empty((len(dataset), *rgb.shape), dtype=torch.uint8)
-                self.y = torch.empty((len(dataset), *y.shape), dtype=torch.uint8)
-            require(
-                name, y.shape == self.y.shape[1:], f"images of one size, {tuple(self.y.shape[1:])}", f"{y.shape} at {i}"
-            )
-            self.rgb[i] = torch.from_numpy(rgb)
-            self.y[i] = torch.from_numpy(check_labels(f"{name}[{i}]", y, num_classes).astype(np.uint8))
-            if depth:
-                require(f"{name}[{i}]", isinstance(item, RGBDFrame), "an RGBDFrame, for its depth", type(item).__name__)
-                images = {"rgb": self.rgb[i].numpy(), "labels": self.y[i].numpy(), "instances": None}
-                self.frames.append(replace(item, **images, table_z=table_height(item)))
-
-    def pictures(self, chosen: Sequence[int]) -> list:
-        """The frames of these numbers, or their RGB images if depth was not kept: what an engine takes."""
-        return [self.frames[i] if self.frames else self.rgb[i].numpy() for i in chosen]
-
-    def __len__(self) -> int:
-        return len(self.y)
-
-    def class_counts(self, num_classes: int) -> np.ndarray:
-        """Pixels of each class; ignored ones are not counted."""
-        return sum(np.bincount(y.numpy().ravel(), minlength=256)[:num_classes] for y in self.y)
-
-
-def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
-    """Take the image and the labels out of a dataset's item."""
-    rgb, y = (item.rgb, item.labels) if isinstance(item, RGBDFrame) else item
-    require(name, y is not None, "a frame with labels", "one without")
-    rgb, y = np.ascontiguousarray(check_rgb(name, np.asarray(rgb))), np.asarray(y)
-    require(name, y.shape == rgb.shape[:2], f"labels of the size of the image, {rgb.shape[:2]}", y.shape)
-    return rgb, y
-
-
-def table_height(frame: RGBDFrame) -> float:
-    """Height of the table in the base frame, metres: the frame's own, else the median over the pixels labelled surface.
-
-    0 without any such pixel.
-
-    >>> frame = RGBDFrame(np.zeros((2, 2, 3), np.uint8), np.ones((2, 2)), np.eye(3), np.eye(4), np.ones((2, 2), int))
-    >>> table_height(frame)
-    1.0
-    """
-    if frame.table_z is not None:
-        return frame.table_z
-    heights = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[frame.labels == SURFACE, 2]
-    heights = heights[np.isfinite(heights)]
-    return float(np.median(heights)) if heights.size else 0.0
-
-
 def choose_device(device: str = "auto") -> torch.device:
     """Turn "auto", "cpu" or "cuda" into a device; raises ValueError if there is no such device here."""
     require("device", device in ("auto", "cpu", "cuda"), "auto, cpu or cuda", repr(device))
     if device == "cuda" and not torch.cuda.is_available():
         raise ValueError("device: expected a CUDA GPU and a CUDA build of PyTorch, got neither; use cpu or auto")
-    return torch.device("cuda" if device != "cpu" and torch.cuda.is_available() else "cpu")
+    if device == "cpu" or not torch.cuda.is_available():
+        return torch.device("cpu")
+    return torch.device("cuda", ranks.told("LOCAL_RANK"))
 
 
 def bf16_is_native(device: torch.device) -> bool:
@@ -197,6 +130,12 @@ def generator_for(*numbers: int) -> torch.Generator:
     """Make a generator whose stream belongs to these numbers, such as a seed and a step."""
     state = np.random.SeedSequence(numbers).generate_state(1, np.uint64)[0]
     return torch.Generator().manual_seed(int(state))
+
+
+@lru_cache(maxsize=2)  # this epoch's, and the next one's, which is read ahead
+def order_of_epoch(seed: int, epoch: int, count: int) -> torch.Tensor:
+    """The order in which an epoch shows its images."""
+    return torch.randperm(count, generator=generator_for(seed, 0, epoch))
 
 
 class DeferredInterrupt:
@@ -239,6 +178,7 @@ class Trainer:
         model = fresh_model(config) if model is None else model
         self.takes = TorchEngine(model).takes
         self.model = model.to(device=device, memory_format=torch.channels_last)
+        self.call = ranks.spread(self.model)
         self.optimiser = torch.optim.AdamW(
             self.model.parameters(), lr=config.lr, weight_decay=config.weight_decay, fused=True
         )
@@ -249,45 +189,61 @@ class Trainer:
         self.losses: list[float] = []  # of this epoch
         self.history: list[dict] = []
 
-    def batch_of_step(self, step: int) -> tuple[list[torch.Tensor], torch.Tensor]:
-        """The arrays (N, D, h, w) that the network takes, and labels (N, h, w): a function of the seed and the step."""
-        config, (H, W) = self.config, self.data.y.shape[1:]
+    def images_of_step(self, step: int) -> tuple[list[int], range]:
+        """The numbers of the images in a step's batch, and which of them, counted in the batch, this process makes."""
         epoch, place = divmod(step, self.batches)
-        order = torch.randperm(len(self.data), generator=generator_for(config.seed, 0, epoch))
-        chosen = order[place * config.batch : (place + 1) * config.batch]
+        order = order_of_epoch(self.config.seed, epoch, len(self.data))
+        chosen = order[place * self.config.batch : (place + 1) * self.config.batch].tolist()
+        return chosen, ranks.part(len(chosen))
+
+    def batch_of_step(self, step: int) -> tuple[list[torch.Tensor], torch.Tensor]:
+        """The arrays (N, D, h, w) that the network takes, and labels (N, h, w): a function of the seed and the step.
+
+        With several ranks, this one's part of them.
+        """
+        config, (H, W) = self.config, self.data.y.shape[1:]
+        whole, part = self.images_of_step(step)
+        chosen = whole[part.start : part.stop] or [whole[part.start]]  # to have shapes; it is cut off again
         if config.augment:
             size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
             generator = generator_for(config.seed, 1, step)
-            if self.data.frames:
-                *arrays, y = augment_frames([self.data.frames[i] for i in chosen.tolist()], size, generator)
+            if self.data.depth is not None:
+                *arrays, y = augment_frames(self.data.pictures(chosen), size, generator, part.start, len(whole))
             else:
-                *arrays, y = augment(self.data.rgb[chosen], self.data.y[chosen], size, generator)
+                *arrays, y = augment(
+                    self.data.rgb[chosen], self.data.y[chosen], size, generator, part.start, len(whole)
+                )
             mean, std = (torch.tensor(value).float().reshape(-1, 1, 1) for value in (self.takes.mean, self.takes.std))
             arrays[0] = arrays[0] * (255.0 / std) - mean / std
         else:
-            built = [self.takes.build(picture) for picture in self.data.pictures(chosen.tolist())]
+            built = [self.takes.build(picture) for picture in self.data.pictures(chosen)]
             arrays = [torch.from_numpy(np.stack(array)).permute(0, 3, 1, 2) for array in zip(*built, strict=True)]
             y = self.data.y[chosen]
+        arrays, y = [array[: len(part)] for array in arrays], y[: len(part)]
         edges = (0, -y.shape[2] % self.takes.divisor, 0, -y.shape[1] % self.takes.divisor)
         if not any(edges):
             return arrays, y
         return [F.pad(array, edges, mode="replicate") for array in arrays], F.pad(y, edges, value=IGNORE)
 
     def step(self) -> float:
-        """Make one optimiser step and return its loss."""
+        """Make one optimiser step and return its loss, over all ranks' images."""
         arrays, y = self.batch_of_step(self.done)
+        ahead, part = self.images_of_step(self.done + AHEAD)
+        self.data.read_ahead(ahead[part.start : part.stop])
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.learning_rate(self.done, self.total)
         self.model.train()
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
-            logits = logits_of(self.model(*(array.to(self.device) for array in arrays)))
-        loss = segmentation_loss(logits, y.to(self.device), self.weights)
+            logits = logits_of(self.call(*(array.to(self.device) for array in arrays)))
+        counted = (y != IGNORE).sum()
+        share = counted / ranks.total(counted).clamp(min=1)  # of the batch's pixels
+        loss = segmentation_loss(logits, y.to(self.device), self.weights) * share
         self.optimiser.zero_grad(set_to_none=True)
-        loss.backward()
+        (loss * ranks.place()[1]).backward()  # gradients are means over ranks, and the loss is their sum
         nn.utils.clip_grad_norm_(self.model.parameters(), 5.0)  # one odd batch must not undo an hour
         self.optimiser.step()
         self.done += 1
-        self.losses.append(loss.item())
+        self.losses.append(ranks.total(loss.cpu()).item())
         return self.losses[-1]
 
     def state(self) -> dict:
@@ -317,17 +273,23 @@ class Trainer:
         self.optimiser.load_state_dict(state["optimiser"])
         self.done, self.losses, self.history = state["done"], list(state["losses"]), list(state["history"])
 
+    def check_together(self) -> None:
+        """Raise ValueError unless all ranks go on from the same step."""
+        found, count = int(ranks.total(torch.tensor(self.done))), ranks.place()[1]
+        together = ranks.total(torch.tensor(int(self.done * count != found))) == 0
+        require("out", together, "a checkpoint that every process reads, or none", f"step {self.done} here alone")
+
 
 def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int, batch: int = 8) -> np.ndarray:
     """Pool one confusion matrix (C, C) over all images of `data`, whole, with the model in eval mode."""
     engine, n = TorchEngine(model), np.zeros((num_classes, num_classes), np.int64)
-    device = engine.weight().device
+    device, (rank, count) = engine.weight().device, ranks.place()
     with torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
-        for first in range(0, len(data), batch):
+        for first in range(batch * rank, len(data), batch * count):
             built = [engine.takes.build(p) for p in data.pictures(range(first, min(first + batch, len(data))))]
             z = engine.padded([np.stack(array) for array in zip(*built, strict=True)])
             n += confusion_matrix(data.y[first : first + batch].numpy(), z.argmax(axis=1), num_classes)
-    return n
+    return ranks.total(torch.from_numpy(n)).numpy()
 
 
 def train(
@@ -339,26 +301,37 @@ def train(
     device: str = "auto",
     progress: bool = True,
     model: nn.Module | None = None,
+    memory_gb: float | None = None,
 ) -> list[dict]:
     """Train a network and return its history: one dict per epoch (epoch, steps, loss, and mean_iou and iou by class).
 
     train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. model: a network
-    of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. In the folder `out` are
-    written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json; NAME.checkpoint.pt,
-    from which `resume` goes on. The checkpoint is written at Ctrl-C, too, which then raises KeyboardInterrupt and says
-    where it is. On one machine, with as many threads, a resumed run ends with the very weights of an undisturbed one.
+    of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. memory_gb: beyond so many
+    gigabytes, decoded images are kept in a file in `out`, not in memory; None is half of the machine's memory. In the
+    folder `out` are written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json;
+    NAME.checkpoint.pt, from which `resume` goes on. The checkpoint is written at Ctrl-C, too, which then raises
+    KeyboardInterrupt and says where it is. On one machine, with as many threads, a resumed run ends with the very
+    weights of an undisturbed one. Under torchrun, each process makes its part of every batch; the first one writes.
     Raises ValueError for data that do not fit, or a checkpoint of another configuration. Topics 03 and 05.
     """
-    out, where = Path(out), choose_device(device)
+    out, where, progress = Path(out), choose_device(device), progress and ranks.leads()
     model = fresh_model(config) if model is None else model
-    depth = "geometry" in TorchEngine(model).takes.arrays
-    train_data = in_memory(train_set, config.num_classes, "train_set", progress, depth)
-    val_data = None if val_set is None else in_memory(val_set, config.num_classes, "val_set", progress, depth)
-    checkpoint = out / f"{config.model}.checkpoint.pt"
-    trainer = Trainer(train_data, config, where, model)
-    if resume and checkpoint.is_file():
-        trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
+    with ranks.joined(where):
+        how = {"progress": progress, "depth": "geometry" in TorchEngine(model).takes.arrays, "memory_gb": memory_gb}
+        train_data = kept(train_set, config.num_classes, "train_set", out, **how)
+        val_data = None if val_set is None else kept(val_set, config.num_classes, "val_set", out, **how)
+        checkpoint = out / f"{config.model}.checkpoint.pt"
+        trainer = Trainer(train_data, config, where, model)
+        if resume and checkpoint.is_file():
+            trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
+        trainer.check_together()
+        run(trainer, val_data, checkpoint, progress)
+        return trainer.history
 
+
+def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, progress: bool) -> None:
+    """Make all steps that are left, and write what there is after each epoch and at Ctrl-C."""
+    config, out = trainer.config, checkpoint.parent
     bar = tqdm(total=trainer.total, initial=trainer.done, desc=config.model, unit="step", disable=not progress)
     with bar, DeferredInterrupt() as interrupt:
         while trainer.done < trainer.total:
@@ -367,16 +340,21 @@ def train(
             bar.set_postfix_str(progress_line(loss, trainer.history), refresh=False)
             if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:
                 finish_epoch(trainer, val_data, out)
-                write_checkpoint(checkpoint, trainer.state())
-            if interrupt.pending:
-                write_checkpoint(checkpoint, trainer.state())
+                write_state(trainer, checkpoint)
+            if ranks.total(torch.tensor(int(interrupt.pending))) > 0:  # all stop after the same step
+                write_state(trainer, checkpoint)
                 raise KeyboardInterrupt(
                     f"stopped after {trainer.done} of {trainer.total} steps; the same command goes on from {checkpoint}"
                 )
     if val_data is not None and "weights_undone" not in trainer.history[-1]:
         finish_run(trainer, val_data, out)
+        write_state(trainer, checkpoint)
+
+
+def write_state(trainer: Trainer, checkpoint: Path) -> None:
+    """Write all that another run needs to go on from here; the first rank does."""
+    if ranks.leads():
         write_checkpoint(checkpoint, trainer.state())
-    return trainer.history
 
 
 def finish_run(trainer: Trainer, val_data: ImagesInMemory, out: Path) -> None:
@@ -388,7 +366,9 @@ def finish_run(trainer: Trainer, val_data: ImagesInMemory, out: Path) -> None:
 
 
 def save_weights(model: nn.Module, trainer: Trainer, out: Path) -> None:
-    """Write a model as the run's weights, with the last row of the history, and the history."""
+    """Write a model as the run's weights, with the last row of the history, and the history; the first rank does."""
+    if not ranks.leads():
+        return
     name = trainer.config.model
     save_model(model, out / f"{name}.pt", **trainer.history[-1], config=asdict(trainer.config))
     write_atomically(out / f"{name}.history.json", json.dumps(trainer.history, indent=1).encode())
@@ -419,11 +399,14 @@ def undo_weights(
     return best
 
 
-def in_memory(dataset, num_classes: int, name: str, progress: bool = True, depth: bool = False) -> ImagesInMemory:
-    """Read a dataset into memory, unless it is there already."""
+def kept(
+    dataset, num_classes: int, name: str, out: Path, progress: bool, depth: bool, memory_gb: float | None
+) -> ImagesInMemory:
+    """Read a dataset into memory, or into a file in `out` if it is too large, unless it was read already."""
     if not isinstance(dataset, ImagesInMemory):
-        return ImagesInMemory(dataset, num_classes, name, progress, depth)
-    require(name, not depth or dataset.frames, "images with depth", "some that were read without")
+        file = out / f".{name}.images" if too_large(name, dataset, depth, memory_gb) else None
+        return ImagesInMemory(dataset, num_classes, name, progress, depth, file)
+    require(name, not depth or dataset.depth is not None, "images with depth", "some that were read without")
     return dataset
 
 

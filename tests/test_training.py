@@ -13,10 +13,19 @@ from torch import nn
 
 import data_gen
 from labkit.frame import RGBDFrame
+from labkit.geometry.images import shared_map, table_height
 from labkit.inference import NetworkInput
 from labkit.losses import class_weights, segmentation_loss
 from labkit.network import SmallSegNet, load_model, predict_probabilities
-from labkit.support.augment import augment, random_colour, random_crop, random_flip, random_noise, random_sharpness
+from labkit.support.augment import (
+    Draws,
+    augment,
+    random_colour,
+    random_crop,
+    random_flip,
+    random_noise,
+    random_sharpness,
+)
 from labkit.training import (
     ImagesInMemory,
     TrainConfig,
@@ -24,7 +33,6 @@ from labkit.training import (
     bf16_is_native,
     choose_device,
     evaluate,
-    table_height,
     train,
     undo_weights,
 )
@@ -69,9 +77,8 @@ def assert_same_weights(a: dict, b: dict):
         assert torch.equal(weight, b[name]), name
 
 
-@pytest.fixture
-def generator():
-    return torch.Generator().manual_seed(3)
+def draws(count: int) -> Draws:
+    return Draws(torch.Generator().manual_seed(3), count)
 
 
 def batch(count: int = 6, height: int = 20, width: int = 28) -> tuple[torch.Tensor, torch.Tensor]:
@@ -85,9 +92,9 @@ def batch(count: int = 6, height: int = 20, width: int = 28) -> tuple[torch.Tens
 # Augmentation
 
 
-def test_a_crop_is_a_window_of_the_image_and_of_its_labels(generator):
+def test_a_crop_is_a_window_of_the_image_and_of_its_labels():
     rgb, y = batch()
-    x, cut = random_crop(rgb, y, (9, 11), generator)
+    x, cut = random_crop(rgb, y, (9, 11), draws(6))
     assert x.shape == (6, 3, 9, 11) and cut.shape == (6, 9, 11)
     red = (x[:, 0] * 255.0).round().to(torch.uint8)
     assert torch.equal(red % 5, cut)
@@ -100,34 +107,33 @@ def test_a_crop_is_a_window_of_the_image_and_of_its_labels(generator):
 
 
 @pytest.mark.parametrize("zoom", [0.8, 1.25])
-def test_zoom_keeps_image_and_labels_aligned(generator, zoom):
+def test_zoom_keeps_image_and_labels_aligned(zoom):
     """A bright square on black, labelled 1: after zooming, the pixels brighter than half are those labelled 1."""
     rgb, y = torch.zeros(3, 40, 40, 3, dtype=torch.uint8), torch.zeros(3, 40, 40, dtype=torch.uint8)
     rgb[:, 14:27, 13:26], y[:, 14:27, 13:26] = 255, 1
-    x, cut = random_crop(rgb, y, (32, 32), generator, zoom)
+    x, cut = random_crop(rgb, y, (32, 32), draws(3), zoom)
     wrong = (x[:, 0] > 0.5) != (cut == 1)
     assert cut.sum() / 3 == pytest.approx(169 * zoom**2, rel=0.3)
     assert wrong.float().mean() < 0.01
 
 
-def test_a_flip_mirrors_image_and_labels_and_twice_is_none(generator):
+def test_a_flip_mirrors_image_and_labels_and_twice_is_none():
     rgb, y = batch(count=16)
     x = rgb.permute(0, 3, 1, 2).float()
-    state = generator.get_state()
-    x1, y1 = random_flip(x.clone(), y.clone(), generator)
+    x1, y1 = random_flip(x.clone(), y.clone(), draws(16))
     flipped = [i for i in range(16) if not torch.equal(y1[i], y[i])]
     assert 0 < len(flipped) < 16
     for i in flipped:
         assert torch.equal(x1[i], x[i].flip(-1)) and torch.equal(y1[i], y[i].flip(-1))
-    x2, y2 = random_flip(x1, y1, generator.set_state(state))
+    x2, y2 = random_flip(x1, y1, draws(16))
     assert torch.equal(x2, x) and torch.equal(y2, y)
 
 
 @pytest.mark.parametrize("change", [random_colour, random_sharpness, random_noise])
-def test_pixel_changes_change_every_image_otherwise_and_move_nothing(generator, change):
+def test_pixel_changes_change_every_image_otherwise_and_move_nothing(change):
     x = torch.zeros(8, 3, 16, 16)
     x[:, :, 5, 9] = 1.0
-    changed = change(x.clone(), generator)
+    changed = change(x.clone(), draws(8))
     assert changed.shape == x.shape
     assert len({round(float(image.std()), 6) for image in changed}) > 3
     assert all(int(image.sum(dim=0).argmax()) == 5 * 16 + 9 for image in changed)
@@ -148,9 +154,9 @@ def test_augmented_batch_is_a_function_of_the_generator_and_keeps_255():
 
 
 @pytest.mark.bad_input
-def test_a_window_larger_than_the_image(generator):
+def test_a_window_larger_than_the_image():
     with pytest.raises(ValueError, match="size: expected a window within"):
-        random_crop(*batch(), (21, 8), generator)
+        random_crop(*batch(), (21, 8), draws(6))
 
 
 # A run
@@ -311,6 +317,25 @@ def test_frames_and_tensors_are_datasets_too():
         data = ImagesInMemory(dataset, progress=False)
         assert np.array_equal(data.rgb, rgb) and np.array_equal(data.y, y)
     np.testing.assert_array_equal(data.class_counts(4), [(y == c).sum() for c in range(4)])
+
+
+@pytest.mark.parametrize("depth", [False, True])
+def test_images_beyond_the_memory_are_trained_on_from_a_file_with_the_same_result(depth, tmp_path, monkeypatch):
+    data = (frames if depth else scenes)(5)
+    config = replace(CONFIG, model="unet_rgbd" if depth else "smallsegnet", epochs=2, crop=None)
+    maps, ahead = [], []
+    plain = ImagesInMemory.read_ahead
+    monkeypatch.setattr("labkit.geometry.images.shared_map", lambda *a: maps.append(shared_map(*a)) or maps[-1])
+    monkeypatch.setattr(
+        ImagesInMemory, "read_ahead", lambda self, chosen: ahead.append(len(chosen)) or plain(self, chosen)
+    )
+    histories = [train(data, data[:2], config, tmp_path / str(gb), progress=False, memory_gb=gb) for gb in (1.0, 0.0)]
+    assert str(histories[0]) == str(histories[1])
+    pixels = data[0].labels.size if depth else data[0][1].size
+    assert [len(map) for map in maps] == [count * ((8 * pixels + 208) if depth else 4 * pixels) for count in (5, 2)]
+    assert sum(ahead) > 0
+    assert_same_weights(*(weights_of(tmp_path / str(gb), config.model) for gb in (1.0, 0.0)))
+    assert all(file.name.startswith(config.model) for file in (tmp_path / "0.0").iterdir()), "the file has gone"
 
 
 # Bad input

@@ -64,18 +64,24 @@ def train(
     ] = None,
     epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
     lr: Annotated[float | None, typer.Option(help="Highest learning rate; the model's recipe if not given.")] = None,
+    batch: Annotated[int | None, typer.Option(help="Images in a batch; the model's recipe if not given.")] = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
     seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in OUT, if there is one.")] = True,
+    memory: Annotated[
+        float | None,
+        typer.Option(help="Gigabytes for images; more are kept in OUT. Half of the machine's if not given."),
+    ] = None,
 ) -> None:
-    """Train a network; stopped with Ctrl-C, the same command goes on where it was."""
+    """Train a network; stopped with Ctrl-C, the same command goes on where it was. Under torchrun, on many cores."""
     from dataclasses import replace
 
     import data_gen
     from labkit import training
     from labkit.apps.own_data import PictureFolder
     from labkit.network import architecture_of, load_model, weights_path
+    from labkit.support import ranks
 
     network = None if init is None else load_model(weights_path(init))
     model = model or ("unet" if network is None else architecture_of(network))
@@ -84,7 +90,8 @@ def train(
     if network is not None and architecture_of(network) != model:
         raise ValueError(f"init: expected weights of {model}, got {init} of {architecture_of(network)}")
     recipe = training.RECIPES[model] if network is None else training.fine_tuning(model, validated=val is not None)
-    asked = {name: value for name, value in (("epochs", epochs), ("lr", lr)) if value is not None}
+    given = {"epochs": epochs, "lr": lr, "batch": batch}
+    asked = {name: value for name, value in given.items() if value is not None}
     config = replace(recipe, seed=seed, **asked)
 
     def opened(path: Path):
@@ -93,13 +100,15 @@ def train(
     val_set = None if val is None else opened(val)
     train_set = data_gen.Joined([opened(path) for path in data], each=scenes)
     try:
-        history = training.train(train_set, val_set, config, out, resume, device, model=network)
+        history = training.train(train_set, val_set, config, out, resume, device, model=network, memory_gb=memory)
     except KeyboardInterrupt as stop:  # it says where the checkpoint is
-        typer.echo(f"labkit: {stop}", err=True)
+        if ranks.leads():
+            typer.echo(f"labkit: {stop}", err=True)
         raise typer.Exit(130) from stop
     last = history[-1]
     scores = f", validation mIoU {last['mean_iou']:.3f}" if "mean_iou" in last else ""
-    typer.echo(f"{out / f'{model}.pt'}: {last['epoch']} epochs, loss {last['loss']:.3f}{scores}")
+    if ranks.leads():
+        typer.echo(f"{out / f'{model}.pt'}: {last['epoch']} epochs, loss {last['loss']:.3f}{scores}")
 
 
 @app.command()

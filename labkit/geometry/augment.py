@@ -17,7 +17,7 @@ from labkit.frame import RGBDFrame
 from labkit.geometry import geometry_channels, mirrored
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import IGNORE, OBSTACLE, TARGET
-from labkit.support.augment import random_colour, random_noise, random_sharpness
+from labkit.support.augment import Draws, random_colour, random_noise, random_sharpness
 
 
 def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generator) -> RGBDFrame:
@@ -106,12 +106,13 @@ def random_size(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     return replace(frame, T_base_cam=T, depth=frame.depth * np.float32(factor), table_z=0.0)
 
 
-def random_hue(x: Float[torch.Tensor, "N 3 H W"], generator: torch.Generator) -> Float[torch.Tensor, "N 3 H W"]:
+def random_hue(x: Float[torch.Tensor, "N 3 H W"], draws: Draws) -> Float[torch.Tensor, "N 3 H W"]:
     """Swap the colours of some images, take them from some, and the whole picture from a few."""
-    kind = torch.rand(len(x), generator=generator)
-    for i, share in enumerate(kind.tolist()):
-        if share < 0.3:
-            x[i] = x[i][torch.randperm(3, generator=generator)]
+    whole = torch.rand(draws.whole, generator=draws.generator).tolist()
+    orders = [torch.randperm(3, generator=draws.generator) if share < 0.3 else None for share in whole]
+    for i, (share, order) in enumerate(zip(whole[draws.rows], orders[draws.rows], strict=True)):
+        if order is not None:
+            x[i] = x[i][order]
         elif share < 0.4:
             x[i] = x[i].mean(dim=0, keepdim=True)
         elif share < 0.46:
@@ -120,12 +121,19 @@ def random_hue(x: Float[torch.Tensor, "N 3 H W"], generator: torch.Generator) ->
 
 
 def augment_frames(
-    frames: Sequence[RGBDFrame], size: tuple[int, int], generator: torch.Generator
+    frames: Sequence[RGBDFrame],
+    size: tuple[int, int],
+    generator: torch.Generator,
+    first: int = 0,
+    whole: int | None = None,
 ) -> tuple[Float[torch.Tensor, "N 3 h w"], Float[torch.Tensor, "N 7 h w"], UInt8[torch.Tensor, "N h w"]]:
-    """Make a training batch of labelled frames: colours and geometry channels in 0..1, and labels."""
+    """Make a training batch of labelled frames: colours and geometry channels in 0..1, and labels.
+
+    first, whole: as for `labkit.support.augment.augment`.
+    """
     seed = int(torch.randint(2**62, (), generator=generator))
     rgb, geometry, y = [], [], []
-    for i, frame in enumerate(frames):
+    for i, frame in enumerate(frames, start=first):
         rng = np.random.default_rng([seed, i])
         seen = random_size(random_calibration(random_view(frame, size, rng), rng), rng)
         depth = random_sensor(seen.depth, rng)
@@ -134,6 +142,7 @@ def augment_frames(
             images = [mirrored(image) for image in images]
         for batch, image in zip((rgb, geometry, y), images, strict=True):
             batch.append(torch.from_numpy(image).permute(2, 0, 1))
-    x = random_colour(torch.stack(rgb).float().div_(255.0), generator)
-    x = random_hue(random_noise(random_sharpness(x, generator), generator), generator).clamp_(0.0, 1.0)
+    draws = Draws(generator, whole or len(frames), first, len(frames))
+    x = random_colour(torch.stack(rgb).float().div_(255.0), draws)
+    x = random_hue(random_noise(random_sharpness(x, draws), draws), draws).clamp_(0.0, 1.0)
     return x, torch.stack(geometry), torch.stack(y)[:, 0]
