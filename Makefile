@@ -10,6 +10,7 @@
 #   make site    set up .venv-site, then a static site of lessons, labs, guides and reference in out/site
 #   make test-site  its links, its words for figures, and what axe-core says of it
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
+#   make evidence write docs/evidence.md, README's promises and what shows them, from results that are there
 #   make mutants how many wrong answers that nobody wrote down a check can name, by lab (an hour)
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
 #   make everywhere  the same on two Debians, with Python 3.11 and 3.13; what both make of fixed seeds is compared
@@ -20,7 +21,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench mutants fresh everywhere clean site test-site
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench evidence mutants fresh everywhere clean site test-site
 
 BIN := .venv/bin
 ARGS ?=
@@ -52,6 +53,9 @@ test-ros2: .venv-ros2/installed
 
 bench: .venv-bench/installed
 	.venv-bench/bin/python -m tests.bench.run $(ARGS)
+
+evidence: .venv/installed
+	$(BIN)/python tests/evidence.py
 
 mutants: .venv/installed
 	PYTHONPATH=. $(BIN)/python tests/measure_diagnosis.py $(ARGS)
