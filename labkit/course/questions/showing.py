@@ -51,7 +51,7 @@ def size(value: object) -> str:
 def written(value: object) -> str:
     """A number, array or tuple in one line; "..." for what is too large.
 
-    >>> written((np.array([[1.0, 0.5], [0.0, np.nan]]), True))
+    >>> written((np.array([[1.0, 0.5], [-0.0, np.nan]]), True))
     '([[1, 0.5], [0, nan]], True)'
     """
     if isinstance(value, tuple | list):
@@ -64,7 +64,7 @@ def written(value: object) -> str:
 def number(value: object) -> str:
     """A number in five digits."""
     if isinstance(value, float | np.floating) or (isinstance(value, np.ndarray) and value.dtype.kind == "f"):
-        return f"{float(value):.5g}"
+        return f"{float(value) + 0.0:.5g}"  # + 0.0: -0 is 0
     return str(value)
 
 

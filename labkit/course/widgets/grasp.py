@@ -150,8 +150,9 @@ def visible_centroid() -> Explorer:
             xlim=(-60, 95), ylim=(-55, 95), aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="from the side"
         )
         side.legend(fontsize=7, loc="upper left")
-        for axis, name, colour in ((0, "sideways, to the camera", "tab:blue"), (2, "upwards", "tab:green")):
-            curve.plot(ELEVATIONS, offsets[:, axis], color=colour, label=name)
+        lines = ((0, "sideways, to the camera", "tab:blue", "-"), (2, "upwards", "tab:green", "--"))
+        for axis, name, colour, line in lines:
+            curve.plot(ELEVATIONS, offsets[:, axis], line, color=colour, label=name)
             curve.plot(elevation, offsets[now, axis], "o", color=colour)
         curve.set(xlabel="elevation of the camera (degrees)", ylabel="visible centroid is off by (mm)", ylim=(-5, None))
         curve.set_title(f"{np.hypot(offsets[now, 0], offsets[now, 2]):.0f} mm off in all")

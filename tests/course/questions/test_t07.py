@@ -1,10 +1,13 @@
 """The references of lab 07 equal the kit's functions, and what its questions accept is really a right answer."""
 
+import warnings
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from labkit import geometry, grasp
 from labkit.course.questions.question import of_topic
+from labkit.course.questions.run import judge
 from labkit.course.questions.t07_grasp import cloud
 from labkit.grasp.planner import HAND_MARGIN, TIP_CLEARANCE
 
@@ -90,3 +93,17 @@ def test_each_bound_of_the_height_is_the_one_that_counts_in_some_case():
     for P, table_z, palm, _, clearance in (QUESTIONS["grasp_height"].inputs(rng) for _ in range(30)):
         counts.add(int(np.argmax([P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance])))
     assert counts == {0, 1, 2}
+
+
+def test_looking_for_a_hint_warns_of_nothing():
+    """`canonical` multiplies what wrong outputs hold, infinity and 0 among it."""
+
+    def closing_not_square_to_the_approach(position, approach, closing):
+        y, z = (v / np.linalg.norm(v) for v in (closing - (closing @ approach) * approach, approach))
+        x = np.cross(y, z)
+        return np.vstack([np.column_stack([x / np.linalg.norm(x), y, z, position]), np.eye(4)[3]])
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert judge(QUESTIONS["grasp_pose"], closing_not_square_to_the_approach, seed=0).hint
+    assert not told

@@ -67,3 +67,14 @@ def cross_entropy_of_all_classes(z, y):
     counted = y != 255
     log_p = z[counted] - np.logaddexp.reduce(z[counted], axis=-1, keepdims=True)
     return -float(log_p.sum())
+
+
+@wrong(QUESTION, "The loss is a sum over the pixels. Yours is divided by how many are counted, and fails if none is.")
+def cross_entropy_mean_of_counted(z, y):
+    return -float(np.mean(true_log_probabilities(z, y)))
+
+
+@wrong(QUESTION, "A pixel labelled 255 adds nothing at all. Yours leaves out its true logit and still adds its lse.")
+def cross_entropy_with_ignored_lse(z, y):
+    true = np.where(y[..., None] == np.arange(z.shape[-1]), z, 0.0)
+    return float(np.logaddexp.reduce(z, axis=-1).sum() - true.sum())

@@ -79,3 +79,10 @@ def one_too_far(kernels, strides, paddings, u):
 def padding_added(kernels, strides, paddings, u):
     """Padding moves the window to the wrong side."""
     return back(kernels, strides, -np.asarray(paddings), u)
+
+
+@wrong(QUESTION, "Each layer makes the window wider: walk the last pixel back on its own.")
+def window_of_the_first_layer(kernels, strides, paddings, u):
+    """Only the first pixel is walked back; the first layer's width is added."""
+    first = back(kernels, strides, paddings, u)[0]
+    return first, first + int(kernels[0]) - 1

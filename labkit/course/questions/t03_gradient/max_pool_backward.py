@@ -85,3 +85,9 @@ def clipped_like_a_relu(x, g):
 def largest_of_the_image(x, g):
     """Only the image's largest pixel passes anything."""
     return (x == x.max()) * to_all_four(x, g)
+
+
+@wrong(QUESTION, "np.tile repeats the whole image. np.repeat repeats each entry, so that it fills its own block.")
+def tiled(x, g):
+    """Maxima and gradients put beside pixels of other blocks."""
+    return (x == np.tile(blocks(x).max(axis=2), (2, 2))) * np.tile(g, (2, 2))

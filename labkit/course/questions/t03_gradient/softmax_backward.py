@@ -65,3 +65,9 @@ def without_the_factor(p, g):
 def plain_mean(p, g):
     """An unweighted mean of the gradients."""
     return p * (g - g.mean(axis=-1, keepdims=True))
+
+
+@wrong(QUESTION, "For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: where is the factor p[k]?")
+def others_unweighted(p, g):
+    """The terms with k other than c lack p[k]."""
+    return p * (1.0 - p) * g - p * (g.sum(axis=-1, keepdims=True) - g)

@@ -55,6 +55,11 @@ def yaw_of(axis):
     return np.arctan2(axis[1], axis[0])
 
 
+@wrong(QUESTION, "That is the direction in which the cloud is longest. The jaws close across it.")
+def longest_direction(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 1])
+
+
 @wrong(QUESTION, "Check Sigma @ v against w * v for the v that you took: is an eigenvector a row or a column?")
 def axes_as_rows(Sigma):
     return yaw_of(np.linalg.eigh(Sigma)[1][0])

@@ -53,7 +53,7 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "The centroid does not know the table nor the palm: how low may the tips go, and who stops them?")
+@wrong(QUESTION, "The centroid knows neither the table nor the palm: how low may the tips go, and what stops them?")
 def height_of_centroid(P, table_z, palm, tips, clearance):
     return P[:, 2].mean()
 
@@ -66,6 +66,11 @@ def palm_forgotten(P, table_z, palm, tips, clearance):
 @wrong(QUESTION, "Only the upper part was seen, and you reach below it: nobody knows what is there.")
 def unseen_depth(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, table_z + clearance) + tips
+
+
+@wrong(QUESTION, "All three bounds are heights of the tips, and you add tips to the table's alone.")
+def origin_from_the_table_alone(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance + tips)
 
 
 @wrong(QUESTION, "Each bound says: not lower than this. Which of them satisfies all?")

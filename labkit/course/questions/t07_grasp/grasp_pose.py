@@ -96,3 +96,10 @@ def approach_bent(position, approach, closing):
 def projected_on_a_long_vector(position, approach, closing):
     y, z = unit(closing - (closing @ approach) * approach), unit(approach)
     return pose(np.cross(y, z), y, z, position)
+
+
+@wrong(QUESTION, "y gets shorter when the part along z is taken off: which length has it at the end?")
+def closing_left_short(position, approach, closing):
+    y, z = unit(closing), unit(approach)
+    y = y - (y @ z) * z
+    return pose(np.cross(y, z), y, z, position)

@@ -98,3 +98,9 @@ def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     inside = (np.abs(x) <= half) & (np.abs(y) <= width / 2 + thickness) & (z <= tips)
     return int(inside.sum())
+
+
+@wrong(QUESTION, "The fingers reach up from the tips without end: a point with z far below 0 is in their way, too.")
+def near_the_tips_alone(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, np.abs(z), *boxes)

@@ -53,3 +53,9 @@ def height_counted_too(T_base_grasp, middle):
 def turned_the_wrong_way(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3] @ (middle - T_base_grasp[:3, 3]))
     return off[1], off[0]
+
+
+@wrong(QUESTION, "The hand may lean: the error and its axes have three components each, and you drop the third.")
+def seen_from_above(T_base_grasp, middle):
+    off = 1000.0 * np.abs((middle - T_base_grasp[:3, 3])[:2] @ T_base_grasp[:2, :2])
+    return off[1], off[0]
