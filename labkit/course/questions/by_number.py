@@ -232,7 +232,10 @@ def no_number(view: View) -> str:
     if not wrong.any() or np.isfinite(g[wrong]).any():
         return ""
     if np.isnan(g[wrong]).all():
-        return "What is wrong is NaN: 0 / 0, the mean of nothing, or the logarithm or root of a negative number."
+        return (
+            "What is wrong is NaN: 0 / 0, infinite over or minus infinite (an exponential too large), "
+            "the mean of nothing, or the logarithm or root of a negative number."
+        )
     return "What is wrong is infinite: something is divided by 0, or grows without end."
 
 

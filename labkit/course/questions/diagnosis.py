@@ -50,10 +50,10 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
     yield from explained(question, cases, outputs)
+    yield from tuple_in_another_order(question, cases, outputs)
     views = list(views_of(question, cases, outputs))
     for name, view in views:
         yield from related(name, view, (*ARRANGED, *NUMBERS, *COMBINED))
-    yield from tuple_in_another_order(question, cases, outputs)
     yield from another_form(question, cases, outputs)
     tried = Tried(question, cases, outputs)
     for says, change in changes(question, cases[0].args):
@@ -118,7 +118,7 @@ def explained(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     failed = tuple(np.array(float(r)) for r in raised)
     args = tuple(case.args for case in cases)
     view = View(tuple(np.array(0.0) for _ in cases), failed, args, question.parameters, 0.0, 0.0)
-    several = 1 < sum(raised) < len(raised) - 1  # else it may be an accident
+    several = 2 < sum(raised) < len(raised) - 2  # else it may be an accident
     where = next((where for where, _ in places(view) if where.startswith("in cases")), "")
     if says and where and (several or "is 255" in where):
         yield Sentence("exception", f"{says} It fails only {where}.")
@@ -157,7 +157,8 @@ def local(name: str, view: View) -> Iterator[Sentence]:
     """The relations that hold at some places outside of which all is right."""
     for where, masks in (*places(view), *wherever_wrong(view)):
         relations = (*NUMBERS, *COMBINED) if where.startswith(("in column", "in entry")) else NUMBERS
-        yield from related(f"{name}It is wrong only {where}. There: ", view.at(masks), relations)
+        wrong = f"It is wrong only {where}. There: " if where != "in some numbers" else "Where it is wrong: "
+        yield from related(name + wrong, view.at(masks), relations)
 
 
 def directed(name: str, view: View) -> Iterator[Sentence]:

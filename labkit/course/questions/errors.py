@@ -131,7 +131,7 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
 # Exceptions that one sentence explains; {1} is what the first bracket of the pattern holds.
 TABLE = {
     r"IndexError: (?:arrays used as indices|only integers|.*is not a valid index)|TypeError: \w+ indices must be": (
-        "An index must be whole numbers or truth values: convert it with .astype(int), or compare."
+        "An index must be whole numbers or truth values: is it the array that you mean? If so: .astype(int), or ==."
     ),
     r"IndexError: boolean index did not match .*?axis (\d+); .*?is (\d+) but .*?is (\d+)": (
         "A mask of {3} entries along axis {1} selects from an array of {2}: whose mask is it?"
@@ -165,7 +165,8 @@ TABLE = {
         "{1} numbers do not fill the shape ({2}): is a part of it longer than you think, padding perhaps?"
     ),
     r"ValueError: The truth value of an array|ValueError: The truth value of a": (
-        "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: use np.where, &, | or np.minimum."
+        "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: is a sum missing? For arrays there are "
+        "np.where, &, | and np.minimum."
     ),
     r"ValueError: (?:'?axes?'?.*match|axes don't match|repeated axis|duplicate value in 'axis')": (
         "The list of axes must name each axis of the array once."

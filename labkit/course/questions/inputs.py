@@ -115,19 +115,22 @@ def without_rotation(T: np.ndarray) -> np.ndarray | None:
 
 def changes(question: Question, args: tuple) -> Iterator[tuple[str, Change]]:
     """Sentences and changes of the arguments, for arguments of these kinds."""
-    names = question.parameters
+    names, single = question.parameters, []
+    for i, (name, value) in enumerate(zip(names, args, strict=True)):
+        number = isinstance(value, int | float | np.generic)
+        table = ARRAYS if isinstance(value, np.ndarray) else NUMBERS if number else {}
+        for rank, (says, change) in enumerate(table.items()):
+            says = says.replace(" row", " entry") if np.ndim(value) == 1 else says
+            single.append((rank, f"Your output is right as if {name} {says}.", at(i, change)))
+    for _, words, change in sorted(single, key=lambda entry: entry[0]):  # what is likely first, of any argument
+        yield words, change
     for i, (name, value) in enumerate(zip(names, args, strict=True)):
         if isinstance(value, np.ndarray):
-            for says, change in ARRAYS.items():
-                yield f"Your output is right as if {name} {says}.", at(i, change)
             last = value.shape[-1] if value.ndim else 0
             for a in range(last if 1 < last <= 4 else 0):
                 for b in range(a):
                     words = f"Your output is right as if columns {b} and {a} of {name} were exchanged."
                     yield words, at(i, exchange_columns(a, b))
-        elif isinstance(value, int | float | np.generic):
-            for says, change in NUMBERS.items():
-                yield f"Your output is right as if {name} {says}.", at(i, change)
     alike = [i for i, v in enumerate(args) if isinstance(v, np.ndarray) and v.ndim and v.shape == first_shape(args)]
     if len(alike) > 1:
         who = " and ".join(names[i] for i in alike)

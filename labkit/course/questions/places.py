@@ -18,10 +18,11 @@ def places(view: View) -> Iterator[tuple[str, Masks]]:
     if not any(w.any() for w in wrong):
         return
     found = []
-    for name, masks in (*in_the_array(view), *by_value(view), *by_argument(view)):
+    in_wrong = [(name, masks, [w.any() for w in wrong]) for name, masks in in_the_array(view)]
+    in_all = [(name, masks, [True] * len(wrong)) for name, masks in (*by_value(view), *by_argument(view))]
+    for name, masks, looked_at in (*in_wrong, *in_all):
         inside = all(not (w & ~m).any() for w, m in zip(wrong, masks, strict=True))
-        some_outside = any((~m).any() for m in masks)
-        if inside and some_outside:
+        if inside and any((~m).any() for m, look in zip(masks, looked_at, strict=True) if look):
             found.append((sum(int(m.sum()) for m in masks), name, masks))
     yield from ((name, masks) for _, name, masks in sorted(found, key=lambda entry: entry[0]))
 
@@ -95,8 +96,11 @@ VALUES: dict[str, Callable] = {
 
 
 def by_value(view: View) -> Iterator[tuple[str, Masks]]:
-    """Places by what is expected there."""
+    """Places by what is expected there; of truth values, True and False."""
+    truths = all(e.dtype.kind == "b" for e in view.expected)
     for name, mask in VALUES.items():
+        if truths and name not in ("where True is expected", "where False is expected"):
+            continue
         with np.errstate(all="ignore"):
             yield name, [np.asarray(mask(e), bool) for e in view.expected]
 
@@ -141,7 +145,8 @@ def by_argument(view: View) -> Iterator[tuple[str, Masks]]:
                     yield f"where {name} {says}", [spread(mark(v), e) for e, v in pairs]
                 elif all(e.shape == v.shape[: e.ndim] and e.ndim for e, v in pairs):
                     yield f"where {name} {says} somewhere", [mark(v).reshape(*e.shape, -1).any(-1) for e, v in pairs]
-                if says in ("is 255", "is NaN"):  # the others are true of some cases by accident
+                labels = all(((v < 32) | (v == 255)).all() for v in values)  # not colours, in which 255 is no mark
+                if says == "is NaN" or (says == "is 255" and labels):  # the others are true of some cases by accident
                     name_it = f"in cases where {name} {says} somewhere"
                     yield name_it, [np.full(e.shape, bool(mark(v).any())) for e, v in pairs]
 

@@ -11,7 +11,9 @@ from labkit.course.questions import diagnosis
 from labkit.course.questions.comparison import expected_cases
 from labkit.course.questions.diagnosis import sentences
 from labkit.course.questions.errors import explain
+from labkit.course.questions.places import places
 from labkit.course.questions.question import Question, find
+from labkit.course.questions.relations import View
 from labkit.course.questions.run import Printed, call, judge, run
 
 
@@ -95,6 +97,14 @@ def test_no_relation_is_said_that_does_not_hold_in_every_case():
         assert wrong.sentence is None or ("every case" not in wrong.hint and "factor of 2" not in wrong.hint), (
             wrong.hint
         )
+
+
+def test_what_says_nothing_is_not_said():
+    """A column that is the whole array is no place; and zeros are the right values times any tiny number."""
+    column, square = np.arange(4.0)[:, None], np.ones((2, 2))
+    view = View((column, square), (column + 9, square), ((), ()), (), 1e-6, 1e-6)
+    assert "in the first column" not in dict(places(view))
+    assert not View((square,), (0 * square,), ((),), (), 1e-6, 1e-6).gives(lambda e: 1e-60 * e)
 
 
 def test_a_right_answer_is_told_nothing():

@@ -74,6 +74,11 @@ def stamps_of_32_bits(a, b, slop):
     return find("08_node.pair_stamps").reference(a, b, slop)
 
 
+def within_numpys_tolerance(reference, other, tolerance):
+    _, changed, left_open = find("09_other_stacks.engine_contract").reference(reference, other, tolerance)
+    return np.allclose(reference, other, atol=tolerance), changed, left_open
+
+
 def gradient_by_one_maximum(z, y):
     e = np.exp(z - z.max())
     p = e / e.sum(axis=-1, keepdims=True)
@@ -91,6 +96,7 @@ ACCEPTED = {
     "09_other_stacks.make_blob": blob_of_doubles,
     "08_node.pair_stamps": stamps_of_32_bits,
     "09_other_stacks.hsv_mask": every_channel_wraps,
+    "09_other_stacks.engine_contract": within_numpys_tolerance,
 }
 
 
@@ -133,6 +139,14 @@ def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
     return n
 
 
+def means_exchanged(z, y, w):
+    return find("05_class_weights.two_means").reference(z, y, w)[::-1]
+
+
+def without_the_mean(features, mean, covariance, allowed):
+    return find("09_other_stacks.choose_region").reference(features, 0 * mean, covariance, allowed)
+
+
 NAMED = [
     ("06_back_projection.cropped_intrinsics", rows_from_one, "entry at [1, 2]. There: Yours are too large by 1"),
     ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "The sign is the other one"),
@@ -141,9 +155,31 @@ NAMED = [
     ("09_other_stacks.measure_pieces", centroid_v_u, "Output 2 of 3"),
     ("07_grasp.slip_across", in_metres, "1000"),
     ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
+    ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
+    ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
 ]
 
 
 @pytest.mark.parametrize("name, answer, says", NAMED)
 def test_what_was_only_counted_is_named(name, answer, says):
     assert says in judge(find(name), answer, seed=0).hint
+
+
+def not_summed(counts, power):
+    present = counts > 0
+    w = np.ones(len(counts))
+    w[present] = counts[present] ** (-power)
+    w[present] *= counts.sum() / counts
+    return w
+
+
+MISLED = [  # what was said of them by accident
+    ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
+    ("09_other_stacks.hsv_mask", every_channel_wraps, "largest value"),
+    ("09_other_stacks.hsv_mask", every_channel_wraps, "upper is 255"),
+]
+
+
+@pytest.mark.parametrize("name, answer, says", MISLED)
+def test_what_is_true_by_accident_is_not_said(name, answer, says):
+    assert says not in (judge(find(name), answer, seed=0).hint or "")

@@ -41,6 +41,11 @@ QUESTION = Question(
         (_BEST_AND_SECOND, _BEST_AND_SECOND[::-1], 1.0),  # classes in another order
         (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
         (_BEST_AND_SECOND, np.where(_BEST_AND_SECOND == 4, np.float32(np.nan), _BEST_AND_SECOND), 1.0),  # no number
+        (
+            1024 * _BEST_AND_SECOND,
+            1024 * _BEST_AND_SECOND + _logits((1 / 64, 0, 0, 0), (0, 0, 0, 0), (0, 0, 0, 0)),
+            1 / 128,
+        ),
     ),
     random_cases=6,
     points=3,
@@ -84,6 +89,12 @@ def kept_upwards_alone(reference, other, tolerance):
 def kept_unless_above(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance
     return not broken.any(), changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "np.allclose and np.isclose forgive more at large logits: their rtol is not 0 unless you say so.")
+def kept_by_allclose(reference, other, tolerance):
+    kept = np.allclose(reference, other, atol=tolerance)
+    return kept, changed(reference, other), at_risk(reference, 2 * tolerance)
 
 
 @wrong(QUESTION, "The gap that counts is the one between the best class and the second, not the last.")

@@ -86,6 +86,14 @@ def resize_corner_to_corner(labels, size):
     return labels[rows[:, None], columns]
 
 
+@wrong(QUESTION, "24.5 * (2 / 49) is not 1 in floating point: which whole numbers give the same quotient?")
+def resize_by_floats(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = (np.arange(H) + 0.5) * (h / H), (np.arange(W) + 0.5) * (w / W)
+    return labels[rows.astype(int)[:, None], columns.astype(int)]
+
+
 @wrong(QUESTION, "np.resize repeats the data in reading order: look at it.")
 def resize_tiled(labels, size):
     W, H = size

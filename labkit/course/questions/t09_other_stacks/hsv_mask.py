@@ -107,6 +107,12 @@ def mask_in_degrees(hsv, lower, upper):
     return hsv_mask(doubled, lower, upper)
 
 
+@wrong(QUESTION, "The bounds and the hues are bytes: 10 - 170 wraps round at 256, not at 180.")
+def hue_by_a_remainder_of_bytes(hsv, lower, upper):
+    hue = (hsv[..., 0] - lower[0]) % 180 <= (upper[0] - lower[0]) % 180
+    return hue & ((hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])).all(axis=-1)
+
+
 @wrong(QUESTION, "From 5 to 20 nearly every hue is in yours: when is it `or`?")
 def mask_always_round(hsv, lower, upper):
     h = hsv[..., 0]
