@@ -231,6 +231,8 @@ def no_number(view: View) -> str:
     _, g, wrong = wrong_numbers(view)
     if not wrong.any() or np.isfinite(g[wrong]).any():
         return ""
+    if np.isnan(g[wrong]).all() and any(np.isnan(right).any() for right in view.expected):
+        return "NaN stands where a number is right: is it 0 / 0, or do you answer NaN in more cases than are asked for?"
     if np.isnan(g[wrong]).all():
         return (
             "What is wrong is NaN: 0 / 0, infinite over or minus infinite (an exponential too large), "

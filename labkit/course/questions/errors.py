@@ -162,7 +162,7 @@ TABLE = {
         "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
     ),
     r"ValueError: cannot reshape array of size (\d+) into shape \(([\d,-]*)": (
-        "{1} numbers do not fill the shape ({2}): is a part of it longer than you think, padding perhaps?"
+        "{1} numbers do not fill the shape ({2}): are there too many (padding, perhaps), or are some missing?"
     ),
     r"ValueError: The truth value of an array|ValueError: The truth value of a": (
         "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: is a sum missing? For arrays there are "

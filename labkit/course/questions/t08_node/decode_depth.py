@@ -65,8 +65,8 @@ def metres(numbers):
 
 @wrong(QUESTION, "From the second row on the image slides sideways: at which byte does row r begin?")
 def padding_as_pixels(data, height, width, step, is_bigendian):
-    numbers = np.frombuffer(data.tobytes(), ">u2" if is_bigendian else "<u2")
-    return metres(numbers[: height * width].reshape(height, width))
+    pixels = data[: 2 * height * width]
+    return metres(units(pixels, height, width, 2 * width, ">" if is_bigendian else "<"))
 
 
 @wrong(QUESTION, "What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")

@@ -33,7 +33,7 @@ QUESTION = Question(
     atol=0.0,
     points=2,
     properties=(
-        Property("16 bytes a point", lambda arguments, data: np.size(data) % 16 == 0),
+        Property("16 bytes per point", lambda arguments, data: np.size(data) % 16 == 0),
         Property(
             "as many points as have three finite coordinates",
             lambda arguments, data: np.size(data) == 16 * np.count_nonzero(np.isfinite(arguments[0]).all(axis=1)),
@@ -64,9 +64,9 @@ def holes_as_origin(P):
     return packed(np.where(np.isfinite(P).all(axis=1, keepdims=True), P, 0.0)).ravel()
 
 
-@wrong(QUESTION, "datatype 7 is float32. How many bytes has a number of yours?")
+@wrong(QUESTION, "A point of yours takes 32 bytes: float32 has 4 bytes per number. How many has float64?")
 def double_precision(P):
-    return packed(finite(P), "<f8").ravel()
+    return packed(finite(P), "<f8", padding=8).ravel()
 
 
 @wrong(QUESTION, "The message says is_bigendian = 0: which byte comes first?")

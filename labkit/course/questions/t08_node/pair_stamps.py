@@ -82,6 +82,20 @@ def one_partner_for_two(a, b, slop):
     return np.where(apart.min(axis=1) <= slop, apart.argmin(axis=1), -1)
 
 
+@wrong(
+    QUESTION,
+    "A stamp of a takes a partner to which a later stamp of a is nearer: which one is the nearest of the partner?",
+)
+def first_come_first_served(a, b, slop):
+    j, free = np.full(len(a), -1), np.ones(len(b), bool)
+    for i in range(len(a)):
+        apart = np.where(free, np.abs(b - a[i]), np.iinfo(np.int64).max)
+        if free.any() and apart.min() <= slop:
+            j[i] = apart.argmin()
+            free[j[i]] = False
+    return j
+
+
 @wrong(QUESTION, "A frame whose partner was lost must stay alone: what is slop for?")
 def no_bound(a, b, slop):
     return pairs(a, b, np.iinfo(np.int64).max, lambda x, y: np.abs(x - y))

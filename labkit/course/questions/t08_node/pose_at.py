@@ -45,6 +45,7 @@ _STAMPS = np.array([0, 40, 80, 200])
 _PLACES = np.array([[0.5, 0.0, 0.4], [0.6, 0.2, 0.4], [0.6, 0.2, 0.8], [0.2, 0.0, 0.8]])
 _TURNS = np.array([turned((0, 0, 1), a) for a in (0.0, 1.6, 1.6, 3.0)])
 _TURNS[3] = -_TURNS[3]  # the same rotation
+_FURTHER = np.array([turned((0, 0, 1), np.radians(a)) for a in (0.0, 170.0, 190.0, 300.0)])
 
 
 QUESTION = Question(
@@ -60,6 +61,7 @@ QUESTION = Question(
         (_STAMPS, _PLACES, _TURNS, 200),
         (_STAMPS, _PLACES, _TURNS, 201),
         (_STAMPS, _PLACES, _TURNS, -1),
+        (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
     ),
     random_cases=6,
     atol=1e-5,

@@ -45,6 +45,7 @@ QUESTION = Question(
         (_turn((1.0, -0.3, 0.2), 2.6),),
         (_turn((-0.3, 1.0, 0.4), 2.8),),
         (_turn((-0.3, 0.2, 1.0), 2.7),),
+        *((np.diag(half_turn),) for half_turn in ((1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))),
     ),
     random_cases=6,
     rtol=1e-4,
