@@ -98,7 +98,7 @@ def sliding_mask() -> Explorer:
         for values, colour, name in zip(scores.T, ("0.55", "tab:red"), ("pixel accuracy", "IoU"), strict=True):
             curves.plot(shifts, values, color=colour, label=name)
             curves.plot(shift, values[shift], "o", color=colour)
-        curves.set_xlabel("shift (pixels)")
+        curves.set(xlabel="shift (pixels)", ylabel="score")
         curves.set_ylim(-0.03, 1.05)
         curves.legend(loc="center right")
         share = toy_object(radius).mean()

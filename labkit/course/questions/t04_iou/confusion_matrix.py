@@ -71,6 +71,13 @@ def prediction_ignored_too(y_true, y_pred, num_classes, ignore):
     return pair_count(rows[columns != ignore], columns[columns != ignore], num_classes)
 
 
+@wrong(
+    QUESTION, "A pixel whose true label is a class counts although `ignore` names that class: `ignore` need not be 255."
+)
+def only_what_is_no_class_ignored(y_true, y_pred, num_classes, ignore):
+    return pair_count(*counted_pairs(y_true, y_pred, 255), num_classes)
+
+
 @wrong(QUESTION, "n holds whole numbers of pixels: nothing is divided yet.")
 def shares_of_rows(y_true, y_pred, num_classes, ignore):
     n = pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)

@@ -32,6 +32,12 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+@wrong(QUESTION, "The overlap stands in the row sum and in the column sum: how often is it in your union?")
+def overlap_twice_in_the_union(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true)
+
+
 @wrong(QUESTION, "That is Dice (F1), another score: the overlap stands once in an IoU, not twice.")
 def dice(n):
     correct, predicted, true = parts(n)

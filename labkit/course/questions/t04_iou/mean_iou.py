@@ -60,6 +60,14 @@ def mean_of_frames_by_class(n_frames):
     return np.nanmean(scores[:, seen], axis=0).mean()
 
 
+@wrong(
+    QUESTION,
+    "Each class of each frame has a vote in your mean, however few pixels it has. Add counts first, divide once.",
+)
+def mean_of_all_scores(n_frames):
+    return np.nanmean([iou_of(n) for n in n_frames])
+
+
 @wrong(QUESTION, "Your background wins: each class has one vote here, however many pixels it has.")
 def sum_over_sum(n_frames):
     correct, predicted, true = parts(n_frames.sum(axis=0))

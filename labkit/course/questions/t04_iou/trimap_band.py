@@ -54,6 +54,19 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+def square(width):
+    """The steps (rows, columns) to all places of the window."""
+    return [(v, u) for v in range(-width, width + 1) for u in range(-width, width + 1)]
+
+
+def banded(y, width, steps, differs=np.not_equal):
+    """The pixels from which one of some steps leads to another class; those of 255 are not left out."""
+    H, W = y.shape
+    framed = np.pad(y, width, constant_values=255)
+    near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in steps]
+    return np.any([differs(n, y) & (n != 255) for n in near], axis=0)
+
+
 @wrong(QUESTION, "An image of one class has no edge: beyond its border there is no class, not class 0.")
 def border_is_an_edge(y, width):
     return trimap_band(np.pad(y, width), width)[width:-width, width:-width]
@@ -66,15 +79,30 @@ def unjudged_is_a_class(y, width):
 
 @wrong(QUESTION, "A step down and a step to the right at once: is that pixel within one row and one column?")
 def cross_window(y, width):
-    def along(y):
-        return np.stack([trimap_band(row[None], width)[0] for row in y])
+    return banded(y, width, [(v, u) for v, u in square(width) if v == 0 or u == 0]) & (y != 255)
 
-    return along(y) | along(y.T).T
+
+@wrong(QUESTION, "The window is a square: is the pixel `width` rows down and `width` columns to the right in yours?")
+def diamond_window(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if abs(v) + abs(u) <= width]) & (y != 255)
+
+
+@wrong(QUESTION, "Your window reaches further up and left than down and right: which number does range leave out?")
+def window_without_its_end(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if v < width and u < width]) & (y != 255)
+
+
+@wrong(QUESTION, "Pixels of the opposite border come in, as by np.roll: beyond its border an image has no pixels.")
+def rolled_round(y, width):
+    near = [np.roll(y, step, axis=(0, 1)) for step in square(width)]
+    return (y != 255) & np.any([(n != y) & (n != 255) for n in near], axis=0)
+
+
+@wrong(QUESTION, "Some pixels of 255 are in your band: a pixel that nobody judged has no class, and no edge.")
+def unjudged_in_the_band(y, width):
+    return banded(y, width, square(width))
 
 
 @wrong(QUESTION, "An edge has two sides: the pixels of the lower class belong to the band, too.")
 def one_side(y, width):
-    H, W = y.shape
-    framed = np.pad(y, width, constant_values=255)
-    reach = range(2 * width + 1)
-    return (y != 255) & np.any([framed[v : v + H, u : u + W] < y for v in reach for u in reach], axis=0)
+    return banded(y, width, square(width), np.less) & (y != 255)
