@@ -307,7 +307,7 @@ def quantities(view: View) -> Iterator[tuple[str, list[float | None]]]:
                 {0: "rows", 1: "columns"}.get(axis, f"entries along axis {axis}") if values[0].ndim > 1 else "entries"
             )
             yield f"the number of {length} of {name}", [float(v.shape[axis]) for v in values]
-        if values[0].ndim > 1:
+        if max(v.ndim for v in values) > 1:
             yield f"the number of all entries of {name}", [float(v.size) for v in values]
             if all(v.ndim > 2 for v in values):
                 yield f"the number of pixels of {name}", [float(v.size // v.shape[-1]) for v in values]

@@ -158,6 +158,10 @@ def in_metres(T_base_grasp, middle):
     return tuple(mm / 1000.0 for mm in find("07_grasp.slip_across").reference(T_base_grasp, middle))
 
 
+def mean_over_all_pixels(z, y):
+    return find("03_gradient.cross_entropy").reference(z, y) / y.size
+
+
 def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
     n = np.zeros((num_classes, num_classes), int)
     np.add.at(n, (y_true, y_pred), 1)
@@ -203,6 +207,7 @@ NAMED = [
     ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
     ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
     ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
+    ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),
 ]
 
 

@@ -78,3 +78,21 @@ def cross_entropy_mean_of_counted(z, y):
 def cross_entropy_with_ignored_lse(z, y):
     true = np.where(y[..., None] == np.arange(z.shape[-1]), z, 0.0)
     return float(np.logaddexp.reduce(z, axis=-1).sum() - true.sum())
+
+
+@wrong(QUESTION, "A probability that rounds to 0 has no logarithm: log p is z - lse(z), without p.")
+def cross_entropy_of_rounded_probabilities(z, y):
+    return -float(np.log(np.exp(true_log_probabilities(z, y))).sum())
+
+
+@wrong(QUESTION, "The maximum that you take out of the exponents comes back: lse is m plus the logarithm.")
+def cross_entropy_without_the_maximum(z, y):
+    counted = y != 255
+    return cross_entropy(z, y) - float(z[counted].max(axis=-1, initial=-np.inf).sum())
+
+
+@wrong(QUESTION, "z[:, y] takes the columns of all pixels' classes for each pixel: one entry per row is asked for.")
+def cross_entropy_of_all_pixels_classes(z, y):
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    return float((np.logaddexp.reduce(z, axis=-1) - z[:, y]).sum())

@@ -31,6 +31,7 @@ QUESTION = Question(
         (np.array([2]), np.array([2]), np.array([0]), 10),
         (np.array([3, 2, 3, 2, 3]), np.array([1, 2, 1, 2, 1]), np.array([1, 0, 1, 0, 1]), 8),
         (np.array([7, 1, 5]), np.array([2, 3, 1]), np.array([3, 0, 0]), 4),
+        (np.array([3, 5]), np.array([1, 2]), np.array([1, 2]), 0),  # it begins outside the image
     ),
     points=3,
     properties=(Property("the first pixel is not behind the last", lambda given, out: bool(out[0] <= out[1])),),
@@ -86,3 +87,10 @@ def window_of_the_first_layer(kernels, strides, paddings, u):
     """Only the first pixel is walked back; the first layer's width is added."""
     first = back(kernels, strides, paddings, u)[0]
     return first, first + int(kernels[0]) - 1
+
+
+@wrong(QUESTION, "A window may begin outside the image, at a negative pixel. Leave it so.")
+def kept_inside_the_image(kernels, strides, paddings, u):
+    """No pixel before 0."""
+    first, last = back(kernels, strides, paddings, u)
+    return max(first, 0), last

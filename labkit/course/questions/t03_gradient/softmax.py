@@ -66,3 +66,15 @@ def logits_divided_by_their_sum(z):
 @wrong(QUESTION, "Which numbers must sum to one: those of one pixel.")
 def wrong_axis(z):
     return softmax_over_pixels(z)
+
+
+@wrong(QUESTION, "Which number, taken off, makes the largest exponent 0? With a smaller one np.exp still overflows.")
+def smallest_logit_taken_off(z):
+    e = np.exp(z - z.min(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Dividing by the largest logit changes the differences of logits; taking it off does not.")
+def divided_by_the_largest(z):
+    e = np.exp(z / z.max(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)

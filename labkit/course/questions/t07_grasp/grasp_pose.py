@@ -103,3 +103,10 @@ def closing_left_short(position, approach, closing):
     y, z = unit(closing), unit(approach)
     y = y - (y @ z) * z
     return pose(np.cross(y, z), y, z, position)
+
+
+@wrong(QUESTION, "The hand's axes are the columns of T_base_grasp, and yours are its rows.")
+def axes_as_rows(position, approach, closing):
+    T = grasp_pose(position, approach, closing)
+    T[:3, :3] = T[:3, :3].T.copy()
+    return T

@@ -104,3 +104,10 @@ def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
 def near_the_tips_alone(P, T_base_grasp, *boxes):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, np.abs(z), *boxes)
+
+
+@wrong(QUESTION, "The borders belong to the boxes: what lies on one counts, with <= and >=.")
+def borders_left_out(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out = np.abs(y) - width / 2
+    return int(((np.abs(x) < half) & (out > 0.0) & (out < thickness) & (z < tips)).sum())

@@ -59,3 +59,10 @@ def turned_the_wrong_way(T_base_grasp, middle):
 def seen_from_above(T_base_grasp, middle):
     off = 1000.0 * np.abs((middle - T_base_grasp[:3, 3])[:2] @ T_base_grasp[:2, :2])
     return off[1], off[0]
+
+
+@wrong(QUESTION, "The hand may lean: its pads need not lie in the table's plane. What is left is along the pads.")
+def left_in_the_tables_plane(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3]) * (1.0, 1.0, 0.0)
+    pushed = np.abs(off @ T_base_grasp[:3, 1])
+    return pushed, np.sqrt(np.maximum(off @ off - pushed**2, 0.0))
