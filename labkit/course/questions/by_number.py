@@ -235,8 +235,8 @@ def no_number(view: View) -> str:
         return "NaN stands where a number is right: is it 0 / 0, or do you answer NaN in more cases than are asked for?"
     if np.isnan(g[wrong]).all():
         return (
-            "What is wrong is NaN: 0 / 0, infinite over or minus infinite (an exponential too large), "
-            "the mean of nothing, or the logarithm or root of a negative number."
+            "What is wrong is NaN: nothing was written there, or it is 0 / 0, infinite over or minus infinite (an "
+            "exponential too large), 0 times infinite, the mean of nothing, or the log or root of a negative number."
         )
     return "What is wrong is infinite: something is divided by 0, or grows without end."
 

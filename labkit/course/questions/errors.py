@@ -73,7 +73,7 @@ def shapes_do_not_fit(found: re.Match, args: dict) -> str:
     if len(a) != len(b):
         return f"Shapes {said} do not fit: is an axis missing, as [..., None] or keepdims=True gives it?"
     if sorted(a) == sorted(b):
-        return f"Shapes {said} are each other's transpose: which one has its axes exchanged?"
+        return f"Shapes {said} have the same lengths in another order: which one has its axes exchanged?"
     return f"Shapes {said} do not fit, number by number: which of them should be another?"
 
 
@@ -131,7 +131,7 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
 # Exceptions that one sentence explains; {1} is what the first bracket of the pattern holds.
 TABLE = {
     r"IndexError: (?:arrays used as indices|only integers|.*is not a valid index)|TypeError: \w+ indices must be": (
-        "An index must be whole numbers or truth values: is it the array that you mean? If so: .astype(int), or ==."
+        "An index must be whole numbers or truth values: is it the right one? Then .astype(int), or a comparison."
     ),
     r"IndexError: boolean index did not match .*?axis (\d+); .*?is (\d+) but .*?is (\d+)": (
         "A mask of {3} entries along axis {1} selects from an array of {2}: whose mask is it?"

@@ -143,7 +143,7 @@ def by_argument(view: View) -> Iterator[tuple[str, Masks]]:
             with np.errstate(all="ignore"):
                 if all(v.shape == e.shape[: v.ndim] for e, v in pairs):
                     yield f"where {name} {says}", [spread(mark(v), e) for e, v in pairs]
-                elif all(e.shape == v.shape[: e.ndim] and e.ndim for e, v in pairs):
+                elif says in ("is 255", "is NaN") and all(e.shape == v.shape[: e.ndim] and e.ndim for e, v in pairs):
                     yield f"where {name} {says} somewhere", [mark(v).reshape(*e.shape, -1).any(-1) for e, v in pairs]
                 labels = all(((v < 32) | (v == 255)).all() for v in values)  # not colours, in which 255 is no mark
                 if says == "is NaN" or (says == "is 255" and labels):  # the others are true of some cases by accident
