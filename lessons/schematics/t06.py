@@ -58,7 +58,8 @@ def frames(axes) -> None:
     word(axes, by(base, -1.2, 0.7), "base")
     along = (point - camera) / np.linalg.norm(point - camera)
     across = np.array([along[1], -along[0]])
-    frame_axes(axes, camera, (1.6 * along, 1.1 * across, (-0.95, -0.3)), ("z", "y", "x"))
+    frame_axes(axes, camera, (1.6 * along, 1.1 * across, (-0.95, -0.3)), ("", "y", "x"))
+    word(axes, camera + 1.6 * along - 0.35 * across, "z", size=SMALL)  # beside the ray
     word(axes, by(camera, -0.5, 0.5), "camera")
     arrow(axes, base, camera, colour=LEAF, gap=0.15, dashed=True, width=1.8)
     word(axes, (3.9, 3.9), r"$T_{base\_cam}$", colour=LEAF)

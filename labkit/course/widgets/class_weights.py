@@ -78,8 +78,7 @@ def weight_slider(start: float = 0.0) -> ipywidgets.FloatSlider:
 def two_gaussians(distance: float = 2.0, share: float = 0.02) -> Explorer:
     """Move the weight of a rare class and see the boundary between two Gaussians go, and what it costs.
 
-    distance: between the classes' means, in standard deviations; share: of the rare class, 0 to 1. Problem 5 of the
-    text.
+    distance: between the classes' means, in standard deviations; share: of the rare class, 0 to 1. Topic 05.
 
     >>> explorer = two_gaussians()
     >>> explorer.controls["exponent"].value = 4.0

@@ -92,3 +92,10 @@ def opengl_axes(depth, K):
 @wrong(QUESTION, "The numbers are right and stand in the wrong places: reshape does not move an axis.")
 def reshaped(depth, K):
     return np.moveaxis(back_project(depth, K), -1, 0).reshape(*depth.shape, 3)
+
+
+@wrong(QUESTION, "A hole has no point: its z is NaN as well, not 0.")
+def holes_at_depth_zero(depth, K):
+    P = back_project(depth, K)
+    P[..., 2] = depth
+    return P

@@ -61,3 +61,8 @@ def resized_first(K, left, top, scale):
 @wrong(QUESTION, "What was at column `left` is at column 0 of the crop: do columns grow or shrink?")
 def added(K, left, top, scale):
     return cropped_intrinsics(K, -left, -top, scale)
+
+
+@wrong(QUESTION, "Two things: left and top count old pixels, so take them off first; and corners stay together, not centres.")
+def resized_first_about_centres(K, left, top, scale):
+    return with_centre(K, scale, scale * K[0, 2] - left, scale * K[1, 2] - top)

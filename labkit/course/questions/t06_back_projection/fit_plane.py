@@ -42,6 +42,12 @@ QUESTION = Question(
     properties=(
         Property("n has length 1", lambda arguments, plane: bool(np.isclose(np.linalg.norm(plane[0]), 1.0, atol=1e-3))),
         Property("n points up, its z is above 0", lambda arguments, plane: bool(plane[0][2] > 0.0)),
+        Property(
+            "the plane goes through the weighted mean m of the points, n . m = d",
+            lambda arguments, plane: np.isclose(
+                plane[0] @ np.average(arguments[0], axis=0, weights=arguments[1] ** -2.0), plane[1], atol=1e-3
+            ),
+        ),
     ),
 )
 
@@ -82,3 +88,15 @@ def centre_without_weights(P, sigma):
 @wrong(QUESTION, "A point of twice the sigma counts a quarter: squares of distances are divided by squares.")
 def weights_not_squared(P, sigma):
     return fit_plane(P, np.sqrt(sigma))
+
+
+@wrong(QUESTION, "A point of a larger sigma is less sure, and must count less; yours counts more.")
+def unsure_points_count_more(P, sigma):
+    return fit_plane(P, sigma**-0.5)
+
+
+@wrong(QUESTION, "np.linalg.eigh gives the eigenvectors as the columns of its matrix: yours is a row.")
+def row_of_the_eigenvectors(P, sigma):
+    w = 1.0 / sigma**2
+    centre = w @ P / w.sum()
+    return up(np.linalg.eigh((P - centre).T * w @ (P - centre))[1][0], centre)

@@ -68,3 +68,8 @@ def ray_straight_ahead(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
 def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = np.stack(columns(u, v, d, K), axis=1)
     return np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth))
+
+
+@wrong(QUESTION, "You count the depth alone, and along the optical axis: u and v err as well, and depth acts along q.")
+def depth_straight_ahead_alone(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    return abs(T_base_cam[2, 2]) * sigma_depth

@@ -51,6 +51,10 @@ QUESTION = Question(
                 np.asarray(pixels)[np.all(arguments[0] == arguments[1][:2, 2], axis=1)], arguments[1][:2, 2], atol=1e-3
             ),
         ),
+        Property(
+            "put into the lens, your pixels come out as those that were seen",
+            lambda arguments, pixels: np.allclose(distort(pixels, *arguments[1:]), arguments[0], atol=1e-3),
+        ),
     ),
     forbidden=("cv2", "scipy"),
 )
@@ -86,4 +90,14 @@ def powers_too_low(pixels, K, k):
     for _ in range(100):
         r = np.linalg.norm(ideal, axis=1, keepdims=True)
         ideal = seen / (1.0 + k[0] * r + k[1] * r**2)
+    return c + f * ideal
+
+
+@wrong(QUESTION, "Each pixel has its own r: add its x squared and its y squared, not those of all pixels.")
+def one_radius_for_all(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = ideal = (pixels - c) / f
+    for _ in range(100):
+        r2 = (ideal**2).sum()
+        ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * ideal
