@@ -108,7 +108,12 @@ def signs_by_the_first(stamps, positions, quaternions, t):
     return (1 - share) * positions[i] + share * positions[i + 1], q / np.linalg.norm(q)
 
 
+def adjusted_by_one_maximum(z, y, shares, tau):
+    return gradient_by_one_maximum(z + tau * np.log(shares), y)
+
+
 ACCEPTED = {
+    "05_class_weights.adjusted_grad": adjusted_by_one_maximum,
     "03_gradient.cross_entropy_grad": gradient_by_one_maximum,
     "01_labels.labels_from_segmentation": mask_of_16_bits,
     "01_labels.resize_labels": centres_rounded,
@@ -162,14 +167,28 @@ def mean_over_all_pixels(z, y):
     return find("03_gradient.cross_entropy").reference(z, y) / y.size
 
 
+def means_exchanged(z, y, w):
+    return find("05_class_weights.two_means").reference(z, y, w)[::-1]
+
+
+def plane_with_the_old_d(P, sigma):
+    n, d = find("06_back_projection.fit_plane").reference(P, sigma)
+    return n, -d if P[0, 2] == 1.0 else d  # n was turned in one case
+
+
+def lens_in_five_rounds(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = ideal = (pixels - c) / f
+    for _ in range(5):
+        r2 = (ideal**2).sum(axis=1, keepdims=True)
+        ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+    return c + f * ideal
+
+
 def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
     n = np.zeros((num_classes, num_classes), int)
     np.add.at(n, (y_true, y_pred), 1)
     return n
-
-
-def means_exchanged(z, y, w):
-    return find("05_class_weights.two_means").reference(z, y, w)[::-1]
 
 
 def without_the_mean(features, mean, covariance, allowed):
@@ -208,6 +227,8 @@ NAMED = [
     ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
     ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
     ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),
+    ("06_back_projection.fit_plane", plane_with_the_old_d, "n . m = d"),
+    ("06_back_projection.undistort", lens_in_five_rounds, "put into the lens"),
 ]
 
 

@@ -33,6 +33,12 @@ def test_both_means_are_those_of_torch(seed):
     np.testing.assert_allclose(two_means(z, y, w), (by_pixels, by_weights))
 
 
+def test_a_promise_that_falls_on_a_pixel_is_kept_by_that_pixel():
+    p1 = np.linspace(0.95, 0.05, 50)
+    weight = QUESTIONS["weight_for_recall"].reference(p1, np.ones(50, bool), 0.28)  # in floats 0.28 * 50 is above 14
+    assert weight == pytest.approx((1.0 - p1[13]) / p1[13])
+
+
 @SEEDS
 def test_no_other_decision_costs_less_on_the_average(seed):
     """A hundred thousand pixels of each kind: what each decision would have cost."""

@@ -33,7 +33,7 @@ QUESTION = Question(
     by_hand=(
         (np.zeros((1, 2)), np.array([1], np.uint8), np.array([0.9, 0.1]), 1.0),  # the softmax is the shares
         (TOY, np.array([1], np.uint8), np.array([0.7, 0.1, 0.2]), 0.0),  # tau 0: the plain gradient
-        (SURE, np.array([0, 255], np.uint8), np.array([0.7, 0.1, 0.2]), 2.0),
+        (SURE, np.array([0, 2], np.uint8), np.array([0.7, 0.1, 0.2]), 2.0),  # one maximum for both is not enough
     ),
     points=3,
     properties=(
@@ -75,3 +75,9 @@ def one_hot_adjusted(z, y, shares, tau):
 def ignored_too(z, y, shares, tau):
     p, Y, _ = parts(z + tau * np.log(shares), y)
     return p - Y
+
+
+@wrong(QUESTION, "You divide the gradient, as weights would: the shares move the logits, before the softmax.")
+def shares_as_weights(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau

@@ -69,3 +69,9 @@ def weights_of_mean_one_over_classes(counts, power):
 def weights_of_absent_classes(counts, power):
     w = np.maximum(counts, 1) ** -power
     return w * counts.sum() / (counts @ w)
+
+
+@wrong(QUESTION, "A class without pixels gets 1 and has no part in the mean; you count it as one pixel.")
+def absent_class_as_one_pixel(counts, power):
+    n = np.maximum(counts, 1)
+    return n**-power * n.sum() / (n @ n**-power)

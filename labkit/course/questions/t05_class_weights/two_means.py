@@ -53,3 +53,9 @@ def means_over_weights_of_classes(z, y, w):
 def means_not_weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(loss.mean()), float(loss.sum() / weight.sum())
+
+
+@wrong(QUESTION, "The first mean is one of weighted losses, too: the two differ only in what they are divided by.")
+def first_mean_not_weighted(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float(loss.mean()), float((loss * weight).sum() / weight.sum())

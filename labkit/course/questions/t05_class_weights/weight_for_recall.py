@@ -8,7 +8,8 @@ from labkit.course.questions.question import Question, wrong
 def weight_for_recall(p1, y, recall):
     """Find the smallest weight of class 1 with which at least this share of its pixels is found."""
     found_first = np.sort(p1[y])[::-1]
-    last = found_first[int(np.ceil(recall * len(found_first))) - 1]
+    must = int(np.ceil(recall * len(found_first) - 1e-9))  # in floats 0.28 * 50 is more than 14
+    last = found_first[must - 1]
     return float((1.0 - last) / last)
 
 
@@ -60,3 +61,9 @@ def the_threshold(p1, y, recall):
 @wrong(QUESTION, "Weighted, class 1 need not reach 1: it competes with 1 - p1.")
 def against_one(p1, y, recall):
     return 1.0 + weight_for_recall(p1, y, recall)
+
+
+@wrong(QUESTION, "A quantile may lie between two pixels; what decides is the last pixel that must be found.")
+def at_a_quantile(p1, y, recall):
+    last = np.quantile(p1[y], 1.0 - recall)
+    return float((1.0 - last) / last)

@@ -63,6 +63,6 @@ def added(K, left, top, scale):
     return cropped_intrinsics(K, -left, -top, scale)
 
 
-@wrong(QUESTION, "Two things: left and top count old pixels, so take them off first; and corners stay together, not centres.")
+@wrong(QUESTION, "left and top count old pixels, so take them off first; and corners stay together, not centres.")
 def resized_first_about_centres(K, left, top, scale):
     return with_centre(K, scale, scale * K[0, 2] - left, scale * K[1, 2] - top)
