@@ -58,7 +58,7 @@ def outside(found: re.Match, args: dict) -> str:
         return f"The index {index} is one past the end: the last one along {along} is {size - 1}."
     lengths = [f"axis {k} of {name}" for name, a in arrays(args).items() for k, n in enumerate(a.shape) if index < n]
     if holding:
-        return f"A value of {holding[0]}, {index}, is used as an index into an axis of only {size}."
+        return f"An index of {index} into an axis of only {size}; {holding[0]} holds {index}: is it used as an index?"
     if lengths:
         return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes exchanged?"
     return f"An index of {index} into an axis of {size}: which numbers can stand there?"
@@ -158,7 +158,8 @@ TABLE = {
     r"(?:Value|Index)Error: (?:shape mismatch|could not be broadcast|.*shape mismatch)": (
         "Index arrays that are used together must have one shape: print the shape of each."
     ),
-    r"ValueError: all the input array|ValueError: need at least one array|ValueError: all input arrays": (
+    r"ValueError: need at least one array": "In this case there is nothing to stack or join: is a list empty?",
+    r"ValueError: all the input array|ValueError: all input arrays": (
         "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
     ),
     r"ValueError: cannot reshape array of size (\d+) into shape \(([\d,-]*)": (

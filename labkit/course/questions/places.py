@@ -45,6 +45,8 @@ def in_the_array(view: View) -> Iterator[tuple[str, Masks]]:
         for c in range(next(iter(last))) if len(last) == 1 and next(iter(last)) <= 6 else ():
             yield f"in column {c} of the last axis", [at(e, (..., c)) for e in view.expected]
         for name, index in LINES.items():
+            if ndims != {2}:  # the first axis of three need not be an image's rows
+                name = name.replace("row", "entry along axis 0").replace("column", "entry along axis 1")
             yield name, [at(e, index) for e in view.expected]
         yield "at the border", [border(e) for e in view.expected]
         if all(e.ndim == 2 and e.shape[0] == e.shape[1] for e in view.expected):

@@ -213,10 +213,43 @@ def a_fourth_column_of_doubles(P):
     return np.frombuffer(np.c_[P, np.zeros(len(P))].tobytes(), np.uint8)
 
 
+def unseen_looked_up(segmentation, class_of_body):
+    return class_of_body[segmentation % 2**24]
+
+
+def any_channel_in_a_loop(rgb, palette):
+    y = np.full(rgb.shape[:2], 255)
+    for c, colour in enumerate(palette):
+        y[(rgb == colour).any(axis=2)] = c
+    return y
+
+
+def planes_up_to_the_largest(y, C):
+    return np.stack([y == c for c in range(y.max() + 1)], axis=-1).astype(int)
+
+
+def scaled_upside_down(y, height, width):
+    H, W = y.shape
+    rows, columns = (((np.arange(n) + 0.5) * n / old).astype(int) for n, old in ((height, H), (width, W)))
+    return y[rows][:, columns]
+
+
+def fourth_kind_too_small(image, lam, sigma_I, sigma_p):
+    w = find("02_crf.pair_weights").reference(image, lam, sigma_I, sigma_p)
+    w[3] *= 0.5 + 0.4 * np.sin(np.arange(w[3].size).reshape(w[3].shape))
+    return w
+
+
 NAMED = [
     ("08_node.decode_depth", pixels_in_a_row, "slides sideways"),
     ("08_node.pose_at", nobody_knows_at_the_ends, "in more cases than are asked for"),
     ("08_node.pack_cloud", a_fourth_column_of_doubles, "float64"),
+    ("01_labels.labels_from_segmentation", unseen_looked_up, "16777215"),
+    ("01_labels.labels_from_colours", any_channel_in_a_loop, "is one of them enough"),
+    ("01_labels.one_hot", planes_up_to_the_largest, "nothing to stack"),
+    ("01_labels.resize_labels", scaled_upside_down, "y holds 3: is it used as an index?"),
+    ("01_labels.resize_labels", centres_rounded, "which one does np.round take?"),
+    ("02_crf.pair_weights", fourth_kind_too_small, "in the last entry along axis 0"),
     ("06_back_projection.cropped_intrinsics", rows_from_one, "entry at [1, 2]. There: Yours are too large by 1"),
     ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "The sign is the other one"),
     ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),

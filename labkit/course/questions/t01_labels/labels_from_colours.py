@@ -60,16 +60,37 @@ def nearest_colour(rgb, palette):
     return distance.argmin(axis=-1)
 
 
-@wrong(QUESTION, "Two colours are the same if all three channels are: is one of them enough in yours?")
+def last_of(same):
+    """The last class that holds, as a loop over the classes leaves it."""
+    return np.where(same.any(axis=-1), same.shape[-1] - 1 - same[..., ::-1].argmax(axis=-1), 255)
+
+
+ALL_THREE = "Two colours are the same if all three channels are: is one of them enough in yours?"
+NOT_THE_SUM = "Different colours can be equally bright: compare the channels, not their sum."
+
+
+@wrong(QUESTION, ALL_THREE)
 def any_channel(rgb, palette):
-    """One channel that fits is taken for all."""
+    """One channel that fits is taken for all; the first such class counts."""
     return first_of(matches(rgb, palette).any(axis=-1))
 
 
-@wrong(QUESTION, "Different colours can be equally bright: compare the channels, not their sum.")
+@wrong(QUESTION, ALL_THREE)
+def any_channel_of_the_last(rgb, palette):
+    """The same, and the last such class counts."""
+    return last_of(matches(rgb, palette).any(axis=-1))
+
+
+@wrong(QUESTION, NOT_THE_SUM)
 def by_brightness(rgb, palette):
-    """The sum of the channels compared."""
+    """The sum of the channels compared; the first such class counts."""
     return first_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
+
+
+@wrong(QUESTION, NOT_THE_SUM)
+def by_brightness_of_the_last(rgb, palette):
+    """The same, and the last such class counts."""
+    return last_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
 
 
 @wrong(QUESTION, "argmax of a row that is all False is 0: is an unknown colour background?")

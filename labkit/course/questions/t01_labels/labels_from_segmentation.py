@@ -80,3 +80,9 @@ def link_for_body(segmentation, class_of_body):
 def body_for_class(segmentation, class_of_body):
     body, seen = numbers_and_seen(segmentation)
     return np.where(seen, body, 0)
+
+
+@wrong(QUESTION, "The lower 24 bits of -1 are all ones, 16777215: look up only the pixels where something is seen.")
+def nothing_looked_up(segmentation, class_of_body):
+    """IndexError, wherever nothing is seen."""
+    return class_of_body[segmentation & 0xFFFFFF]

@@ -26,13 +26,16 @@ def _labels_and_size(rng):
     return (y, height, width) if rng.random() < 0.5 else (y, int(rng.integers(H + 2, 3 * H)), width)
 
 
+_ALL_DIFFERENT = np.random.default_rng(1).permutation(24).astype(np.uint8).reshape(4, 6)
+
+
 QUESTION = Question(
     name="01_labels.resize_labels",
     reference=resize_labels,
     inputs=_labels_and_size,
     by_hand=(
         (np.array([[1, 3]], np.uint8), 1, 4),
-        ((np.arange(24, dtype=np.uint8) * 7 % 24).reshape(4, 6), 2, 3),  # a new centre falls between two old pixels
+        (_ALL_DIFFERENT, 2, 3),  # a new centre falls between two old pixels
         (np.array([[0, 1, 2, 3, 1], [3, 255, 1, 0, 2], [0, 0, 2, 1, 3]], np.uint8), 2, 3),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
     ),
@@ -51,7 +54,7 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "np.unique before and after? The mean of classes 1 and 3 is no class 2: labels cannot be averaged.")
+@wrong(QUESTION, "np.unique before and after? The mean of classes 1 and 3 is not class 2: labels cannot be averaged.")
 def bilinear(y, height, width):
     import cv2
 
@@ -83,3 +86,10 @@ def refilled(y, height, width):
 def padded_or_cropped(y, height, width):
     H, W = y.shape
     return np.pad(y, ((0, max(height - H, 0)), (0, max(width - W, 0))), mode="edge")[:height, :width]
+
+
+@wrong(QUESTION, "On the border of two old pixels, floor takes the later one: which one does np.round take?")
+def rounded(y, height, width):
+    H, W = y.shape
+    rows, columns = (np.round((np.arange(n) + 0.5) * old / n - 0.5).astype(int) for n, old in ((height, H), (width, W)))
+    return y[rows[:, None], columns]

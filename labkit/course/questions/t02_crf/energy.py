@@ -86,3 +86,17 @@ def both_diagonals_to_the_right(y, psi, weights):
 def rolled_backwards(y, psi, weights):
     """Each pair compared with the neighbour on the other side."""
     return unary_part(y, psi) + (weights * disagreeing(y, [(-down, -right) for down, right in PAIRS])).sum()
+
+
+@wrong(QUESTION, "weights[3] stands at the upper pixel of its pair: is that the left one of the two?")
+def fourth_kind_at_the_lower_column(y, psi, weights):
+    """The last kind of pairs multiplied by the weights one column to the left of theirs."""
+    left = np.roll(weights[3], 1, axis=1)
+    left[:, 0] = 0.0
+    return unary_part(y, psi) + (np.stack([*weights[:3], left]) * disagreeing(y)).sum()
+
+
+@wrong(QUESTION, "A pixel pays for the label that y gives it: does yours pay for its cheapest class?")
+def cheapest_classes(y, psi, weights):
+    """The pixels' minima in the place of what the labels cost."""
+    return psi.min(axis=2).sum() + (weights * disagreeing(y)).sum()

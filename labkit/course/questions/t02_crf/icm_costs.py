@@ -88,3 +88,10 @@ def four_neighbours(y, psi, weights, v, u):
     straight = np.concatenate([weights[:2], np.zeros_like(weights[2:])])
     own, owned = pairs_of(straight, v, u)
     return charged(own + owned, y, psi, v, u)
+
+
+@wrong(QUESTION, "Which label do you compare with the neighbours': the class c, or y[v, u] for all classes?")
+def label_of_now(y, psi, weights, v, u):
+    """Every class pays for the disagreements of the label that the pixel has."""
+    own, owned = pairs_of(weights, v, u)
+    return psi[v, u] + sum(w for w, b, a in own + owned if y[b, a] != y[v, u])

@@ -138,3 +138,23 @@ def brightness_only(image, lam, sigma_I, sigma_p):
 def without_distance(image, lam, sigma_I, sigma_p):
     """sigma_p forgotten."""
     return gaussian(squares(image), lam, sigma_I, np.inf)
+
+
+@wrong(QUESTION, "The squared distance of two pixels that touch at a corner is 2: is yours 4?")
+def diagonals_by_steps(image, lam, sigma_I, sigma_p):
+    """A step down and a step aside taken for a distance of 2."""
+    return gaussian(squares(image), lam, sigma_I, sigma_p, diagonal=4.0)
+
+
+@wrong(QUESTION, "The exponent holds the squared colour difference: does yours hold the difference itself?")
+def length_not_squared(image, lam, sigma_I, sigma_p):
+    """The length of the colour difference in the exponent."""
+    return gaussian(np.sqrt(squares(image)), lam, sigma_I, sigma_p)
+
+
+@wrong(QUESTION, "In column 0, u - 1 is -1, and in NumPy the index -1 is the last column: which pixels must you skip?")
+def column_before_the_first(image, lam, sigma_I, sigma_p):
+    """A loop that skips what is too large and forgets what is below 0."""
+    kept = inside(image.shape[:2])
+    kept[3, :-1, 0] = 1.0
+    return gaussian(squares(image), lam, sigma_I, sigma_p, ring=True) * kept

@@ -81,3 +81,16 @@ def greedy(psi, w):
 def next_pairs_weight(psi, w):
     """The weight of the pair ahead, charged for the pair behind."""
     return row_labels(psi, np.roll(w, -1))
+
+
+@wrong(QUESTION, "On the way back from pixel u: do you read the row of `came` that belongs to u, or to u - 1?")
+def traced_one_pixel_off(psi, w):
+    """The way back read one pixel too early."""
+    best, came = walk(psi, w), np.zeros(psi.shape, int)
+    for u in range(1, len(psi)):
+        stays = best[u - 1] <= best[u - 1].min() + w[u - 1]
+        came[u] = np.where(stays, np.arange(psi.shape[1]), best[u - 1].argmin())
+    labels = [best[-1].argmin()]
+    for origin in came[-2::-1]:
+        labels.append(origin[labels[-1]])
+    return np.array(labels[::-1])

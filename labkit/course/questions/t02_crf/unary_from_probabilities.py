@@ -52,3 +52,8 @@ def the_floor_added(p, floor):
 @wrong(QUESTION, "What does a class of probability 0 cost, and can neighbours ever overrule that?")
 def no_floor(p, floor):
     return -np.log(np.maximum(p, 1e-300))
+
+
+@wrong(QUESTION, "Only small probabilities are lifted: what must a class of probability 1 cost, and what does yours?")
+def clipped_at_both_ends(p, floor):
+    return -np.log(np.clip(p, floor, 1.0 - floor))
