@@ -77,7 +77,7 @@ RELATIONS = [
     (lambda a, k: a * a.sum(), "a number that stays the same from column to column"),
     (lambda a, k: a.sum(axis=1, keepdims=True), "What you return is the result of sum, made of a"),
     (lambda a, k: table(a, k) + a.mean(axis=0), "the right values plus the mean of a over axis 0"),
-    (lambda a, k: np.where(table(a, k) > 0.8, np.nan, table(a, k)), "What is wrong is NaN"),
+    (lambda a, k: np.where(table(a, k) > 0.8, np.nan, table(a, k)), "What is wrong is NaN: nothing was written there"),
     (lambda a, k: table(a, k) + (table(a, k) > 0.8) * a, "Wherever yours are wrong, they are too large"),
     (lambda a, k: k * a / np.sqrt(a.sum(axis=1, keepdims=True)), "a number that stays the same from column to column"),
 ]  # fmt: skip
