@@ -85,16 +85,6 @@ def gradient_by_one_maximum(z, y):
     return np.where(y[..., None] == 255, 0.0, p - (y[..., None] == np.arange(z.shape[-1])))
 
 
-def row_x_for_large_turns(R):
-    """Right unless x is 0: half a turn about y or z then gives a row of zeros."""
-    x, y, z = np.diagonal(R)
-    if x + y + z > 0.0:
-        row = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1 + x + y + z])
-    else:
-        row = np.array([1 + x - y - z, R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[2, 1] - R[1, 2]])
-    return row / np.linalg.norm(row)
-
-
 def signs_by_the_first(stamps, positions, quaternions, t):
     """All quaternions on the side of the first, where neighbours should be on one side."""
     signs = np.where(quaternions @ quaternions[0] < 0.0, -1.0, 1.0)
@@ -123,7 +113,6 @@ ACCEPTED = {
     "09_other_stacks.choose_region": with_a_finite_penalty,
     "09_other_stacks.make_blob": blob_of_doubles,
     "08_node.pair_stamps": stamps_of_32_bits,
-    "08_node.quaternion": row_x_for_large_turns,
     "08_node.pose_at": signs_by_the_first,
     "09_other_stacks.hsv_mask": every_channel_wraps,
     "09_other_stacks.engine_contract": within_numpys_tolerance,

@@ -73,6 +73,16 @@ def right_quaternion(R):
     return Rotation.from_matrix(R).as_quat()
 
 
+@wrong(
+    QUESTION,
+    "Half a turn about y or z has w = 0 and x = 0, too: your row is zeros then. Which square is the largest?",
+)
+def x_where_w_is_small(R):
+    q = right_quaternion(R)
+    row = q * q[3 if np.trace(R) > 0.0 else 0]
+    return row / np.linalg.norm(row)
+
+
 @wrong(QUESTION, "The axis and the angle say it, too, but what is the length?")
 def rotation_vector(R):
     q = right_quaternion(R)
