@@ -59,3 +59,9 @@ def means_not_weighted(z, y, w):
 def first_mean_not_weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(loss.mean()), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "A weight multiplies the loss of a pixel, by its true class: the logits keep their values.")
+def logits_weighted(z, y, w):
+    loss, weight = losses_and_weights(z * w, y, w)
+    return float(loss.mean()), float(loss.sum() / weight.sum())
