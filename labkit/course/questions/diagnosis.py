@@ -8,6 +8,7 @@ is wrong.
 
 import copy
 import functools
+import itertools
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labkit.course.questions import forms, made_of  # noqa: F401  they enter their relations
-from labkit.course.questions.by_number import DIRECTIONS, NUMBERS
+from labkit.course.questions.by_number import DIRECTIONS, NUMBERS, values_taken_for_others
 from labkit.course.questions.comparison import Case, Problem, alike, parts, trusted
 from labkit.course.questions.errors import explain
 from labkit.course.questions.inputs import changes
@@ -155,10 +156,12 @@ def related(name: str, view: View, relations: Sequence[Relation], kind: str = "r
 
 def local(name: str, view: View) -> Iterator[Sentence]:
     """The relations that hold at some places outside of which all is right."""
-    for where, masks in (*places(view), *wherever_wrong(view)):
+    for where, masks in places(view):
         relations = (*NUMBERS, *COMBINED) if where.startswith(("in column", "in entry")) else NUMBERS
-        wrong = f"It is wrong only {where}. There: " if where != "in some numbers" else "Where it is wrong: "
-        yield from related(name + wrong, view.at(masks), relations)
+        yield from related(f"{name}It is wrong only {where}. There: ", view.at(masks), relations)
+    if masks := wherever_wrong(view):  # which value stands for which is known there, if there are but two
+        relations = [r for r in NUMBERS if r is not values_taken_for_others]
+        yield from related(f"{name}Where it is wrong: ", view.at(masks), relations)
 
 
 def directed(name: str, view: View) -> Iterator[Sentence]:
@@ -173,13 +176,12 @@ def narrow_places(view: View) -> Iterator[str]:
     return (where for where, masks in places(view) if sum(int(m.sum()) for m in masks) <= half)
 
 
-def wherever_wrong(view: View) -> Iterator[tuple[str, list[np.ndarray]]]:
+def wherever_wrong(view: View) -> list[np.ndarray]:
     """The places that are wrong, if there are several, some are right, and there is more to say than no for yes."""
     wrong = view.wrong() if view.shaped else []
     count = sum(int(w.sum()) for w in wrong)
     truths = all(np.isin(a, (0, 1)).all() for a in (*view.expected, *view.got))
-    if 2 < count < sum(w.size for w in wrong) and not truths:
-        yield "in some numbers", wrong
+    return wrong if 2 < count < sum(w.size for w in wrong) and not truths else []
 
 
 def another_form(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
@@ -208,7 +210,7 @@ def another_form(question: Question, cases: Sequence[Case], outputs: Sequence[ob
 
 
 def tuple_in_another_order(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
-    """Two outputs exchanged."""
+    """Two outputs exchanged, or one in the place of another."""
     got = [output for output in outputs if isinstance(output, tuple)]
     count = len(parts(cases[0].expected))
     if len(got) < len(outputs) or any(len(output) != count for output in got):
@@ -220,6 +222,11 @@ def tuple_in_another_order(question: Question, cases: Sequence[Case], outputs: S
             turned = [tuple(parts(case.expected)[k] for k in order) for case in cases]
             if all(alike(question, a, b) for a, b in zip(turned, got, strict=True)):
                 yield Sentence("relation", f"Outputs {j + 1} and {i + 1} are exchanged.")
+    for i, j in itertools.permutations(range(count), 2):
+        other = [tuple(parts(case.expected)[j if k == i else k] for k in range(count)) for case in cases]
+        same = all(alike(question, a, b) for a, b in zip(other, got, strict=True))
+        if same and not all(alike(question, case.expected, a) for case, a in zip(cases, other, strict=True)):
+            yield Sentence("relation", f"Output {i + 1} holds what output {j + 1} should be.")
 
 
 # ---------------------------------------------------------------------------------------- functions that are tried

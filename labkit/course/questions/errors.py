@@ -218,7 +218,7 @@ TABLE = {
         "&, |, ^ and ~ work on truth values and whole numbers: compare first, in brackets, as in (a > 0) & (b > 0)."
     ),
     r"TypeError: only (?:length-1|0-dimensional|integer scalar|size-1) arrays": (
-        "Python wants one number there and gets an array: use NumPy's function, np.exp for math.exp, or take one entry."
+        "Python wants one number there and gets an array: is a sum or an index missing, or np.exp for math.exp?"
     ),
     r"TypeError: (?:int|float)\(\) argument must be|TypeError: must be real number, not": (
         "Python wants one number there and gets a list or a tuple: which of its entries do you mean?"

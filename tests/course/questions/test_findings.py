@@ -180,6 +180,10 @@ def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
     return n
 
 
+def across_twice(T_base_grasp, middle):
+    return (find("07_grasp.slip_across").reference(T_base_grasp, middle)[1],) * 2
+
+
 def without_the_mean(features, mean, covariance, allowed):
     return find("09_other_stacks.choose_region").reference(features, 0 * mean, covariance, allowed)
 
@@ -247,6 +251,7 @@ NAMED = [
     ("07_grasp.slip_across", in_metres, "1000"),
     ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
     ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
+    ("07_grasp.slip_across", across_twice, "Output 1 holds what output 2 should be"),
     ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
     ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),
     ("06_back_projection.fit_plane", plane_with_the_old_d, "n . m = d"),
@@ -278,8 +283,17 @@ def without_blue(rgb, palette):
     return np.where(found.any(axis=-1), found.cumsum(axis=-1).argmax(axis=-1), 255)
 
 
+def walk_without_memory(psi, w):
+    labels = [psi[-1].argmin()]
+    for best, weight in zip(psi[-2::-1], w[::-1], strict=True):
+        stays = best <= best.min() + weight
+        labels.append(labels[-1] if stays[labels[-1]] else best.argmin())
+    return np.array(labels[::-1])
+
+
 MISLED = [  # what was said of them by accident
     ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
+    ("02_crf.row_labels", walk_without_memory, "Where it is wrong: Wherever"),
     ("08_node.decode_depth", three_bytes_each, "It fails only in cases where height"),
     ("01_labels.labels_from_colours", without_blue, "where rgb is 0"),
     ("09_other_stacks.hsv_mask", every_channel_wraps, "largest value"),
