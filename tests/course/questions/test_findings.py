@@ -238,6 +238,7 @@ NAMED = [
     ("08_node.pose_at", nobody_knows_at_the_ends, "in more cases than are asked for"),
     ("08_node.pack_cloud", a_fourth_column_of_doubles, "float64"),
     ("01_labels.labels_from_segmentation", unseen_looked_up, "16777215"),
+    ("01_labels.labels_from_segmentation", mask_of_16_bits, "has 24 bits"),
     ("01_labels.labels_from_colours", any_channel_in_a_loop, "is one of them enough"),
     ("01_labels.one_hot", planes_up_to_the_largest, "nothing to stack"),
     ("01_labels.resize_labels", scaled_upside_down, "y holds 3: is it used as an index?"),

@@ -31,7 +31,7 @@ QUESTION = Question(
     inputs=_raw_mask,
     by_hand=(
         (np.array([[-1, 0, 1], [2, 1 + (1 << 24), 2 + (3 << 24)]], np.int32), np.array([1, 3, 2], np.uint8)),
-        (np.array([[65537, 65538 + (1 << 24)]], np.int32), (np.arange(65540) % 3).astype(np.uint8)),  # many bodies
+        (np.array([[65537, 65538 + (1 << 24)]], np.int32), (np.arange(65540) // 7 % 4).astype(np.uint8)),  # many bodies
         (np.array([[5 << 24, 3 + (12 << 24)]], np.int32), np.array([2, 0, 0, 1], np.uint8)),
     ),
     rtol=0.0,
@@ -86,3 +86,8 @@ def body_for_class(segmentation, class_of_body):
 def nothing_looked_up(segmentation, class_of_body):
     """IndexError, wherever nothing is seen."""
     return class_of_body[segmentation & 0xFFFFFF]
+
+
+@wrong(QUESTION, "The body has 24 bits, six hexadecimal digits: how many does your mask keep?")
+def sixteen_bits(segmentation, class_of_body):
+    return np.where(segmentation >= 0, class_of_body[np.where(segmentation >= 0, segmentation & 0xFFFF, 0)], 0)
