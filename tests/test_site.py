@@ -3,6 +3,7 @@
 It runs in the environment of `make site` (`make test-site`); in any other there is no Sphinx, and it skips.
 """
 
+import re
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -18,6 +19,7 @@ PAGES = [
     "lessons/02_crf.html",
     "labs/04_iou/04_iou.html",
     "out/reference/labkit.geometry.projection.html",
+    "genindex.html",
 ]
 
 
@@ -67,6 +69,16 @@ def test_every_link_inside_the_site_leads_somewhere(pages):
             if not target.exists() or (known and parts.fragment and unquote(parts.fragment) not in known.ids):
                 dead.append(f"{path.name}: {link}")
     assert not dead
+
+
+def test_readers_are_two_clicks_from_what_they_look_for(site, pages):
+    """The bugs, a first lesson, a syllabus, `back_project`: from the first page's own text, without the side bar."""
+    text = (site / "index.html").read_text().split("<article")[1]
+    wanted = {"lessons/errata.html", "lessons/01_labels.html", "docs/teaching.html", "genindex.html"}
+    assert wanted <= set(re.findall(r'href="([^"#]+)', text))
+    assert "syllabus" in text
+    places = "out/reference/labkit.geometry.projection.html#labkit.geometry.projection.back_project"
+    assert places in pages[site / "genindex.html"].links
 
 
 def test_no_page_loads_anything_from_a_network(pages):

@@ -71,6 +71,12 @@ GUIDES = {
 }
 
 
+# Where four kinds of readers want to go from the first page, under its title.
+SHORTCUTS = (
+    "Ten minutes: [twenty bugs](/lessons/errata.md) in others' code. Learn: [first lesson](/lessons/01_labels.ipynb). "
+    "Teach: [syllabus](/docs/teaching.md). Use: {ref}`all names of the library <genindex>`."
+)
+
 # ------------------------------------------------------------------------------------------- what stands where
 
 
@@ -127,7 +133,7 @@ def contents() -> str:
         "Lessons": [*LESSONS, "lessons/errata"],
         "Labs": written("labs", ".ipynb"),
         **{name: [page for page in pages if (ROOT / f"{page}.md").exists()] for name, pages in GUIDES.items()},
-        "Reference": [f"out/reference/{name}" for name in MODULES],
+        "Reference": ["genindex", *(f"out/reference/{name}" for name in MODULES)],
     }
     trees = [
         "\n".join(["", "```{toctree}", ":hidden:", f":caption: {name}", *(f"/{page}" for page in pages), "```", ""])
@@ -164,7 +170,7 @@ def read_source(app, page: str, source: list[str]) -> None:
     path = ROOT / page
     if (ROOT / f"{page}.md").exists():
         text = links_that_lead_somewhere(source[0], path.parent.relative_to(ROOT))
-        source[0] = text + contents() if page == root_doc else text
+        source[0] = text.replace("\n\n", f"\n\n{SHORTCUTS}\n\n", 1) + contents() if page == root_doc else text
         return
     if not (ROOT / f"{page}.ipynb").exists():
         return
