@@ -15,9 +15,9 @@ from jaxtyping import Bool, Integer
 
 from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
-from labkit.crf.maxflow_kernels import Graph, max_flow, new_forest
+from labkit.crf.maxflow_kernels import SOURCE, Graph, max_flow, new_forest
 from labkit.crf.messages import _trws
-from labkit.crf.move_kernels import RING, SINK, expansion_move, swap_move
+from labkit.crf.move_kernels import RING, expansion_move, swap_move
 
 START_SWEEPS = 6
 # How far flow is pushed on without search trees, in pixels: from a good start the ways are shorter than in one cut.
@@ -121,7 +121,7 @@ class Moves:
         The cut with the fewest changes is taken, so that any change at all lowers the energy.
         """
         _, _, tree = self.cut(expansion_move, alpha)
-        takes = self.nodes[tree == SINK]
+        takes = self.nodes[tree == SOURCE]
         self.labels[takes] = alpha
         return len(takes) > 0
 
@@ -132,7 +132,7 @@ class Moves:
             return False
         before = self.labels[self.nodes]
         part = (before == alpha) | (before == beta)
-        self.labels[self.nodes[part]] = np.where(tree[part] == SINK, beta, alpha)
+        self.labels[self.nodes[part]] = np.where(tree[part] == SOURCE, beta, alpha)
         return True
 
     def cut(self, question: Callable, *classes: int, near: int = NEAR):

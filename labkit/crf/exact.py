@@ -10,7 +10,7 @@ from jaxtyping import Float, Int, UInt8
 
 from labkit.crf.energy import MapResult, PottsCRF, pair_slices
 from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
-from labkit.crf.maxflow_kernels import SINK, Graph, both_ways, max_flow, new_forest
+from labkit.crf.maxflow_kernels import SOURCE, Graph, both_ways, max_flow, new_forest
 from labkit.support.validation import require
 
 MAX_LABELLINGS = 2**22
@@ -114,8 +114,9 @@ def cut_grid(
     """Return the maximum flow through a flat grid with a ring (`integers`), and 1 on the sink's side of a cut."""
     nodes = pixel_numbers(size)
     trees = new_forest(len(excess))
-    flow = max_flow(Graph(both_ways(weights, step), excess, step), *trees, nodes, NEAR)
-    return int(flow), (inside(trees[0].tree, size) == SINK).astype(np.uint8)
+    # Arcs go both ways, so that source and sink can change places: the source's side is the one that max_flow tells.
+    flow = max_flow(Graph(both_ways(weights, step), -excess, step), *trees, nodes, NEAR)
+    return int(flow), (inside(trees[0].tree, size) == SOURCE).astype(np.uint8)
 
 
 def enumerate_labellings(crf: PottsCRF) -> Iterator[tuple[UInt8[np.ndarray, "n H W"], Float[np.ndarray, "n"]]]:

@@ -50,22 +50,26 @@ def both_ways(weights, step):
 
 @njit(cache=True, nogil=True)
 def max_flow(graph, forest, active, orphans, nodes, near):
-    """Send all the flow that fits and return its value; forest.tree then holds the side of a minimum cut of each node.
+    """Send all the flow that fits and return its value; forest.tree is then SOURCE on that side of a minimum cut.
 
-    nodes: those that take part. capacity (N, K) and excess (N,), integers, are left holding what remains. A node in no
-    tree may go to either side. near: how far flow goes without trees, see `push_nearby`.
+    Of all minimum cuts it is the one with the fewest nodes on that side. nodes: those that take part. capacity (N, K)
+    and excess (N,), integers, are left holding what remains. near: how far flow goes without trees, see `push_nearby`.
     """
     tree, parent, dist, stamp = forest
     flow = 0
     for n in nodes:
         flow += max(graph.excess[n], 0)
     push_nearby(graph, dist, active, nodes, near)
+    roots = 0
     for n in nodes:
         flow -= max(graph.excess[n], 0)
         tree[n] = SOURCE if graph.excess[n] > 0 else SINK if graph.excess[n] < 0 else FREE
         parent[n], dist[n], stamp[n] = ROOT, 1, 0
+        roots += tree[n] != FREE
+    # The source's tree finds every way by growing alone. Where much is free, two trees that grow meet sooner.
+    both_grow = 2 * roots < len(nodes)
     for n in nodes:
-        if tree[n] != FREE and meets_others(graph, tree, n):
+        if (tree[n] == SOURCE or (both_grow and tree[n] == SINK)) and meets_others(graph, tree, n):
             push(active, n)
     time = 0
     while active.ends[0] != active.ends[1]:

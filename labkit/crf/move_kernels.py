@@ -7,8 +7,6 @@ and all arcs of `nodes`. Arrays are flat with a ring (`integers`); ring pixels h
 import numpy as np
 from numba import njit
 
-from labkit.crf.maxflow_kernels import SINK, SOURCE  # noqa: F401
-
 RING = 255
 
 
@@ -20,11 +18,11 @@ def pair_weight(weights, n, m, k, K):
 
 @njit(cache=True, nogil=True)
 def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
-    """Ask of each pixel: keep your label (the source's side), or take `alpha`?
+    """Ask of each pixel: keep your label, or take `alpha` (the source's side)?
 
     With x = 1 for taking alpha, two pixels of one label disagree if x_p != x_q: an arc both ways. Two pixels of
     different labels disagree unless both take alpha: w (1 - x_p x_q) = w (1 - x_p) + w x_p (1 - x_q), which is a cost
-    of keeping p and an arc from q to p. Beside a pixel of label alpha keeping costs w, and beside a pixel that stays
+    of keeping p and an arc from p to q. Beside a pixel of label alpha keeping costs w, and beside a pixel that stays
     with the same label taking alpha does.
     """
     K = len(step)
@@ -47,16 +45,17 @@ def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
                 taking -= w
             elif not free[m]:
                 taking += w if labels[m] == labels[n] else 0
-            elif labels[m] == labels[n] or 2 * k >= K:
+            elif labels[m] == labels[n]:
                 capacity[n, k] = w
-            else:
+            elif 2 * k < K:
+                capacity[n, k] = w
                 taking -= w
-        excess[n] = taking
+        excess[n] = -taking
 
 
 @njit(cache=True, nogil=True)
 def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
-    """Ask each pixel labelled alpha (the source's side) or beta which of the two it takes; all pixels are free.
+    """Ask each pixel labelled alpha or beta (the source's side) which of the two it takes; all pixels are free.
 
     A plain minimum cut between these pixels; the others are left out, as whatever they disagree about stays. Returns
     the value of the cut that stands for the present labels.
@@ -67,8 +66,8 @@ def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
     for n in nodes:
         capacity[n] = 0
         takes_part = labels[n] in (alpha, beta)
-        excess[n] = unary[n, beta] - unary[n, alpha] if takes_part else 0
-        present += max(excess[n], 0) if labels[n] == beta else max(-excess[n], 0)
+        excess[n] = unary[n, alpha] - unary[n, beta] if takes_part else 0
+        present += max(-excess[n], 0) if labels[n] == beta else max(excess[n], 0)
         if takes_part:
             for k in range(K):
                 m = n + step[k]

@@ -13,8 +13,9 @@ import numpy as np
 from labkit.crf.cuts import Moves, trws_expansion
 from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.integers import pixel_numbers, quantise
+from labkit.crf.maxflow_kernels import SOURCE
 from labkit.crf.message_kernels import trws_bound
-from labkit.crf.move_kernels import SOURCE, energy_of, fold_fixed, persistency_test
+from labkit.crf.move_kernels import energy_of, fold_fixed, persistency_test
 
 # If more of the pixels than these shares are left after the first test, or after all, "trws+expansion" solves the image
 # as a whole: it takes less time then.
