@@ -24,7 +24,7 @@ PAGE = HERE.parent.parent / "BENCHMARKS.md"
 INTRODUCTION = """# Benchmarks
 
 `make bench` writes this page. What stands in one table was measured side by side in one run; times are medians, and on
-another machine they differ, while their ratios hold.
+another machine they differ, while their ratios hold. Each section says when it was measured; those that do not, on 2026-11-21.
 """
 SECTION = "<!-- bench: {} -->"
 QUIET_LOAD, PATIENCE_S = 0.5, 900.0
@@ -71,7 +71,8 @@ def measure(name: str, folder: Path) -> str:
     seconds = time.perf_counter() - start
     title, _, rest = description.partition("\n")
     busy = "" if load < QUIET_LOAD else f" after {PATIENCE_S / 60:.0f} minutes of waiting: the machine was never quiet"
-    footer = f"<sub>Measured in {seconds:.0f} s on {machine()}; load before it {load:.1f}{busy}.</sub>"
+    when = f"Measured on {time.strftime('%Y-%m-%d')} in {seconds:.0f} s"
+    footer = f"<sub>{when} on {machine()}; load before it {load:.1f}{busy}.</sub>"
     return "\n\n".join(part for part in (f"## {title.rstrip('.')}", rest.strip(), table.strip(), footer) if part)
 
 
