@@ -24,7 +24,8 @@ PAGE = HERE.parent.parent / "BENCHMARKS.md"
 INTRODUCTION = """# Benchmarks
 
 `make bench` writes this page. What stands in one table was measured side by side in one run; times are medians, and on
-another machine they differ, while their ratios hold. Each section says when it was measured; those that do not, on 2026-11-21.
+another machine they differ, while their ratios hold. Each section says when it was measured; those that do not, on
+2026-11-21.
 """
 SECTION = "<!-- bench: {} -->"
 QUIET_LOAD, PATIENCE_S = 0.5, 900.0
