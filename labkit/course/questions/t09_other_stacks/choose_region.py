@@ -39,6 +39,7 @@ QUESTION = Question(
         (100.0 * _LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),  # all far away
         (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
         (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
+        (_LINE, np.zeros(3), np.diag([0.9, 0.3, 1.0]), np.array([True, True, True])),  # the inverse twice: 1, not 2
         (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
         (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
         (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
@@ -86,3 +87,14 @@ def chosen_among_the_allowed(features, mean, covariance, allowed):
 @wrong(QUESTION, "If no piece is allowed, the answer is 0: what is argmin of all inf?")
 def chosen_always(features, mean, covariance, allowed):
     return 1 + int(np.where(allowed, distances(features, mean, covariance), np.inf).argmin())
+
+
+@wrong(QUESTION, "The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
+def inverse_twice(features, mean, covariance, allowed):
+    squared = (((features - mean) @ np.linalg.inv(covariance)) ** 2).sum(axis=1)
+    return np.where(allowed, squared, np.inf).argmin() + 1 if allowed.any() else 0
+
+
+@wrong(QUESTION, "If no piece is allowed, the answer is 0, which is no piece's number.")
+def none_is_minus_one(features, mean, covariance, allowed):
+    return choose_region(features, mean, covariance, allowed) or -1

@@ -117,3 +117,9 @@ def hue_by_a_remainder_of_bytes(hsv, lower, upper):
 def mask_always_round(hsv, lower, upper):
     h = hsv[..., 0]
     return ((h >= lower[0]) | (h <= upper[0])) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong(QUESTION, "Only the hue goes round: a saturation from 200 to 100 holds nothing.")
+def all_three_go_round(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    return np.where(lower > upper, above | below, above & below).all(axis=-1)

@@ -107,3 +107,10 @@ def cut_to_a_multiple(bgr, multiple):
 @wrong(QUESTION, "The room is to be 0, not the last pixel once more.")
 def room_like_the_edge(bgr, multiple):
     return scaled(planes(padded(bgr, multiple, "edge")[..., ::-1]))
+
+
+@wrong(QUESTION, "Rows and columns may need different numbers of zeros: compute each by itself.")
+def one_margin_for_both(bgr, multiple):
+    margin = max(-bgr.shape[0] % multiple, -bgr.shape[1] % multiple)
+    rgb = np.pad(bgr[..., ::-1], ((0, margin), (0, margin), (0, 0)))
+    return (rgb.transpose(2, 0, 1)[None] / 255).astype(np.float32)
