@@ -17,7 +17,8 @@ from labkit import training
 from labkit.support.augment import augment
 
 ROOT = Path(__file__).parent.parent
-LAUNCH = (sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2")
+# Loopback by its number: on some machines the own name leads nowhere, and ranks would wait for it.
+LAUNCH = (sys.executable, "-m", "torch.distributed.run", "--standalone", "--local-addr=127.0.0.1", "--nproc-per-node=2")
 
 
 def small_run(model: str, out: Path, epochs: int = 2, memory_gb: float | None = None) -> list[dict]:

@@ -66,7 +66,7 @@ def spread(model: nn.Module) -> nn.Module:
     for layer in model.modules():
         if type(layer) is nn.BatchNorm2d and layer.affine and layer.track_running_stats:
             layer.__class__ = BatchNormOfAllRanks  # it keeps its weights, and its place in the model
-    return nn.parallel.DistributedDataParallel(model, broadcast_buffers=False)
+    return nn.parallel.DistributedDataParallel(model, forward_sync_buffers=False)
 
 
 class BatchNormOfAllRanks(nn.BatchNorm2d):
