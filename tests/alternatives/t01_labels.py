@@ -2,25 +2,10 @@
 
 import numpy as np
 
-from labkit.course.questions.t01_labels.labels_from_segmentation import numbers_and_seen
-
 
 def labels_from_segmentation__modulo(segmentation, class_of_body):
     with_nothing = np.append(class_of_body, np.uint8(0))
     return with_nothing[np.where(segmentation < 0, -1, segmentation % (1 << 24))]
-
-
-def labels_from_segmentation__loops(segmentation, class_of_body):
-    labels = np.zeros(segmentation.shape, np.uint8)
-    for place, value in np.ndenumerate(segmentation):
-        if value != -1:
-            labels[place] = class_of_body[int(value) - ((int(value) >> 24) << 24)]
-    return labels
-
-
-def labels_from_segmentation__by_body(segmentation, class_of_body):
-    body, seen = numbers_and_seen(segmentation)
-    return sum((seen & (body == number)) * int(c) for number, c in enumerate(class_of_body))
 
 
 def labels_from_segmentation__torch(segmentation, class_of_body):
@@ -34,14 +19,6 @@ def one_hot__eye(y, C):
     return np.vstack([np.eye(C, dtype=np.uint8), np.zeros((1, C), np.uint8)])[np.where(y == 255, C, y)]
 
 
-def one_hot__loops(y, C):
-    Y = np.zeros((*y.shape, C), np.uint8)
-    for place, c in np.ndenumerate(y):
-        if c != 255:
-            Y[(*place, c)] = 1
-    return Y
-
-
 def one_hot__planes(y, C):
     return np.stack([y == c for c in range(C)], axis=-1).astype(int)
 
@@ -53,33 +30,12 @@ def one_hot__torch(y, C):
     return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
 
 
-def labels_from_colours__loops(rgb, palette):
-    """Pixel by pixel, in a dictionary of colours."""
-    names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
-    return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
-
-
-def labels_from_colours__class_by_class(rgb, palette):
-    y = np.full(rgb.shape[:2], 255, np.uint8)
-    for c, colour in enumerate(palette):
-        y[(rgb == colour).all(axis=2)] = c
-    return y
-
-
 def labels_from_colours__as_numbers(rgb, palette):
     """Each colour as one number of 24 bits."""
     weights = np.array([65536, 256, 1])
     picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
     found = picture[..., None] == table
     return (found * np.arange(len(table))).sum(axis=-1) + 255 * ~found.any(axis=-1)
-
-
-def class_shares__loops(y, C):
-    n = [0] * C
-    for c in y.ravel().tolist():
-        if c != 255:
-            n[c] += 1
-    return np.array([count / sum(n) for count in n])
 
 
 def class_shares__one_hot(y, C):
@@ -96,21 +52,6 @@ def class_shares__torch(y, C):
 
     n = torch.bincount(torch.as_tensor(y[y != 255].astype(np.int64)), minlength=C).float()
     return n / n.sum()
-
-
-def resize_labels__integers(y, height, width):
-    H, W = y.shape
-    rows = (2 * np.arange(height) + 1) * H // (2 * height)
-    columns = (2 * np.arange(width) + 1) * W // (2 * width)
-    return y[np.ix_(rows, columns)]
-
-
-def resize_labels__loops(y, height, width):
-    (H, W), out = y.shape, np.empty((height, width), y.dtype)
-    for i in range(height):
-        for j in range(width):
-            out[i, j] = y[int((i + 0.5) * H / height), int((j + 0.5) * W / width)]
-    return out
 
 
 def resize_labels__take(y, height, width):

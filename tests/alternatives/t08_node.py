@@ -4,20 +4,8 @@ import struct
 
 import numpy as np
 
-from labkit.course.questions.t08_node.pack_cloud import finite
 from labkit.course.questions.t08_node.pose_at import neighbours, outside
 from labkit.course.questions.t08_node.quaternion import from_trace, right_quaternion
-
-
-def decode_depth__loops(data, height, width, step, is_bigendian):
-    depth = np.full((height, width), np.nan)
-    for v in range(height):
-        for u in range(width):
-            first, second = int(data[v * step + 2 * u]), int(data[v * step + 2 * u + 1])
-            number = 256 * first + second if is_bigendian else first + 256 * second
-            if number:
-                depth[v, u] = number / 1000.0
-    return depth
 
 
 def decode_depth__struct(data, height, width, step, is_bigendian):
@@ -25,12 +13,6 @@ def decode_depth__struct(data, height, width, step, is_bigendian):
     numbers = np.array([row.unpack_from(bytes(data), v * step) for v in range(height)], np.float32)
     numbers[numbers == 0] = np.nan
     return numbers / np.float32(1000)
-
-
-def decode_depth__strided(data, height, width, step, is_bigendian):
-    order = ">" if is_bigendian else "<"
-    numbers = np.ndarray((height, width), f"{order}u2", np.ascontiguousarray(data).tobytes(), strides=(step, 2))
-    return np.where(numbers != 0, numbers.astype(float), np.nan) / 1e3
 
 
 def decode_depth__torch(data, height, width, step, is_bigendian):
@@ -41,32 +23,6 @@ def decode_depth__torch(data, height, width, step, is_bigendian):
     high, low = (0, 1) if is_bigendian else (1, 0)
     numbers = 256 * pairs[..., high] + pairs[..., low]
     return torch.where(numbers > 0, numbers / 1000, torch.nan)
-
-
-def pair_stamps__loops(a, b, slop):
-    def nearest(stamp, others):
-        return min(range(len(others)), key=lambda k: abs(int(stamp) - int(others[k])), default=-1)
-
-    found = []
-    for i, stamp in enumerate(a):
-        j = nearest(stamp, b)
-        mutual = j >= 0 and nearest(b[j], a) == i and abs(int(stamp) - int(b[j])) <= slop
-        found.append(j if mutual else -1)
-    return np.array(found, int)
-
-
-def pair_stamps__sorted(a, b, slop):
-    def nearest(of, among):
-        after = np.searchsorted(among, of).clip(0, len(among) - 1)
-        before = (after - 1).clip(0)
-        best = np.where(np.abs(of - among[before]) <= np.abs(among[after] - of), before, after)
-        return np.searchsorted(among, among[best])  # the first of equal stamps
-
-    if len(b) == 0:
-        return np.full(len(a), -1)
-    best = nearest(a, b)
-    mutual = nearest(b, a)[best] == np.arange(len(a))
-    return np.where(mutual & (np.abs(a - b[best]) <= slop), best, -1)
 
 
 def pair_stamps__torch(a, b, slop):
@@ -98,19 +54,6 @@ def pose_at__by_an_angle(stamps, positions, quaternions, t):
     return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
 
 
-def pose_at__by_a_frame(stamps, positions, quaternions, t):
-    """Go round the circle that a and the part of b at right angles to it span."""
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    b = np.sign(a @ b) * b
-    beside = b - (a @ b) * a
-    length = np.linalg.norm(beside)
-    angle = share * np.arctan2(length, a @ b)
-    place = [np.interp(float(t - stamps[0]), (stamps - stamps[0]).astype(float), axis) for axis in positions.T]
-    turn = np.cos(angle) * a + np.sin(angle) * beside / max(length, 1e-12)
-    return outside(stamps, t) or (np.array(place), -turn)
-
-
 def pose_at__torch(stamps, positions, quaternions, t):
     import torch
 
@@ -127,20 +70,6 @@ def pack_cloud__struct(P):
     return np.frombuffer(data, np.uint8)
 
 
-def pack_cloud__structured(P):
-    points = np.zeros(len(finite(P)), np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("pad", "V4")]))
-    for axis, name in enumerate("xyz"):
-        points[name] = finite(P)[:, axis]
-    return np.frombuffer(points.tobytes(), np.uint8)
-
-
-def pack_cloud__columns(P):
-    cloud = finite(P)
-    numbers = np.zeros((len(cloud), 4), np.float32)
-    numbers[:, :3] = cloud
-    return numbers.view(np.uint8).reshape(-1)
-
-
 def pack_cloud__torch(P):
     import torch
 
@@ -152,14 +81,6 @@ def pack_cloud__torch(P):
 
 def quaternion__scipy(R):
     return -right_quaternion(R)  # the same rotation
-
-
-def quaternion__eigen(R):
-    S = np.zeros((4, 4))
-    S[:3, :3] = R + R.T - np.trace(R) * np.eye(3)
-    S[:3, 3] = S[3, :3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    S[3, 3] = np.trace(R)
-    return np.linalg.eigh(S)[1][:, -1].astype(np.float32)
 
 
 def quaternion__cases(R):

@@ -4,28 +4,7 @@ import numpy as np
 import torch
 
 from labkit.course.questions.t09_other_stacks.choose_region import chosen
-from labkit.course.questions.t09_other_stacks.hsv_mask import between
 from labkit.course.questions.t09_other_stacks.make_blob import padded
-
-
-def make_blob__loops(bgr, multiple):
-    H, W, _ = bgr.shape
-    tall, wide = H, W
-    while tall % multiple:
-        tall += 1
-    while wide % multiple:
-        wide += 1
-    blob = np.zeros((1, 3, tall, wide), np.float32)
-    for v in range(H):
-        for u in range(W):
-            for c in range(3):
-                blob[0, c, v, u] = bgr[v, u, 2 - c] / 255.0
-    return blob
-
-
-def make_blob__stacked(bgr, multiple):
-    image = padded(bgr, multiple)
-    return np.stack([image[:, :, c].astype(np.float32) / 255 for c in (2, 1, 0)])[np.newaxis]
 
 
 def make_blob__torch(bgr, multiple):
@@ -39,27 +18,6 @@ def make_blob__einsum(bgr, multiple):
     return np.einsum("hwc,dc->dhw", padded(bgr, multiple).astype(np.float32), swap / np.float32(255))[None]
 
 
-def engine_contract__loops(reference, other, tolerance):
-    _C, H, W = reference.shape
-    kept, changed, close = True, 0, 0
-    for v in range(H):
-        for u in range(W):
-            z, y = reference[:, v, u].tolist(), other[:, v, u].tolist()
-            kept = kept and all(abs(a - b) <= tolerance for a, b in zip(z, y, strict=True))
-            changed += int(reference[:, v, u].argmax() != other[:, v, u].argmax())
-            best, second = sorted(z)[:-3:-1]
-            close += best - second <= 2 * tolerance
-    return kept, changed / (H * W), close / (H * W)
-
-
-def engine_contract__without_the_best(reference, other, tolerance):
-    labels = reference.argmax(axis=0)
-    rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
-    margin = reference.max(axis=0) - rest.max(axis=0)
-    kept = bool(np.all(np.abs(other - reference) <= tolerance))
-    return kept, 1.0 - np.mean(labels == other.argmax(axis=0)), np.count_nonzero(margin <= 2 * tolerance) / margin.size
-
-
 def engine_contract__torch(reference, other, tolerance):
     z, y = torch.from_numpy(np.array(reference)), torch.from_numpy(np.array(other))
     best = z.topk(2, dim=0).values
@@ -67,42 +25,9 @@ def engine_contract__torch(reference, other, tolerance):
     return ((z - y).abs() <= tolerance).all(), changed, (best[0] - best[1] <= 2 * tolerance).double().mean()
 
 
-def enlarge__loops(labels, size):
-    W, H = size
-    h, w = labels.shape
-    out = np.zeros((H, W), labels.dtype)
-    for v in range(H):
-        for u in range(W):
-            out[v, u] = labels[int((v + 0.5) * h / H), int((u + 0.5) * w / W)]
-    return out
-
-
-def enlarge__take(labels, size):
-    rows, columns = (
-        ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
-    )
-    return labels.take(rows, axis=0).take(columns, axis=1)
-
-
 def enlarge__torch(labels, size):
     image = torch.from_numpy(labels.astype(np.float64))[None, None]
     return torch.nn.functional.interpolate(image, size[::-1], mode="nearest-exact")[0, 0].long()
-
-
-def hsv_mask__loops(hsv, lower, upper):
-    mask = np.zeros(hsv.shape[:2], bool)
-    for v in range(hsv.shape[0]):
-        for u in range(hsv.shape[1]):
-            h, s, x = (int(value) for value in hsv[v, u])
-            round_ = lower[0] > upper[0]
-            hue = (h >= lower[0] or h <= upper[0]) if round_ else lower[0] <= h <= upper[0]
-            mask[v, u] = hue and lower[1] <= s <= upper[1] and lower[2] <= x <= upper[2]
-    return mask
-
-
-def hsv_mask__modulo(hsv, lower, upper):
-    shifted = (hsv[..., 0].astype(int) - int(lower[0])) % 180 <= (int(upper[0]) - int(lower[0])) % 180
-    return shifted & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
 def hsv_mask__by_table(hsv, lower, upper):
@@ -125,31 +50,6 @@ def hsv_mask__torch(hsv, lower, upper):
     return hue & (above & below)[..., 1:].all(dim=-1)
 
 
-def measure_pieces__loops(pieces):
-    n = int(pieces.max())
-    area, total = [0] * n, [[0, 0] for _ in range(n)]
-    box = [[10**9, 10**9, -1, -1] for _ in range(n)]
-    for v in range(pieces.shape[0]):
-        for u in range(pieces.shape[1]):
-            i = int(pieces[v, u]) - 1
-            if i >= 0:
-                area[i] += 1
-                total[i][0] += u
-                total[i][1] += v
-                box[i] = [min(box[i][0], u), min(box[i][1], v), max(box[i][2], u), max(box[i][3], v)]
-    area = np.array(area)
-    return area, np.array(total) / area[:, None], np.array(box)
-
-
-def measure_pieces__bincount(pieces):
-    flat, n = pieces.ravel(), int(pieces.max())
-    v, u = (grid.ravel() for grid in np.mgrid[: pieces.shape[0], : pieces.shape[1]])
-    area = np.bincount(flat, minlength=n + 1)[1:]
-    middle = np.stack([np.bincount(flat, x, n + 1)[1:] / area for x in (u, v)], axis=1)
-    box = np.array([[f(x[flat == i]) for f in (np.min, np.max) for x in (u, v)] for i in range(1, n + 1)])
-    return area, middle.astype(np.float32), box
-
-
 def measure_pieces__einsum(pieces):
     H, W = pieces.shape
     member = pieces[None] == np.arange(1, pieces.max() + 1)[:, None, None]
@@ -158,20 +58,6 @@ def measure_pieces__einsum(pieces):
     columns, rows = member.any(axis=1), member.any(axis=2)
     last = W - 1 - columns[:, ::-1].argmax(axis=1), H - 1 - rows[:, ::-1].argmax(axis=1)
     return area, middle / area[:, None], np.stack([columns.argmax(axis=1), rows.argmax(axis=1), *last], axis=1)
-
-
-def choose_region__loops(features, mean, covariance, allowed):
-    best, number, P = np.inf, 0, np.linalg.inv(covariance)
-    for i in range(len(features)):
-        off = features[i] - mean
-        if allowed[i] and off @ P @ off < best:
-            best, number = off @ P @ off, i + 1
-    return number
-
-
-def choose_region__einsum(features, mean, covariance, allowed):
-    off = features - mean
-    return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
 
 
 def choose_region__whitened(features, mean, covariance, allowed):

@@ -17,16 +17,16 @@ import numpy as np
 
 from labkit.course.questions import forms, made_of  # noqa: F401  they enter their relations
 from labkit.course.questions.by_number import DIRECTIONS, NUMBERS, values_taken_for_others
-from labkit.course.questions.comparison import Case, Problem, alike, parts, trusted
+from labkit.course.questions.comparison import Case, Problem, alike, parts, plain, trusted
 from labkit.course.questions.errors import explain
 from labkit.course.questions.inputs import changes
 from labkit.course.questions.places import places
 from labkit.course.questions.question import Misconception, Property, Question
 from labkit.course.questions.relations import ARRANGED, COMBINED, LOOSE, Relation, View, attempt
 from labkit.course.questions.slips import Slip, slips
-from labkit.course.questions.steps import changed_steps, steps
+from labkit.course.questions.steps import changed_steps, quiet, steps
 
-MOST_TRIES = 1500  # functions that are tried for one answer: a number, so that all machines say the same
+MOST_TRIES = 4000  # functions that are tried for one answer: a number, so that all machines say the same
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,10 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     """All sentences that are true of wrong outputs, the most specific first."""
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
+    nothing = [isinstance(got, Problem) and "returns None" in got.says for got in outputs]
+    if any(nothing):
+        words = ("In some cases no `return` is reached", "It never reaches a `return` with a value")[all(nothing)]
+        yield Sentence("exception", f"{words}: where does it stand, and is it in a branch or a loop?")
     yield from explained(question, cases, outputs)
     yield from tuple_in_another_order(question, cases, outputs)
     views = list(views_of(question, cases, outputs))
@@ -62,9 +66,10 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
             yield Sentence("input", says)
     for name, view in views:
         yield from local(name, view)
-    for says, function in changed_steps(question.reference):
-        if tried.explains(function):
-            yield Sentence("step", says)
+    for right in (question.reference, *question.ways):
+        for says, function in changed_steps(right, tried.args):
+            if tried.explains(function):
+                yield Sentence("step", says)
     for slip in slips_of(question.reference):
         if tried.explains(lambda args, slip=slip: slip.function(*args)):
             yield Sentence("slip", str(slip))
@@ -238,23 +243,32 @@ class Tried:
     def __init__(self, question: Question, cases: Sequence[Case], outputs: Sequence[object]):
         self.question, self.pairs, self.count = question, with_outputs(question, cases, outputs), 0
 
+    @property
+    def args(self) -> tuple:
+        """Arguments of the first case that is wrong, or of any."""
+        return self.pairs[0][0].args if self.pairs else ()
+
     def explains(self, function: Callable) -> bool:
         """Whether a function gives the outputs (where it fails, the right ones), some of them wrong."""
         self.count += 1
         if not self.pairs or self.count > MOST_TRIES:
             return False
         shown = 0
-        for case, got in self.pairs:
-            new = plain_of(function, case.args)
-            if not alike(self.question, case.expected if new is None else new, got):
-                return False
-            shown += new is not None and not alike(self.question, new, case.expected) and not all_nan(got)
+        with quiet():
+            for case, got in self.pairs:
+                new = made(function, case.args)
+                if not alike(self.question, case.expected if new is None else new, got):
+                    return False
+                shown += new is not None and not alike(self.question, new, case.expected) and not all_nan(got)
         return shown > 0
 
 
-def plain_of(function: Callable, args: tuple) -> object | None:
-    """What a function gives for copies of arguments, as `plain` has it; None if it fails."""
-    output = attempted(trusted, lambda *given: function(given), args)
+def made(function: Callable, args: tuple) -> object | None:
+    """What a function gives for a copy of a tuple of arguments, as `plain` has it; None if it fails."""
+    try:
+        output = plain(function(tuple(a.copy() if isinstance(a, np.ndarray) else a for a in args)))
+    except Exception:
+        return None
     return None if isinstance(output, Problem) else output
 
 

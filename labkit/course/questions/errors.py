@@ -178,7 +178,14 @@ TABLE = {
     r"ValueError: (\w+)\(\) (?:arg is an empty sequence|iterable argument is empty)": (
         "The {1} of nothing: in this case nothing is left. What is right then?"
     ),
-    r"ValueError: zip\(\) argument": "The lists that you go through together have different lengths: print them.",
+    r"ValueError: zip\(\) argument (\d+) is (\w+) than": (
+        "Of the lists that you go through together, number {1} is {2} than those before: print them."
+    ),
+    r"ValueError: array is not broadcastable": "What you add at places has another shape than the places: print both.",
+    r"ValueError: The weights and list don't have the same length": (
+        "np.bincount needs one weight for each number that it counts, in the same order: print both."
+    ),
+    r"ValueError: kth\(=(-?\d+)\) out of bounds \((\d+)\)": "There are only {2} numbers, and you ask for number {1}.",
     r"ValueError: slice step cannot be zero": "The step of a slice is 0 in this case: which number should it be?",
     r"ValueError: .*(?:enough dimensions|too small depth)": (
         "A function gets one number where it wants a row or a matrix: was a sum, or an index, taken too early?"

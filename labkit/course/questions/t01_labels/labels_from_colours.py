@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Question, wrong
+from labkit.course.questions.question import Question, way, wrong
 
 
 def labels_from_colours(rgb, palette):
@@ -39,6 +39,24 @@ QUESTION = Question(
     points=3,
     forbidden=("labkit",),
 )
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(rgb, palette):
+    """Pixel by pixel, in a dictionary of colours."""
+    names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
+    return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
+
+
+@way(QUESTION)
+def class_by_class(rgb, palette):
+    y = np.full(rgb.shape[:2], 255, np.uint8)
+    for c, colour in enumerate(palette):
+        y[(rgb == colour).all(axis=2)] = c
+    return y
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

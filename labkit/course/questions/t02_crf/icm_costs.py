@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Question, wrong
+from labkit.course.questions.question import Question, way, wrong
 from labkit.course.questions.t02_crf import PAIRS, labelled_model
 
 
@@ -40,6 +40,23 @@ QUESTION = Question(
     points=3,
     forbidden=("labkit",),
 )
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loop(y, psi, weights, v, u):
+    """Every pixel asked whether it is a neighbour, in single precision."""
+    costs = psi[v, u].astype(np.float32)
+    for b, a in np.ndindex(*y.shape):
+        step = (b - v, a - u)
+        w = weights[PAIRS.index(step), v, u] if step in PAIRS else 0.0
+        step = (v - b, u - a)
+        w = weights[PAIRS.index(step), b, a] if step in PAIRS else w
+        for c in range(len(costs)):
+            costs[c] += w if c != y[b, a] else 0.0
+    return costs
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.question import Property, Question, way, wrong
 from labkit.course.questions.t07_grasp import cloud
 
 
@@ -47,6 +47,21 @@ QUESTION = Question(
     canonical=lambda yaw: np.array([np.cos(2.0 * yaw), np.sin(2.0 * yaw)]),
     forbidden=("sklearn", "cv2"),
 )
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def formula(Sigma):
+    long = 0.5 * np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1])
+    return (long + np.pi / 2) % np.pi
+
+
+@way(QUESTION)
+def svd(Sigma):
+    axes, _, _ = np.linalg.svd(Sigma[:2, :2])
+    return float(np.arctan2(*axes[::-1, -1]))
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.question import Property, Question, way, wrong
 
 
 def pose_at(stamps, positions, quaternions, t):
@@ -75,6 +75,23 @@ QUESTION = Question(
     canonical=one_of_two,
     forbidden=("scipy",),
 )
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_a_frame(stamps, positions, quaternions, t):
+    """Go round the circle that a and the part of b at right angles to it span."""
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    b = np.sign(a @ b) * b
+    beside = b - (a @ b) * a
+    length = np.linalg.norm(beside)
+    angle = share * np.arctan2(length, a @ b)
+    place = [np.interp(float(t - stamps[0]), (stamps - stamps[0]).astype(float), axis) for axis in positions.T]
+    turn = np.cos(angle) * a + np.sin(angle) * beside / max(length, 1e-12)
+    return outside(stamps, t) or (np.array(place), -turn)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.question import Property, Question, way, wrong
 
 
 def quaternion(R):
@@ -56,6 +56,18 @@ QUESTION = Question(
     ),
     canonical=_one_of_two,
 )
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def eigen(R):
+    S = np.zeros((4, 4))
+    S[:3, :3] = R + R.T - np.trace(R) * np.eye(3)
+    S[:3, 3] = S[3, :3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    S[3, 3] = np.trace(R)
+    return np.linalg.eigh(S)[1][:, -1].astype(np.float32)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Property, Question, wrong
+from labkit.course.questions.question import Property, Question, way, wrong
 
 
 def enlarge(labels, size):
@@ -42,6 +42,28 @@ QUESTION = Question(
     ),
     forbidden=("cv2", "PIL"),
 )
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(labels, size):
+    W, H = size
+    h, w = labels.shape
+    out = np.zeros((H, W), labels.dtype)
+    for v in range(H):
+        for u in range(W):
+            out[v, u] = labels[int((v + 0.5) * h / H), int((u + 0.5) * w / W)]
+    return out
+
+
+@way(QUESTION)
+def take(labels, size):
+    rows, columns = (
+        ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
+    )
+    return labels.take(rows, axis=0).take(columns, axis=1)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

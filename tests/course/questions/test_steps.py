@@ -1,0 +1,125 @@
+"""A step of the right answer taken otherwise: each change is said of an answer that makes it; none runs without end."""
+
+import contextlib
+
+import jaxtyping
+import numpy as np
+import pytest
+
+from labkit.course.questions.comparison import expected_cases
+from labkit.course.questions.diagnosis import sentences
+from labkit.course.questions.question import Question, way
+from labkit.course.questions.run import run
+from labkit.course.questions.steps import MOST_STEPS, changed_steps, traced
+
+
+@pytest.fixture(autouse=True)
+def as_outside_the_suite(shape_checks_off_for_bad_input):
+    """Without the shape checks."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+
+
+def shares(a, k, limit):
+    """Of each row without its last number, the shares of what is above a limit, each to the power of k."""
+    kept = a[:, :-1] * (a[:, :-1] > limit)
+    return (kept / kept.sum(axis=1, keepdims=True)) ** k - np.maximum(a[:, 1:], limit) / a[0, 1]
+
+
+SHARES = Question(
+    name="00_test.shares",
+    reference=shares,
+    inputs=lambda rng: (rng.random((4, 6)) + 0.5, float(rng.uniform(1.5, 3.0)), float(rng.uniform(0.6, 0.8))),
+    by_hand=((np.array([[1.0, 3.0, 4.0], [2.0, 1.5, 1.0]]), 2.0, 1.2),),
+)
+
+
+@way(SHARES)
+def loops(a, k, limit):
+    found = np.zeros((len(a), a.shape[1] - 1))
+    for i in range(len(a)):
+        total = sum(x for x in a[i, :-1] if x > limit)
+        for j in range(a.shape[1] - 1):
+            share = a[i, j] / total if a[i, j] > limit else 0.0
+            found[i, j] = share**k - max(a[i, j + 1], limit) / a[0, 1]
+    return found
+
+
+def answer(
+    operation=lambda s, k: s**k, total=np.sum, over=1, above=np.greater, larger=np.maximum, place=(0, 1), end=-1
+):
+    """An answer like the reference, with one of its steps taken otherwise."""
+
+    def wrong(a, k, limit):
+        kept = a[:, :-1] * above(a[:, :end][:, : a.shape[1] - 1], limit)
+        part = larger(a[:, 1:], limit) / a[place]
+        return operation(kept / total(kept, axis=over, keepdims=True), k) - part
+
+    return wrong
+
+
+TAKEN_OTHERWISE = [
+    (answer(operation=lambda s, k: s * k), "the power made of a, k and limit, were a product"),
+    (answer(operation=lambda s, k: s), "the power made of a, k and limit, were its first side alone"),
+    (answer(total=np.mean), "the result of sum, made of a and limit, were taken with mean"),
+    (answer(over=0), "the result of sum, made of a and limit, ran over axis 0"),
+    (answer(above=np.less), "the comparison made of a and limit were made with <"),
+    (answer(above=lambda a, b: np.ones(a.shape)), "the comparison made of a and limit were always true"),
+    (answer(larger=np.minimum), "the result of maximum, made of a and limit, were taken with minimum"),
+    (answer(larger=lambda a, b: a), "the result of maximum, made of a and limit, were not taken"),
+    (answer(place=(1, 0)), "the entry or part made of a had its indices 0 and 1 exchanged"),
+    (answer(place=(0, 2)), "a number in the entry or part made of a were one larger"),
+    (lambda a, k, limit: shares(a, k, limit) * (np.arange(len(a)) < len(a) - 1)[:, None], "ended one turn earlier"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(TAKEN_OTHERWISE)))
+def test_a_step_that_is_taken_otherwise_is_named(number):
+    wrong, says = TAKEN_OTHERWISE[number]
+    cases = expected_cases(SHARES, 1)
+    outputs, _ = run(wrong, [case.args for case in cases])
+    said = [sentence.says for sentence in sentences(SHARES, cases, outputs)]
+    assert any(says in sentence for sentence in said), said
+
+
+def test_what_is_said_of_a_step_is_true():
+    """Each sentence comes with the function that it speaks of; where nothing is changed, that is the reference."""
+    args = expected_cases(SHARES, 1)[-1].args
+    assert np.allclose(traced(shares).run(args), shares(*args)) and np.allclose(traced(loops).run(args), shares(*args))
+    for says, function in changed_steps(shares, args):
+        if says.endswith("the comparison made of a and limit were always true."):
+            a, k, limit = args
+            without = (a[:, :-1] / a[:, :-1].sum(axis=1, keepdims=True)) ** k - np.maximum(a[:, 1:], limit) / a[0, 1]
+            assert np.allclose(function(args), without)
+            break
+    else:
+        pytest.fail("nothing is said of the comparison")
+
+
+def halvings(x):
+    """How often x is halved until it is below 1."""
+    n = 0
+    while x >= 1:
+        x, n = x / 2, n + 1
+    return n
+
+
+def test_a_change_that_makes_a_loop_endless_is_given_up():
+    for says, function in changed_steps(halvings, (5.0,)):
+        if "were always true" in says:
+            with pytest.raises(RuntimeError, match="does not end"):
+                function((5.0,))
+            assert traced(halvings).count <= MOST_STEPS + 1
+            break
+    else:
+        pytest.fail("the condition is not changed")
+
+
+def power(n):
+    """The n-th power of two, twice."""
+    return 2**n + (1 << n)
+
+
+def test_a_change_makes_no_number_of_thousands_of_digits():
+    for _, function in changed_steps(power, (40,)):
+        with contextlib.suppress(OverflowError, ValueError, TypeError, ZeroDivisionError):
+            assert abs(function((40,))) < 2**200
