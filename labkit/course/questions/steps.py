@@ -223,14 +223,14 @@ class InFull(ast.NodeTransformer):
 def traced(reference: Callable) -> Traced:
     """A reference whose expressions are steps; raises OSError, SyntaxError or ValueError if it has no source."""
     definition = InFull().visit(definition_of(reference))
+    original = copy.deepcopy(definition)
     arguments = [argument.arg for argument in definition.args.args]
     sources, trace = made_of(definition), Traced(parameters=tuple(arguments))
     paths = [path for i, line in enumerate(definition.body) for path in below(line, (("body", i),))]
     for path in sorted(paths, key=len, reverse=True):  # the inner ones first
-        outer = [follow(definition, path[:n]) for n in range(1, len(path))]
-        node = follow(definition, path)
-        what = outer[-1] if path[-1][0] == "iter" else literal(node)
-        words = words_for(what, outer, path, sources, arguments)
+        outer = [follow(original, path[:n]) for n in range(1, len(path))]
+        what = outer[-1] if path[-1][0] == "iter" else literal(follow(original, path))
+        words, node = words_for(what, outer, path, sources, arguments), follow(definition, path)
         if words:
             compute, operands, options = taken_apart(what, node, sources)
             looped = any(isinstance(o, LOOPS) for o in outer) or isinstance(node, ast.Name)
@@ -250,19 +250,19 @@ def literal(node: ast.AST) -> ast.AST:
 def taken_apart(what: ast.AST, node: ast.AST, sources: dict) -> tuple[Callable, list[ast.AST], list[ast.keyword]]:
     """How a step is computed, and what of: expressions of its operands and its options."""
     if isinstance(what, ast.BinOp):
-        return OPERATIONS[type(what.op)][1], [what.left, what.right], []
+        return OPERATIONS[type(node.op)][1], [node.left, node.right], []
     if isinstance(what, ast.Compare) and len(what.ops) == 1 and type(what.ops[0]) in COMPARISONS:
-        return COMPARISONS[type(what.ops[0])][1], [what.left, *what.comparators], []
+        return COMPARISONS[type(what.ops[0])][1], [node.left, *node.comparators], []
     if isinstance(what, ast.Subscript):
-        return (lambda whole, index: whole[index]), [what.value, index_of(what.slice)], []
+        return (lambda whole, index: whole[index]), [node.value, index_of(node.slice)], []
     if isinstance(what, ast.UnaryOp):
         minus = isinstance(what.op, ast.USub)
-        return ((lambda a: -a) if minus else opposite), [what.operand], []
+        return ((lambda a: -a) if minus else opposite), [node.operand], []
     if isinstance(what, ast.Call) and is_method(what, sources):
         name = what.func.attr
-        return (lambda a, *b, **c: getattr(a, name)(*b, **c)), [what.func.value, *what.args], what.keywords
+        return (lambda a, *b, **c: getattr(a, name)(*b, **c)), [node.func.value, *node.args], node.keywords
     if isinstance(what, ast.Call):
-        return (lambda function, *b, **c: function(*b, **c)), [what.func, *what.args], what.keywords
+        return (lambda function, *b, **c: function(*b, **c)), [node.func, *node.args], node.keywords
     return (lambda value: value), [node], []
 
 
@@ -302,6 +302,8 @@ def words_for(what: ast.AST, outer: Sequence[ast.AST], path: Path, sources: dict
         made = sorted(set().union(*(sources.get(name, set()) for name in names_in(what.iter)))) or made
         return f"the loop over what is made of {listed(made)}" if made else "the loop"
     kind = kind_of(what, arguments)
+    if isinstance(what, ast.Subscript) and is_entry(what, arguments):
+        return kind
     if isinstance(what, ast.Name) or not kind or (path and path[-1][0] == "slice" and isinstance(what, ast.Tuple)):
         return kind if isinstance(what, ast.Name) else ""
     return f"{kind} made of {listed(made) if made else 'fixed numbers'}"
@@ -312,12 +314,19 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
+def is_entry(node: ast.Subscript, arguments: Collection[str]) -> bool:
+    """Whether it is a part of an argument whose place is written in numbers, such as R[0, 2]."""
+    return getattr(node.value, "id", "") in arguments and not names_in(node.slice)
+
+
 def kind_of(node: ast.AST, arguments: Collection[str]) -> str:
     """What kind of step an expression is, in words; "" if it is none."""
     if isinstance(getattr(node, "ctx", None), ast.Store | ast.Del):
         return ""
     if isinstance(node, ast.Name):
         return f"{node.id}, in one of the places where it comes in," if node.id in arguments else ""
+    if isinstance(node, ast.Subscript) and is_entry(node, arguments):
+        return f"{ast.unparse(node)},"
     if isinstance(node, ast.Call):
         name = getattr(node.func, "attr", getattr(node.func, "id", ""))
         known = isinstance(node.func, ast.Attribute) or name in CALLED

@@ -66,8 +66,8 @@ TAKEN_OTHERWISE = [
     (answer(above=lambda a, b: np.ones(a.shape)), "the comparison made of a and limit were always true"),
     (answer(larger=np.minimum), "the result of maximum, made of a and limit, were taken with minimum"),
     (answer(larger=lambda a, b: a), "the result of maximum, made of a and limit, were not taken"),
-    (answer(place=(1, 0)), "the entry or part made of a had its indices 0 and 1 exchanged"),
-    (answer(place=(0, 2)), "a number in the entry or part made of a were one larger"),
+    (answer(place=(1, 0)), "a[0, 1] had its indices 0 and 1 exchanged"),
+    (answer(place=(0, 2)), "a number in a[0, 1] were one larger"),
     (lambda a, k, limit: shares(a, k, limit) * (np.arange(len(a)) < len(a) - 1)[:, None], "ended one turn earlier"),
 ]
 
