@@ -26,7 +26,8 @@ NOT_GRADED = "not graded"
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:46rem;margin:2rem auto;padding:0 1rem;color:#222}
 h1{font-size:1.5rem}.points{float:right;color:#555}section{border-left:5px solid;padding:.2rem 1rem;margin:1rem 0}
 .right{border-color:#2e7d32}.wrong{border-color:#c62828}.warning{background:#fff3cd;padding:.6rem 1rem}
-h2{font-size:1.1rem;margin:.2rem 0}p{margin:.3rem 0}table{border-collapse:collapse}pre{overflow:auto}
+h2{font-size:1.1rem;margin:.2rem 0}h2[id]{font-size:1.3rem;margin-top:2rem}h3{font-size:1rem;margin:.2rem 0}
+p{margin:.3rem 0}table{border-collapse:collapse}pre{overflow:auto}
 td,th{padding:.2rem 1rem;text-align:left;border-bottom:1px solid #ddd}pre{background:#f6f6f6;padding:.5rem}"""
 
 

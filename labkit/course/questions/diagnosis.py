@@ -120,7 +120,9 @@ def explained(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     if not any(raised):
         return
     first = raised.index(True)
-    says = explain(outputs[first].says, dict(zip(question.parameters, cases[first].args, strict=True)))
+    says = explain(
+        outputs[first].says.removeprefix("it raises "), dict(zip(question.parameters, cases[first].args, strict=True))
+    )
     failed = tuple(np.array(float(r)) for r in raised)
     args = tuple(case.args for case in cases)
     view = View(tuple(np.array(0.0) for _ in cases), failed, args, question.parameters, 0.0, 0.0)

@@ -160,7 +160,7 @@ def changed_steps(reference: Callable, args: tuple) -> Iterator[tuple[str, Calla
                 says = "were not taken"
             elif says in UNDONE or (says in STRANGE and "one of the places" in step.words):
                 continue
-            words = step.words.removesuffix(",") + "," * (", " in step.words)
+            words = step.words.removesuffix(",") + "," * (", made of" in step.words or ", in one of" in step.words)
             yield told(trace, f"{words} {says}", number, change)
     for number, words, instead in exchanges(trace, args, calls):
         yield told(
@@ -297,7 +297,7 @@ def words_for(what: ast.AST, outer: Sequence[ast.AST], path: Path, sources: dict
             return ""
         around = (words_for(o, (), (), sources, arguments) for o in reversed(outer) if not isinstance(o, ast.Tuple))
         option = next((o.arg for o in reversed(outer) if isinstance(o, ast.keyword)), "a number")
-        return "" if option == "axis" else f"{option} in {next(filter(None, around), 'the formula')}"
+        return "" if option == "axis" else f"{option} in {next(filter(None, around), 'the formula').removesuffix(',')}"
     if path and path[-1][0] == "iter" and isinstance(what, ast.For | ast.comprehension):
         made = sorted(set().union(*(sources.get(name, set()) for name in names_in(what.iter)))) or made
         return f"the loop over what is made of {listed(made)}" if made else "the loop"

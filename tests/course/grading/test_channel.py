@@ -11,7 +11,9 @@ from hypothesis.extra import numpy as hnp
 
 from labkit.course.grading import worker
 from labkit.course.grading.channel import Changed, Text, decode
-from labkit.course.questions.judge import Problem
+from labkit.course.questions.diagnosis import diagnose
+from labkit.course.questions.judge import Problem, expected_cases
+from labkit.course.questions.question import find
 
 NUMBERS = [dtype for code in "bhilqBHILQ" for dtype in (np.dtype(code),)] + [
     np.dtype(t) for t in ("?", "f2", "f4", "f8")
@@ -138,3 +140,12 @@ def test_a_call_that_changes_its_argument_says_so():
     assert isinstance(got, Changed) and got.position == 1 and got.value[0] == 10.0
     session.namespace["f"] = lambda a, b, c: a
     assert same(decode(session.answer(("call", "f", pickle.dumps(arguments)))), arguments[0])
+
+
+def test_an_exception_that_came_through_the_channel_is_explained():
+    """In the words of the notebook's check, so that the class page counts it as named."""
+    question = find("04_iou.confusion_matrix")
+    cases = expected_cases(question, 0)
+    reply = b"E" + struct.pack("<IB", 0, 0) + b"IndexError: index 255 is out of bounds for axis 0 with size 3"
+    sentence = diagnose(question, cases, [decode(reply) for _ in cases])
+    assert sentence.kind == "exception" and "labelled 255, are used as an index" in sentence.says
