@@ -83,7 +83,7 @@ def whose(shape: tuple[int, ...], args: dict) -> str:
     return f" (the shape of {' and '.join(names)})" if names else ""
 
 
-@when(r"(?:numpy\.exceptions\.)?AxisError: axis (-?\d+) is out of bounds for array of dimension (\d+)")
+@when(r"(?:(?:numpy\.exceptions\.)?AxisError|an exception): axis (-?\d+) is out of bounds for array of dimension (\d+)")
 def no_such_axis(found: re.Match, args: dict) -> str:
     """An axis that there is not."""
     by_hand = f"{found[2]} axes: 0" + (f" to {int(found[2]) - 1}" if int(found[2]) > 1 else "")
@@ -205,7 +205,7 @@ TABLE = {
     ),
     r"ZeroDivisionError": "Something that you divide by is 0 in this case.",
     r"OverflowError|FloatingPointError": "A number grows too large: which exponential, power or cast is it?",
-    r"(?:numpy\.linalg\.)?LinAlgError: Singular matrix": (
+    r"(?:(?:numpy\.linalg\.)?LinAlgError|an exception): Singular matrix": (
         "This matrix has no inverse: is it the one that you mean, and are all its rows filled?"
     ),
     r"(?:numpy\.linalg\.)?LinAlgError": "np.linalg wants square matrices of finite numbers, in the last two axes.",

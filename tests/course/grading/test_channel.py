@@ -146,6 +146,12 @@ def test_an_exception_that_came_through_the_channel_is_explained():
     """In the words of the notebook's check, so that the class page counts it as named."""
     question = find("04_iou.confusion_matrix")
     cases = expected_cases(question, 0)
-    reply = b"E" + struct.pack("<IB", 0, 0) + b"IndexError: index 255 is out of bounds for axis 0 with size 3"
-    sentence = diagnose(question, cases, [decode(reply) for _ in cases])
-    assert sentence.kind == "exception" and "labelled 255, are used as an index" in sentence.says
+    for name, message, says in (
+        ("IndexError", "index 255 is out of bounds for axis 0 with size 3", "labelled 255, are used as an index"),
+        ("AxisError", "axis 1 is out of bounds for array of dimension 1", "There is no axis 1 here"),
+        ("LinAlgError", "Singular matrix", "has no inverse"),
+    ):
+        problem = decode(b"E" + struct.pack("<IB", 0, 0) + f"{name}\0{message}".encode())
+        outputs = [problem if (case.args[0] == 255).any() else case.expected for case in cases]
+        sentence = diagnose(question, cases, outputs)
+        assert sentence.kind == "exception" and says in sentence.says
