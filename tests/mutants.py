@@ -1,7 +1,9 @@
 """Wrong answers by the thousand: copies of a function with one small thing changed, as a slip of the hand would.
 
-OPERATORS are those of `labkit.course.questions.slips`, by which a check recognises slips; HELD_OUT are others, which it
-does not know: branches, neighbouring functions, arguments, keywords, casts and copies.
+OPERATORS are those of `labkit.course.questions.slips`, by which a check recognises slips; HELD_OUT are others, which
+slips do not know: branches, neighbouring functions, arguments, keywords, casts and copies. A check knows functions of
+one family, exchanged arguments, missing options and turns of loops all the same, as steps of a right answer that are
+taken otherwise (`labkit.course.questions.otherwise`).
 """
 
 import ast
