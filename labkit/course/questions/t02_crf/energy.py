@@ -111,3 +111,19 @@ def fourth_kind_at_the_lower_column(y, psi, weights):
 def cheapest_classes(y, psi, weights):
     """The pixels' minima in the place of what the labels cost."""
     return psi.min(axis=2).sum() + (weights * disagreeing(y)).sum()
+
+
+@wrong(QUESTION, "A difference of bytes wraps round, 0 - 1 is 255; and only whether two labels differ counts.")
+def byte_steps(y, psi, weights):
+    steps = np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
+    return unary_part(y, psi) + (weights * steps).sum()
+
+
+@wrong(QUESTION, "The last row and the last column have costs and pairs as well: how far do your loops go?")
+def loops_too_short(y, psi, weights):
+    return unary_part(y[:-1, :-1], psi[:-1, :-1]) + (weights * disagreeing(y))[:, :-1, :-1].sum()
+
+
+@wrong(QUESTION, "The last row has pairs to the right, the last column pairs downward: how far do your loops go?")
+def pairs_of_the_last_row_and_column_skipped(y, psi, weights):
+    return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, :-1].sum()

@@ -112,3 +112,11 @@ def label_of_now(y, psi, weights, v, u):
     """Every class pays for the disagreements of the label that the pixel has."""
     own, owned = pairs_of(weights, v, u)
     return psi[v, u] + sum(w for w, b, a in own + owned if y[b, a] != y[v, u])
+
+
+@wrong(QUESTION, "Seen from the neighbour above to the right you lie below to the LEFT: which kind of pair is that?")
+def upper_diagonals_exchanged(y, psi, weights, v, u):
+    """weights[2] taken for the neighbour's own side, not for yours."""
+    own = pairs_of(weights, v, u)[0]
+    owned = pairs_of(weights[[0, 1, 3, 2]], v, u)[1]
+    return charged(own + owned, y, psi, v, u)

@@ -187,3 +187,23 @@ def column_before_the_first(image, lam, sigma_I, sigma_p):
     kept = inside(image.shape[:2])
     kept[3, :-1, 0] = 1.0
     return gaussian(squares(image), lam, sigma_I, sigma_p, ring=True) * kept
+
+
+@wrong(QUESTION, "One exponential holds both terms, and lam stands before it: exp(a) + exp(b) is not exp(a + b).")
+def two_exponentials_added(image, lam, sigma_I, sigma_p):
+    near = gaussian(np.zeros_like(squares(image)), lam, sigma_I, sigma_p)
+    return gaussian(squares(image), lam, sigma_I, np.inf) + near
+
+
+@wrong(QUESTION, "sigma_I is a difference of colours from 0 to 255: on which scale are yours?")
+def colours_up_to_1(image, lam, sigma_I, sigma_p):
+    return gaussian(squares(image) / 255.0**2, lam, sigma_I, sigma_p)
+
+
+@wrong(QUESTION, "Is your sum of squares still made of bytes? They have no negative numbers: begin with floats.")
+def negated_without_a_sign(image, lam, sigma_I, sigma_p):
+    """The minus of the exponent before an unsigned sum: it becomes almost 2^64."""
+    byte = differences(image).astype(int).astype(np.uint8)
+    with np.errstate(over="ignore"):
+        weights = gaussian(-(-(byte**2).sum(axis=3)).astype(float), lam, sigma_I, sigma_p, ring=True)
+    return np.where(inside(image.shape[:2]), weights, 0.0)

@@ -34,6 +34,7 @@ QUESTION = Question(
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
         (np.array([[0.0, 0.5, 3.0], [1.0, 0.9, 3.0], [3.0, 0.0, 2.5]]), np.array([0.8, 0.3])),
         (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
+        (np.array([[0.0, 1.0], [0.5, 0.4]]), np.array([0.5])),  # the last pixel alone would choose 1
     ),
     points=3,
     properties=(
@@ -83,13 +84,33 @@ def walk(psi, w):
     return np.array(best)
 
 
+def walk_with_origins(psi, w):
+    """The walk, and the class that each came from, (n, C)."""
+    best, came = walk(psi, w), np.zeros(psi.shape, int)
+    for u in range(1, len(psi)):
+        stays = best[u - 1] <= best[u - 1].min() + w[u - 1]
+        came[u] = np.where(stays, np.arange(psi.shape[1]), best[u - 1].argmin())
+    return best, came
+
+
+def traced(came, last):
+    """The way back from the last label, through one row of `came` after the other."""
+    labels = [last]
+    for origin in came[::-1]:
+        labels.append(origin[labels[-1]])
+    return np.array(labels[::-1])
+
+
 @wrong(QUESTION, "That is each pixel's own choice: where did the weights come in?")
 def pixel_by_pixel(psi, w):
     """The weights forgotten."""
     return psi.argmin(axis=1)
 
 
-@wrong(QUESTION, "The cheapest class so far is not yet the class on the cheapest way through the whole row: walk back.")
+@wrong(
+    QUESTION,
+    "The cheapest class so far need not lie on the cheapest way: walk back, and let a pixel keep its class for free.",
+)
 def never_walked_back(psi, w):
     """The minimum at each pixel of the forward walk."""
     return walk(psi, w).argmin(axis=1)
@@ -113,11 +134,17 @@ def next_pairs_weight(psi, w):
 @wrong(QUESTION, "On the way back from pixel u: do you read the row of `came` that belongs to u, or to u - 1?")
 def traced_one_pixel_off(psi, w):
     """The way back read one pixel too early."""
-    best, came = walk(psi, w), np.zeros(psi.shape, int)
-    for u in range(1, len(psi)):
-        stays = best[u - 1] <= best[u - 1].min() + w[u - 1]
-        came[u] = np.where(stays, np.arange(psi.shape[1]), best[u - 1].argmin())
-    labels = [best[-1].argmin()]
-    for origin in came[-2::-1]:
-        labels.append(origin[labels[-1]])
-    return np.array(labels[::-1])
+    best, came = walk_with_origins(psi, w)
+    return traced(came[:-1], best[-1].argmin())
+
+
+@wrong(QUESTION, "The last label is the cheapest by `best`, which holds the whole row, not by the last pixel's psi.")
+def last_pixel_on_its_own(psi, w):
+    return traced(walk_with_origins(psi, w)[1][1:], psi[-1].argmin())
+
+
+@wrong(QUESTION, "Your way back ends one step too early: what came[1] says of the first pixel is not used.")
+def first_pixel_not_reached(psi, w):
+    labels = row_labels(psi, w).copy()
+    labels[0] *= len(labels) == 1
+    return labels

@@ -76,3 +76,10 @@ def source_and_sink_exchanged(psi):
 def one_minimum_for_all(psi):
     """Right as a cut, but both arcs of a pixel stay."""
     return terminals(psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size)
+
+
+@wrong(QUESTION, "A negative cost needs no clipping: less the pixel's smaller cost, both of its arcs are 0 or more.")
+def negative_costs_clipped(psi):
+    clipped = np.maximum(psi, 0.0)
+    lowest = clipped.min(axis=2)
+    return terminals(clipped[..., 1] - lowest, clipped[..., 0] - lowest, lowest.sum())

@@ -69,3 +69,14 @@ def no_floor(p, floor):
 @wrong(QUESTION, "Only small probabilities are lifted: what must a class of probability 1 cost, and what does yours?")
 def clipped_at_both_ends(p, floor):
     return -np.log(np.clip(p, floor, 1.0 - floor))
+
+
+@wrong(QUESTION, "Must yours sum to 1 after the floor? What is not below it stays as it is, and 1 still costs 0.")
+def made_to_sum_to_1_again(p, floor):
+    lifted = np.maximum(p, floor)
+    return -np.log(lifted / lifted.sum(axis=-1, keepdims=True))
+
+
+@wrong(QUESTION, "Not 0 alone counts as the floor: every probability below the floor does.")
+def zeros_lifted(p, floor):
+    return -np.log(np.where(p == 0.0, floor, p))

@@ -118,3 +118,8 @@ def holes_at_depth_zero(depth, K):
     P = back_project(depth, K)
     P[..., 2] = depth
     return P
+
+
+@wrong(QUESTION, "The optical axis meets the image at (cx, cy), where x and y are 0: from where do you count u and v?")
+def counted_from_the_first_pixel(depth, K):
+    return back_project(depth, K_of(K[0, 0], K[1, 1], 0.0, 0.0))

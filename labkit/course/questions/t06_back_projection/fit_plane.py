@@ -79,7 +79,8 @@ def loops(P, sigma):
 
 
 def up(n, centre):
-    n = n * np.sign(n[2])
+    """A plane through centre; a normal that is level stays as it is."""
+    n = -n if n[2] < 0.0 else n
     return n, float(n @ centre)
 
 
@@ -95,7 +96,7 @@ def along_z(P, sigma):
 def largest_spread(P, sigma):
     w = 1.0 / sigma**2
     centre = w @ P / w.sum()
-    return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][0], centre)
+    return up(np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 2], centre)
 
 
 @wrong(QUESTION, "A plane need not contain the origin: from which point are the directions measured?")
@@ -124,3 +125,21 @@ def row_of_the_eigenvectors(P, sigma):
     w = 1.0 / sigma**2
     centre = w @ P / w.sum()
     return up(np.linalg.eigh((P - centre).T * w @ (P - centre))[1][0], centre)
+
+
+@wrong(QUESTION, "d is gone only if you subtract the mean m from the points before you look for n; then d = n . m.")
+def not_centred(P, sigma):
+    return up(np.linalg.eigh(P.T / sigma**2 @ P)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
+
+
+@wrong(QUESTION, "You divide by sigma squared twice: in A one of the two factors has the weight, not both.")
+def weights_in_both_factors(P, sigma):
+    centred = (P - np.average(P, axis=0, weights=sigma**-2.0)) / sigma[:, None] ** 2
+    return up(np.linalg.eigh(centred.T @ centred)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
+
+
+@wrong(QUESTION, "Turn n up before you compute n . m = d: yours still has the sign of the other normal.")
+def d_before_the_turn(P, sigma):
+    centre = np.average(P, axis=0, weights=sigma**-2.0)
+    n = np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 0]
+    return up(n, centre)[0], float(n @ centre)

@@ -91,3 +91,24 @@ def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
 @wrong(QUESTION, "You count the depth alone, and along the optical axis: u and v err as well, and depth acts along q.")
 def depth_straight_ahead_alone(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return abs(T_base_cam[2, 2]) * sigma_depth
+
+
+@wrong(QUESTION, "The depth alone errs in yours: u and v err as well, and move the point sideways by d / f.")
+def depth_alone(*arguments):
+    return abs(shares(*arguments)[2])
+
+
+@wrong(QUESTION, "Both pixel coordinates err, u and v: yours has the share of one of them.")
+def errors_of_u_and_d(*arguments):
+    return np.linalg.norm(shares(*arguments)[[0, 2]])
+
+
+@wrong(QUESTION, "A covariance holds squares: diag(sigma_p, sigma_p, sigma_d) is not yet the S of the lesson.")
+def deviations_taken_for_variances(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    return np.linalg.norm(shares(u, v, d, K, T_base_cam, np.sqrt(sigma_pixel), np.sqrt(sigma_depth)))
+
+
+@wrong(QUESTION, "Depth is measured along z: its column of J is q, whose third entry is 1, not a unit vector.")
+def depth_along_a_unit_ray(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    length = np.linalg.norm(columns(u, v, d, K)[2])
+    return np.linalg.norm(shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth / length))

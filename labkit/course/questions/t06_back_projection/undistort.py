@@ -128,3 +128,13 @@ def one_radius_for_all(pixels, K, k):
         r2 = (ideal**2).sum()
         ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * ideal
+
+
+@wrong(QUESTION, "Minus signs in the factor undo the lens only roughly: guess r, divide what is seen, and repeat.")
+def signs_exchanged(pixels, K, k):
+    return distort(pixels, K, -k)
+
+
+@wrong(QUESTION, "k2 stands beside r to the fourth: square r squared once more.")
+def k2_beside_r_squared(pixels, K, k):
+    return undistort(pixels, K, np.array([k[0] + k[1], 0.0]))
