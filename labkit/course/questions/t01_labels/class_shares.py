@@ -73,3 +73,8 @@ def inverse_shares(y, C):
 def up_to_the_largest_label(y, C):
     n = np.bincount(y[y != 255])
     return n / n.sum()
+
+
+@wrong(QUESTION, "np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")
+def unjudged_as_a_class(y, C):
+    return np.bincount(y.ravel(), minlength=C) / y.size

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import Question, way, wrong
+from labkit.course.questions.question import Property, Question, way, wrong
 
 
 def labels_from_colours(rgb, palette):
@@ -37,6 +37,12 @@ QUESTION = Question(
     rtol=0.0,
     atol=0.0,
     points=3,
+    properties=(
+        Property(
+            "a pixel is 255 where no class has exactly its colour",
+            lambda arguments, y: bool(np.all(y[~(arguments[0][:, :, None] == arguments[1]).all(-1).any(-1)] == 255)),
+        ),
+    ),
     forbidden=("labkit",),
 )
 

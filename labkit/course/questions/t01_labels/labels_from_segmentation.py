@@ -31,7 +31,7 @@ QUESTION = Question(
     inputs=_raw_mask,
     by_hand=(
         (np.array([[-1, 0, 1], [2, 1 + (1 << 24), 2 + (3 << 24)]], np.int32), np.array([1, 3, 2], np.uint8)),
-        (np.array([[65537, 65538 + (1 << 24)]], np.int32), (np.arange(65540) // 7 % 4).astype(np.uint8)),  # many bodies
+        (np.array([[65537, 65538 + (1 << 24)]], np.int32), (np.arange(5, 65545) // 7 % 4).astype(np.uint8)),  # many
         (np.array([[5 << 24, 3 + (12 << 24)]], np.int32), np.array([2, 0, 0, 1], np.uint8)),
     ),
     rtol=0.0,
@@ -109,3 +109,17 @@ def nothing_looked_up(segmentation, class_of_body):
 @wrong(QUESTION, "The body has 24 bits, six hexadecimal digits: how many does your mask keep?")
 def sixteen_bits(segmentation, class_of_body):
     return np.where(segmentation >= 0, class_of_body[np.where(segmentation >= 0, segmentation & 0xFFFF, 0)], 0)
+
+
+@wrong(QUESTION, "The upper bits are the link plus one, not the body: which bits hold the body?")
+def link_looked_up(segmentation, class_of_body):
+    """IndexError, where a link's number is no body's."""
+    return np.where(segmentation >= 0, class_of_body[np.maximum(segmentation >> 24, 0)], 0)
+
+
+@wrong(QUESTION, "You find the base and link 0 alone, and a body may have many links. What holds for all of them?")
+def first_link_alone(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for body, c in enumerate(class_of_body):
+        labels[(segmentation == body) | (segmentation == body + (1 << 24))] = c
+    return labels

@@ -113,3 +113,18 @@ def rounded(y, height, width):
     H, W = y.shape
     rows, columns = (np.round((np.arange(n) + 0.5) * old / n - 0.5).astype(int) for n, old in ((height, H), (width, W)))
     return y[rows[:, None], columns]
+
+
+@wrong(QUESTION, "The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+def rounded_up(y, height, width):
+    """IndexError, where the last centre is rounded to the number of pixels."""
+    rows, columns = (
+        np.round((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip((height, width), y.shape, strict=True)
+    )
+    return y[rows[:, None], columns]
+
+
+@wrong(QUESTION, "Columns are counted along W and rows along H: you take H for both.")
+def height_for_both(y, height, width):
+    rows, columns = (((np.arange(n) + 0.5) * len(y) / n).astype(int) for n in (height, width))
+    return y[rows[:, None], columns]

@@ -120,3 +120,10 @@ def axes_as_rows(position, approach, closing):
     T = grasp_pose(position, approach, closing)
     T[:3, :3] = T[:3, :3].T.copy()
     return T
+
+
+@wrong(QUESTION, "T_base_grasp takes the grasp's origin to its place in the base frame: what is its last column?")
+def position_of_the_inverse(position, approach, closing):
+    T = grasp_pose(position, approach, closing)
+    T[:3, 3] = -T[:3, :3].T @ position
+    return T

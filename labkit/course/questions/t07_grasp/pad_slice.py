@@ -102,3 +102,9 @@ def cut_in_the_base_frame(P, T_base_grasp, half):
 def one_side_of_the_pad(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[(x >= 0.0) & (x <= half)])
+
+
+@wrong(QUESTION, "Half of the width is a length, not a place: what is the mean of the outermost two?")
+def half_of_the_width(P, T_base_grasp, half):
+    width = pad_slice(P, T_base_grasp, half)[1]
+    return width / 2, width

@@ -128,3 +128,14 @@ def borders_left_out(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     out = np.abs(y) - width / 2
     return int(((np.abs(x) < half) & (out > 0.0) & (out < thickness) & (z < tips)).sum())
+
+
+@wrong(QUESTION, "The hand may lean: what is above the tips is so along z of the grasp frame, not of the base.")
+def heights_of_the_base_frame(P, T_base_grasp, width, half, thickness, tips):
+    x, y, _ = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, T_base_grasp[2, 3] - P[:, 2], width, half, thickness, tips)
+
+
+@wrong(QUESTION, "A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
+def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width, half, np.inf, tips)

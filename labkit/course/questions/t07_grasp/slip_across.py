@@ -81,3 +81,15 @@ def left_in_the_tables_plane(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3]) * (1.0, 1.0, 0.0)
     pushed = np.abs(off @ T_base_grasp[:3, 1])
     return pushed, np.sqrt(np.maximum(off @ off - pushed**2, 0.0))
+
+
+@wrong(QUESTION, "The base's x is where the jaws close in the example only: which column of T says so for any hand?")
+def in_the_base_frame_of_the_example(T_base_grasp, middle):
+    off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
+    return off[0], off[1]
+
+
+@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(T_base_grasp, middle):
+    off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ middle - T_base_grasp[:3, 3])
+    return off[1], off[0]
