@@ -330,5 +330,7 @@ def kind_of(node: ast.AST, arguments: Collection[str]) -> str:
     if isinstance(node, ast.Call):
         name = getattr(node.func, "attr", getattr(node.func, "id", ""))
         known = isinstance(node.func, ast.Attribute) or name in CALLED
-        return f"the result of {name}," if known else ""
+        axis = next((literal(k.value) for k in node.keywords if k.arg == "axis"), None)
+        over = f" over axis {axis.value}" if isinstance(axis, ast.Constant) else ""
+        return f"the result of {name}{over}," if known else ""
     return KINDS.get(type(node.op) if isinstance(node, ast.BinOp | ast.UnaryOp) else type(node), "")

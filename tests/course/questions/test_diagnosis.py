@@ -75,7 +75,7 @@ RELATIONS = [
     (lambda a, k: np.full(a.shape, a.sum()) ** 0.5 + a[0, 0], "Yours do not change from row to row"),
     (lambda a, k: np.zeros((len(a), 9)) + k, "always has length 9"),
     (lambda a, k: a * a.sum(), "a number that stays the same from column to column"),
-    (lambda a, k: a.sum(axis=1, keepdims=True), "What you return is the result of sum, made of a"),
+    (lambda a, k: a.sum(axis=1, keepdims=True), "What you return is the result of sum over axis 1, made of a"),
     (lambda a, k: table(a, k) + a.mean(axis=0), "the right values plus the mean of a over axis 0"),
     (lambda a, k: np.where(table(a, k) > 0.8, np.nan, table(a, k)), "What is wrong is NaN: nothing was written there"),
     (lambda a, k: table(a, k) + (table(a, k) > 0.8) * a, "Wherever yours are wrong, they are too large"),

@@ -60,8 +60,8 @@ def answer(
 TAKEN_OTHERWISE = [
     (answer(operation=lambda s, k: s * k), "the power made of a, k and limit were a product"),
     (answer(operation=lambda s, k: s), "the power made of a, k and limit were its first side alone"),
-    (answer(total=np.mean), "the result of sum, made of a and limit, were taken with mean"),
-    (answer(over=0), "the result of sum, made of a and limit, ran over axis 0"),
+    (answer(total=np.mean), "the result of sum over axis 1, made of a and limit, were taken with mean"),
+    (answer(over=0), "the result of sum over axis 1, made of a and limit, ran over axis 0"),
     (answer(above=np.less), "the comparison made of a and limit were made with <"),
     (answer(above=lambda a, b: np.ones(a.shape)), "the comparison made of a and limit were always true"),
     (answer(larger=np.minimum), "the result of maximum, made of a and limit, were taken with minimum"),
