@@ -76,3 +76,8 @@ def grad_of_squared_error(z, y):
     p = softmax(z)
     error = p - one_hot(z, y)
     return p * (error - (p * error).sum(axis=-1, keepdims=True)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "The other classes move, too: where c is not the true class the slope is p[c], not 0.")
+def grad_of_the_true_class_alone(z, y):
+    return (softmax(z) - 1.0) * one_hot(z, y)

@@ -114,3 +114,11 @@ def kept_inside_the_image(kernels, strides, paddings, u):
     """No pixel before 0."""
     first, last = back(kernels, strides, paddings, u)
     return max(first, 0), last
+
+
+@wrong(QUESTION, "That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+def centred(kernels, strides, paddings, u):
+    """A window of the right width around the output's place in the image."""
+    first, last = back(kernels, strides, paddings, u)
+    middle = u * int(np.prod(strides))
+    return middle - (last - first + 1) // 2, middle + (last - first + 1) // 2

@@ -120,3 +120,9 @@ def overlapping_blocks(x, g):
         v, u = divmod(int(x[i : i + 2, j : j + 2].argmax()), 2)
         out[i + v, j + u] += g[i, j]
     return out
+
+
+@wrong(QUESTION, "The places are right, but g is tiled: np.repeat, not np.tile, gives each block its own gradient.")
+def gradients_tiled(x, g):
+    """Maxima beside their own blocks, gradients beside others."""
+    return (x == to_all_four(x, blocks(x).max(axis=2))) * np.tile(g, (2, 2))

@@ -97,3 +97,9 @@ def softmax_of_p(p, g):
     """p taken for logits."""
     p = np.exp(p) / np.exp(p).sum(axis=-1, keepdims=True)
     return p * (g - (p * g).sum(axis=-1, keepdims=True))
+
+
+@wrong(QUESTION, "The sum that is subtracted is one of p g, not of g: classes count by their probability.")
+def plain_sum(p, g):
+    """An unweighted sum of the gradients."""
+    return p * (g - g.sum(axis=-1, keepdims=True))
