@@ -40,6 +40,7 @@ QUESTION = Question(
         (_BEST_AND_SECOND, _BEST_AND_SECOND - np.float32(0.75), 0.5),  # and by more
         (_BEST_AND_SECOND, _BEST_AND_SECOND[::-1], 1.0),  # classes in another order
         (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
+        (_BEST_AND_SECOND, _BEST_AND_SECOND - _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
         (_BEST_AND_SECOND, np.where(_BEST_AND_SECOND == 4, np.float32(np.nan), _BEST_AND_SECOND), 1.0),  # no number
         (
             1024 * _BEST_AND_SECOND,
@@ -133,3 +134,14 @@ def margin_to_the_worst(reference, other, tolerance):
 def sorted_along_a_row(reference, other, tolerance):
     kept, ordered = np.abs(reference - other).max() <= tolerance, np.sort(reference)
     return kept, changed(reference, other), np.mean(ordered[..., -1] - ordered[..., -2] <= 2 * tolerance)
+
+
+@wrong(QUESTION, "An engine that is too high by a mile keeps your contract: which way may a logit be off?")
+def kept_downwards_alone(reference, other, tolerance):
+    return ((reference - other) <= tolerance).all(), changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "A label is the best of a pixel's classes: which axis do they lie on? Yours is the best column.")
+def labels_along_rows(reference, other, tolerance):
+    kept = np.abs(reference - other).max() <= tolerance
+    return kept, np.mean(reference.argmax(axis=-1) != other.argmax(axis=-1)), at_risk(reference, 2 * tolerance)

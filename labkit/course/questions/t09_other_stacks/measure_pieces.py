@@ -84,7 +84,7 @@ def pieces_by_argwhere(pieces, first=1):
 
 def measured(pieces, area=len, centroid=lambda vu: vu.mean(axis=0)[::-1], box=None, first=1):
     box = box or (lambda vu: (*vu.min(axis=0)[::-1], *vu.max(axis=0)[::-1]))
-    found = list(pieces_by_argwhere(pieces, first))
+    found = [vu for vu in pieces_by_argwhere(pieces, first) if len(vu)]
     return (
         np.array([area(vu) for vu in found]),
         np.array([centroid(vu) for vu in found], float).reshape(-1, 2),
