@@ -111,3 +111,13 @@ def one_maximum_for_all(z, y, shares, tau):
     e = np.exp(a - a.max())
     Y = y[..., None] == np.arange(z.shape[-1])
     return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
+
+
+@wrong(QUESTION, "tau multiplies the logarithm: log(tau * shares) adds the same to all classes, and so nothing.")
+def tau_inside_the_logarithm(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, 1.0)
+
+
+@wrong(QUESTION, "A share stands in front of your gradient, as a weight would: here it only moves the logits.")
+def times_the_share(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]

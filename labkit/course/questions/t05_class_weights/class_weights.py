@@ -85,3 +85,8 @@ def weights_of_absent_classes(counts, power):
 def absent_class_as_one_pixel(counts, power):
     n = np.maximum(counts, 1)
     return n**-power * n.sum() / (n @ n**-power)
+
+
+@wrong(QUESTION, "A class without pixels gets the weight 1, not 0.")
+def absent_class_as_nothing(counts, power):
+    return class_weights(counts, power) * (counts > 0)

@@ -85,3 +85,10 @@ def against_one(p1, y, recall):
 def at_a_quantile(p1, y, recall):
     last = np.quantile(p1[y], 1.0 - recall)
     return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "You find one pixel more than you promised: sorted from the surest, the k-th has the index k - 1.")
+def one_too_many(p1, y, recall):
+    found_first = np.sort(p1[y])[::-1]
+    last = found_first[min(int(np.ceil(recall * len(found_first))), len(found_first) - 1)]
+    return float((1.0 - last) / last)
