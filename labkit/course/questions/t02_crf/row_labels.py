@@ -34,7 +34,7 @@ QUESTION = Question(
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
         (np.array([[0.0, 0.5, 3.0], [1.0, 0.9, 3.0], [3.0, 0.0, 2.5]]), np.array([0.8, 0.3])),
         (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
-        (np.array([[0.0, 1.0], [0.5, 0.4]]), np.array([0.5])),  # the last pixel alone would choose 1
+        (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
     ),
     points=3,
     properties=(
@@ -148,3 +148,8 @@ def first_pixel_not_reached(psi, w):
     labels = row_labels(psi, w).copy()
     labels[0] *= len(labels) == 1
     return labels
+
+
+@wrong(QUESTION, "The first pixel's own cheapest class need not lie on the best way: its label is traced back as well.")
+def first_pixel_on_its_own(psi, w):
+    return np.array([psi[0].argmin(), *row_labels(psi, w)[1:]])
