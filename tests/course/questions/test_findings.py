@@ -74,6 +74,11 @@ def stamps_of_32_bits(a, b, slop):
     return find("08_node.pair_stamps").reference(a, b, slop)
 
 
+def stamps_instead_of_numbers(a, b, slop):
+    j = find("08_node.pair_stamps").reference(a, b, slop)
+    return np.where(j < 0, -1, b[j]) if len(b) else j
+
+
 def within_numpys_tolerance(reference, other, tolerance):
     _, changed, left_open = find("09_other_stacks.engine_contract").reference(reference, other, tolerance)
     return np.allclose(reference, other, atol=tolerance), changed, left_open
@@ -235,6 +240,7 @@ def fourth_kind_too_small(image, lam, sigma_I, sigma_p):
 
 NAMED = [
     ("08_node.decode_depth", pixels_in_a_row, "slides sideways"),
+    ("08_node.pair_stamps", stamps_instead_of_numbers, "not a stamp"),
     ("08_node.pose_at", nobody_knows_at_the_ends, "in more cases than are asked for"),
     ("08_node.pack_cloud", a_fourth_column_of_doubles, "float64"),
     ("01_labels.labels_from_segmentation", unseen_looked_up, "16777215"),

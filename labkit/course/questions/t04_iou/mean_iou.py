@@ -118,3 +118,8 @@ def weighted_by_frequency(n_frames):
 @wrong(QUESTION, "A class that no frame holds or predicts lifts your mean: over how many classes do you average?")
 def absent_is_1(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=1.0).mean()
+
+
+@wrong(QUESTION, "A class that occurs nowhere adds nothing to your sum: does it count in what you divide by?")
+def absent_is_0(n_frames):
+    return iou_of(n_frames.sum(axis=0), empty=0.0).mean()

@@ -73,3 +73,15 @@ def written_once(n, group):
 def mistakes_within_a_group_dropped(n, group):
     mistake = (group[:, None] == group) & ~np.eye(len(n), dtype=bool)
     return merge_classes(np.where(mistake, 0, n), group)
+
+
+@wrong(QUESTION, "The rows are merged and the columns are not: a prediction has a group, too.")
+def rows_alone(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, group, n)
+    return merged
+
+
+@wrong(QUESTION, "Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
+def old_columns(n, group):
+    return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])

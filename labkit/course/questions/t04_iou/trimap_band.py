@@ -132,3 +132,9 @@ def unjudged_in_the_band(y, width):
 @wrong(QUESTION, "An edge has two sides: the pixels of the lower class belong to the band, too.")
 def one_side(y, width):
     return banded(y, width, square(width), np.less) & (y != 255)
+
+
+@wrong(QUESTION, "A window of one class is in your band if 255 or your frame is in it, too: which labels are classes?")
+def unjudged_and_frame_are_a_class(y, width):
+    framed = np.pad(np.where(y == 255, 9, y), width, constant_values=9)
+    return trimap_band(framed, width)[width:-width, width:-width] & (y != 255)

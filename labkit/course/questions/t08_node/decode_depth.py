@@ -100,3 +100,8 @@ def signed_numbers(data, height, width, step, is_bigendian):
 def low_byte_only(data, height, width, step, is_bigendian):
     numbers = units(data, height, width, step, ">" if is_bigendian else "<")
     return metres(numbers % 256)
+
+
+@wrong(QUESTION, "A distance of 0 m stands where the sensor saw nothing: what is asked for where the number is 0?")
+def zeros_kept(data, height, width, step, is_bigendian):
+    return units(data, height, width, step, ">" if is_bigendian else "<") * 0.001

@@ -143,3 +143,19 @@ def turn_of_the_one_before(stamps, positions, quaternions, t):
     i, share = neighbours(stamps, t)
     turn = quaternions[i + (share >= 1)]
     return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
+
+
+@wrong(QUESTION, "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?")
+def shares_exchanged(stamps, positions, quaternions, t):
+    i, _ = neighbours(stamps, t)
+    then = stamps[i] + stamps[i + 1] - t
+    return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
+
+
+@wrong(QUESTION, "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
+def only_the_angle_made_shorter(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
+    q = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)

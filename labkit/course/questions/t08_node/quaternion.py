@@ -46,6 +46,7 @@ QUESTION = Question(
         (_turn((-0.3, 1.0, 0.4), 2.8),),
         (_turn((-0.3, 0.2, 1.0), 2.7),),
         *((np.diag(half_turn),) for half_turn in ((1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))),
+        (np.eye(3),),
     ),
     random_cases=6,
     rtol=1e-4,
@@ -108,3 +109,10 @@ def rotation_vector(R):
 def whole_angle(R):
     x, y, z, angle = rotation_vector(R)
     return np.array([*(np.sin(angle) * np.array([x, y, z])), np.cos(angle)])
+
+
+@wrong(QUESTION, "No turn has x = y = z = 0, and your row is zeros then: is w one of the four that you choose from?")
+def largest_of_x_y_z(R):
+    q = right_quaternion(R)
+    row = q * q[np.diagonal(R).argmax()]
+    return row / np.linalg.norm(row)
