@@ -148,9 +148,6 @@ HEAD = f"""# Evidence
 `make evidence` writes this page from the files of results; it measures nothing. Date and commit are those at which a
 result was written down. A test compares README and the model card with it.
 
-A row whose command names no file stands in README or the model card alone: it was measured by an older kit, which
-looked at the mirror image as well.
-
 ## Masks and lifts
 
 {SCORES} command | measured |
