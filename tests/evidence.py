@@ -12,7 +12,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "evidence.md"
-PRINTED = ("README.md", "labkit/weights/MODEL_CARD.md")
 KINDS = {
     "test": ("", "test"),
     "test, perturbed": (" --perturb", "test_perturbed"),
@@ -91,20 +90,14 @@ def footer(section: str) -> str:
 
 
 def score_rows() -> list[tuple[str, str, str]]:
-    """A row per kind of scenes and masks, as README and the model card print it, the command, and the file.
-
-    Where there is no file of results, what they print is the last result.
-    """
-    rows, printed = [], [(page, line) for page in PRINTED for line in (ROOT / page).read_text().splitlines()]
+    """A row per kind of scenes and masks, as README and the model card print it, the command, and the file."""
+    rows = []
     for (kind, (how, stem)), (masks, (which, end)) in product(KINDS.items(), MASKS.items()):
         file = f"docs/results/{stem}{end}.json"
-        command = f"labkit evaluate --scenes 300 --config {stem.removesuffix('_perturbed')}{how}{which}"
-        found = [(line, page) for page, line in printed if line.startswith(f"| {kind} | {masks} |")]
+        command = f"labkit evaluate --scenes 300 --config {stem.removesuffix('_perturbed')}{how}{which} --json {file}"
         if (ROOT / file).exists():
             row = " | ".join([kind, masks, *scores(json.loads((ROOT / file).read_text()), masks == "true masks")])
-            rows.append((f"| {row} |", f"{command} --json {file}", file))
-        elif found:
-            rows.append((found[0][0], command, f"{found[0][1]}:{found[0][0]}"))
+            rows.append((f"| {row} |", command, file))
     return rows
 
 
