@@ -122,11 +122,12 @@ def latency(frame) -> str:
         meeting(frame, "kit", *NODE, "--qos-inputs", "reliable", "--ros-args") as (kit, _),
     ):
         relayed, added, perceived = [], [], []
-        for stamp in range(1, REPEATS + 6):
+        for turn in range(REPEATS + 5):
+            stamp = time.time_ns()  # later than those of `meeting`: an older pose than all that are known is refused
             first, second = bare.ask(frame, stamp), kit.ask(frame, stamp)
             while stamp not in kit.told:
                 time.sleep(0.001)
-            if stamp > 5:
+            if turn >= 5:
                 perceived.append(float(kit.told[stamp]["of these in the pipeline"]))
                 relayed.append(first)
                 added.append(second - perceived[-1])
