@@ -28,7 +28,7 @@ MASKS = {
 }
 SCORES = "| scenes | masks | mean IoU | target IoU | boundary IoU | pixel accuracy | lifted (95 % interval) |"
 FINE_TUNED = "Twenty of them took the target IoU of a camera unlike any in training from 0.43 to 0.64"
-# README's words, with numbers from the file of results; the command; what else the file says. {a}: `value("a")`.
+# README's words, with numbers from the file of results; the command; what else the file says. {a}: `numbers`.
 PROMISES = [
     ("Masks spoilt on purpose in five ways, {lifts} lifts", "labkit study", "{lifted} lifted", "lessons/07_grasp.csv"),
     (

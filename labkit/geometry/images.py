@@ -39,14 +39,13 @@ class ImagesInMemory:
     ):
         require(name, len(dataset) > 0, "at least one image", "none")
         size = image_and_labels(f"{name}[0]", dataset[0])[1].shape
-        kinds = [("camera", "f8", 26), ("depth", "f4", size)] if depth else []
-        kinds += [("rgb", "u1", (*size, 3)), ("y", "u1", size)]
+        record = kept_of_one(size, depth)
         self.map = None
         if file is None:
-            records, mine = np.empty(len(dataset), kinds), range(len(dataset))
+            records, mine = np.empty(len(dataset), record), range(len(dataset))
         else:
-            self.map = shared_map(file, len(dataset) * np.dtype(kinds).itemsize)
-            records = np.frombuffer(self.map, kinds)
+            self.map = shared_map(file, len(dataset) * record.itemsize)
+            records = np.frombuffer(self.map, record)
             mine = range(ranks.told("LOCAL_RANK"), len(dataset), ranks.told("LOCAL_WORLD_SIZE", 1))
         for i in tqdm(mine, desc=f"reading {name}", unit="image", disable=not progress):
             item = dataset[i]
@@ -94,6 +93,12 @@ class ImagesInMemory:
     def class_counts(self, num_classes: int) -> np.ndarray:
         """Pixels of each class; ignored ones are not counted."""
         return sum(np.bincount(y.numpy().ravel(), minlength=256)[:num_classes] for y in self.y)
+
+
+def kept_of_one(size: tuple[int, int], depth: bool) -> np.dtype:
+    """What is kept of an image of (H, W); camera: K, T_base_cam and the table's height in a row."""
+    geometry = [("camera", "f8", 26), ("depth", "f4", size)] if depth else []
+    return np.dtype([*geometry, ("rgb", "u1", (*size, 3)), ("y", "u1", size)])
 
 
 def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
@@ -146,8 +151,8 @@ def too_large(name: str, dataset: Sequence, depth: bool, memory_gb: float | None
     """
     if not len(dataset):
         return False
-    pixels = image_and_labels(f"{name}[0]", dataset[0])[1].size
-    needed = pixels * (8 if depth else 4) * len(dataset) * ranks.told("LOCAL_WORLD_SIZE", 1)
+    record = kept_of_one(image_and_labels(f"{name}[0]", dataset[0])[1].shape, depth)
+    needed = record.itemsize * len(dataset) * ranks.told("LOCAL_WORLD_SIZE", 1)
     return needed > (0.5 * machine_memory() if memory_gb is None else memory_gb * 1e9)
 
 

@@ -202,9 +202,8 @@ def decode_values(data: bytes) -> object:
         shape = struct.unpack(f"<{ndim}q", claimable(data, at + 2, 8 * ndim))
         if any(n < 0 for n in shape):
             raise ValueError("reply: a negative length")
-        if (
-            math.prod(max(n, 1) for n in shape) > MOST_BYTES
-        ):  # what is empty along one axis may be endless along another
+        # What is empty along one axis may be endless along another.
+        if math.prod(max(n, 1) for n in shape) > MOST_BYTES:
             raise ValueError("reply: too long an axis")
         claims.append((np.dtype(DTYPES[code]).newbyteorder("<"), shape))
         at += 2 + 8 * ndim

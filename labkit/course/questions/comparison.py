@@ -12,7 +12,7 @@ import copy
 import sys
 import types
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,10 +56,17 @@ def expected_cases(question: Question, seed: int) -> list[Case]:
     ]
 
 
-def trusted(function: Callable, args: tuple) -> object:
-    """Call the kit's own function on copies of the arguments, quietly; `plain` of its output."""
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Without warnings, Python's and NumPy's."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
+        yield
+
+
+def trusted(function: Callable, args: tuple) -> object:
+    """Call the kit's own function on copies of the arguments, quietly; `plain` of its output."""
+    with quiet():
         return plain(function(*copy.deepcopy(args)))
 
 

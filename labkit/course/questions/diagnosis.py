@@ -9,7 +9,6 @@ is wrong.
 import copy
 import functools
 import itertools
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -17,14 +16,14 @@ import numpy as np
 
 from labkit.course.questions import forms, made_of  # noqa: F401  they enter their relations
 from labkit.course.questions.by_number import DIRECTIONS, NUMBERS, values_taken_for_others
-from labkit.course.questions.comparison import Case, Problem, alike, parts, plain, trusted
+from labkit.course.questions.comparison import Case, Problem, alike, parts, plain, quiet, trusted
 from labkit.course.questions.errors import explain
 from labkit.course.questions.inputs import changes
 from labkit.course.questions.places import places
 from labkit.course.questions.question import Misconception, Property, Question
 from labkit.course.questions.relations import ARRANGED, COMBINED, LOOSE, Relation, View, attempt
 from labkit.course.questions.slips import Slip, slips
-from labkit.course.questions.steps import changed_steps, quiet, steps
+from labkit.course.questions.steps import changed_steps, steps
 
 MOST_TRIES = 4000  # functions that are tried for one answer: a number, so that all machines say the same
 
@@ -288,8 +287,7 @@ def with_outputs(question: Question, cases: Sequence[Case], outputs: Sequence[ob
 def attempted(function: Callable, *args: object) -> object | None:
     """What a function gives, quietly; None if it fails, as it may on changed arguments and on the oddest outputs."""
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with quiet():
             return function(*args)
     except Exception:
         return None

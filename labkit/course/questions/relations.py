@@ -7,11 +7,12 @@ alone (`places`); COMBINED are those with the arguments and steps; LOOSE are tru
 """
 
 import itertools
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from labkit.course.questions.comparison import quiet
 
 Array = np.ndarray | np.generic
 
@@ -101,8 +102,7 @@ def relation(entries: list[Relation]) -> Callable[[Relation], Relation]:
 def attempt(change: Callable, *arguments) -> np.ndarray | None:
     """The array that a change gives; None if it cannot be made."""
     try:
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with quiet():
             changed = change(*arguments)
         return None if changed is None else np.asarray(changed)
     except Exception:  # a change that cannot be made here explains nothing

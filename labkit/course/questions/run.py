@@ -12,13 +12,12 @@ import signal
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from types import TracebackType
 
 import numpy as np
 
-from labkit.course.questions.comparison import Problem, expected_cases, plain
+from labkit.course.questions.comparison import Problem, expected_cases, plain, quiet
 from labkit.course.questions.judge import Verdict, verdict
 from labkit.course.questions.program import Program
 from labkit.course.questions.question import Question
@@ -109,20 +108,13 @@ def guarded(function: Callable, own: set[str], limit_s: float | None, printed: P
     own: files, or cells, that the student wrote.
     """
     try:
-        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), silent():
+        # A division by zero says so wherever the function is called itself; here it would only fill the notebook.
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), quiet():
             return limited(function, limit_s)
     except TimeIsUp:
         return Problem("time", "it did not return in time: does a loop never end?")
     except BaseException as error:  # SystemExit and KeyboardInterrupt as well: they are the answer's, not ours
         return exception_problem(error, own)
-
-
-@contextlib.contextmanager
-def silent():
-    """Keep warnings out of the notebook: a division by zero says so wherever the function is called itself."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        yield
 
 
 def limited(function: Callable, seconds: float | None) -> object:

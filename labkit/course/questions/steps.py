@@ -5,27 +5,19 @@ otherwise than the reference does (`otherwise`), or another one in its place.
 """
 
 import ast
-import contextlib
 import copy
 import functools
-import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from labkit.course.questions.comparison import quiet
 from labkit.course.questions.otherwise import COMPARISONS, OPERATIONS, Change, done_otherwise
 from labkit.course.questions.slips import Path, below, compiled, definition_of, follow, made_of, names_in, put
 
-KINDS = {
-    ast.Add: "the sum",
-    ast.Sub: "the difference",
-    ast.Mult: "the product",
-    ast.Div: "the quotient",
-    ast.Pow: "the power",
-    ast.MatMult: "the product of matrices",
+KINDS = {kind: f"the {name.removeprefix('a ')}" for kind, (name, _) in OPERATIONS.items()} | {
     ast.FloorDiv: "the quotient",
-    ast.Mod: "the remainder",
     ast.BitAnd: "the condition",
     ast.BitOr: "the condition",
     ast.BitXor: "the condition",
@@ -102,14 +94,6 @@ class Traced:
 def kept(value: object) -> object:
     """A value that does not change when the reference goes on in place."""
     return value.copy() if isinstance(value, np.ndarray) else value
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Without warnings."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        yield
 
 
 def steps(reference: Callable, arguments: Sequence[tuple]) -> Steps:
