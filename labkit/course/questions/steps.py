@@ -178,7 +178,7 @@ def exchanges(trace: Traced, args: tuple, calls: dict[int, list]) -> Iterator[tu
     """Steps by their numbers, and what of the same shape, an argument or an earlier step, could stand in its place."""
     known = [
         (name, value, lambda *a, i=i, **o: trace.given[i])
-        for i, (name, value) in enumerate(zip(trace.parameters, args, strict=True))
+        for i, (name, value) in enumerate(zip(trace.parameters, args, strict=False))  # not those of *arguments
     ]
     for number in calls:
         step, value = trace.steps[number], calls[number][-1][2]

@@ -8,7 +8,7 @@ import pytest
 
 from labkit.course.questions.comparison import expected_cases
 from labkit.course.questions.diagnosis import sentences
-from labkit.course.questions.question import Question, way
+from labkit.course.questions.question import TOPICS, Question, of_topic, way
 from labkit.course.questions.run import run
 from labkit.course.questions.steps import MOST_STEPS, changed_steps, traced
 
@@ -93,6 +93,23 @@ def test_what_is_said_of_a_step_is_true():
             break
     else:
         pytest.fail("nothing is said of the comparison")
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_every_right_answer_has_steps_that_can_be_taken_otherwise(topic):
+    for question in of_topic(topic).values():
+        args = expected_cases(question, 1)[-1].args
+        for right in (question.reference, *question.ways):
+            assert len(list(changed_steps(right, args))) > 20, f"{question.name}: {right.__name__}"
+
+
+def passed_on(a, *others):
+    """The largest of a and of two numbers."""
+    return max(a.max(), *others)
+
+
+def test_arguments_without_names_of_their_own_are_no_obstacle():
+    assert list(changed_steps(passed_on, (np.ones(2), 3, 4)))
 
 
 def halvings(x):

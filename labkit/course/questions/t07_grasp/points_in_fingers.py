@@ -63,8 +63,8 @@ QUESTION = Question(
 
 
 @way(QUESTION)
-def by_inverse(P, T_base_grasp, *boxes):
-    return in_boxes(*moved(P, np.linalg.inv(T_base_grasp)), *boxes)
+def by_inverse(P, T_base_grasp, width, half, thickness, tips):
+    return in_boxes(*moved(P, np.linalg.inv(T_base_grasp)), width, half, thickness, tips)
 
 
 @way(QUESTION)
