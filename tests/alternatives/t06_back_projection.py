@@ -44,6 +44,13 @@ def undistort__halving(pixels, K, k):
     return c + f * x * 1.3 * high[:, None]
 
 
+def fit_plane__svd(P, sigma):
+    centre = np.average(P, axis=0, weights=sigma**-2.0)
+    n = np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][2]
+    n = n if n[2] > 0 else -n
+    return n, float(n @ centre)
+
+
 def fit_plane__torch(P, sigma):
     import torch
 

@@ -22,6 +22,11 @@ def closing_yaw__loop(Sigma):
     return best
 
 
+def closing_yaw__svd(Sigma):
+    axes, _, _ = np.linalg.svd(Sigma[:2, :2])
+    return float(np.arctan2(*axes[::-1, -1]))
+
+
 def closing_yaw__torch(Sigma):
     import torch
 

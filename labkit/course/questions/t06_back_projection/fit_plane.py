@@ -10,7 +10,7 @@ def fit_plane(P, sigma):
     """Fit n . p = d by least squares of the distances along n, each divided by its point's sigma; n points up."""
     w = 1.0 / sigma**2
     centre = w @ P / w.sum()
-    n = np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][2]
+    n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
     n = n * np.sign(n[2])
     return n, float(n @ centre)
 

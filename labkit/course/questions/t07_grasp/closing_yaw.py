@@ -57,12 +57,6 @@ def formula(Sigma):
     return (long + np.pi / 2) % np.pi
 
 
-@way(QUESTION)
-def svd(Sigma):
-    axes, _, _ = np.linalg.svd(Sigma[:2, :2])
-    return float(np.arctan2(*axes[::-1, -1]))
-
-
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
