@@ -298,9 +298,15 @@ def walk_without_memory(psi, w):
     return np.array(labels[::-1])
 
 
+def source_cost_kept_whole(psi):
+    source = np.where(psi[..., 1] > psi[..., 0], psi[..., 1], 0.0)
+    return source, psi[..., 0] - psi.min(axis=2), psi.min(axis=2).sum()
+
+
 MISLED = [  # what was said of them by accident
     ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
     ("02_crf.row_labels", walk_without_memory, "Where it is wrong: Wherever"),
+    ("02_crf.terminal_capacities", source_cost_kept_whole, "times the place of"),
     ("08_node.decode_depth", three_bytes_each, "It fails only in cases where height"),
     ("01_labels.labels_from_colours", without_blue, "where rgb is 0"),
     ("09_other_stacks.hsv_mask", every_channel_wraps, "largest value"),

@@ -93,6 +93,20 @@ def both_diagonals_to_the_right(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y, (*PAIRS[:3], PAIRS[2]))).sum()
 
 
+@wrong(QUESTION, "weights[3] belongs to the neighbour below to the left: in which column do you look for it?")
+def both_diagonals_to_the_right_in_loops(y, psi, weights):
+    """The same in loops, which leave out the pairs that would end outside."""
+    inside = weights.copy()
+    inside[3, :, -1] = 0.0
+    return both_diagonals_to_the_right(y, psi, inside)
+
+
+@wrong(QUESTION, "A pair's weight stands at the pixel that owns it, (v, u): do you read it at the neighbour's place?")
+def weights_of_the_neighbours(y, psi, weights):
+    moved = np.stack([np.roll(w, (-down, -right), (0, 1)) for w, (down, right) in zip(weights, PAIRS, strict=True)])
+    return unary_part(y, psi) + (np.where(weights > 0.0, moved, 0.0) * disagreeing(y)).sum()
+
+
 @wrong(QUESTION, "np.roll by +1 brings the left neighbour: with which sign does the right one come?")
 def rolled_backwards(y, psi, weights):
     """Each pair compared with the neighbour on the other side."""

@@ -114,6 +114,12 @@ def label_of_now(y, psi, weights, v, u):
     return psi[v, u] + sum(w for w, b, a in own + owned if y[b, a] != y[v, u])
 
 
+@wrong(QUESTION, "Each class is compared with the neighbours' labels: is yours compared with y[v, u], the pixel's own?")
+def compared_with_itself(y, psi, weights, v, u):
+    own, owned = pairs_of(weights, v, u)
+    return psi[v, u] + sum(w for w, _, _ in own + owned) * (np.arange(psi.shape[2]) != y[v, u])
+
+
 @wrong(QUESTION, "Seen from the neighbour above to the right you lie below to the LEFT: which kind of pair is that?")
 def upper_diagonals_exchanged(y, psi, weights, v, u):
     """weights[2] taken for the neighbour's own side, not for yours."""

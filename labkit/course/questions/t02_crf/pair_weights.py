@@ -163,6 +163,11 @@ def brightness_only(image, lam, sigma_I, sigma_p):
     return gaussian(differences(image).sum(axis=3) ** 2, lam, sigma_I, sigma_p)
 
 
+@wrong(QUESTION, "Square the difference of each channel first, then add: 3 and 4 make 9 + 16 = 25, not 7 squared.")
+def added_before_squared(image, lam, sigma_I, sigma_p):
+    return gaussian(np.abs(differences(image)).sum(axis=3) ** 2, lam, sigma_I, sigma_p)
+
+
 @wrong(QUESTION, "What happened to sigma_p? Neighbours at a corner are farther apart than those at an edge.")
 def without_distance(image, lam, sigma_I, sigma_p):
     """sigma_p forgotten."""

@@ -101,9 +101,9 @@ def traced(came, last):
     return np.array(labels[::-1])
 
 
-@wrong(QUESTION, "That is each pixel's own choice: where did the weights come in?")
+@wrong(QUESTION, "That is each pixel's own choice: does changing the class cost w in yours, and keeping it nothing?")
 def pixel_by_pixel(psi, w):
-    """The weights forgotten."""
+    """The weights forgotten, or paid by all classes alike."""
     return psi.argmin(axis=1)
 
 

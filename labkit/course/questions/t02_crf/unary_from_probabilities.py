@@ -80,3 +80,8 @@ def made_to_sum_to_1_again(p, floor):
 @wrong(QUESTION, "Not 0 alone counts as the floor: every probability below the floor does.")
 def zeros_lifted(p, floor):
     return -np.log(np.where(p == 0.0, floor, p))
+
+
+@wrong(QUESTION, "The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
+def costs_lifted(p, floor):
+    return np.maximum(-np.log(p), floor)
