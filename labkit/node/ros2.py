@@ -7,9 +7,11 @@ one message and not of a thread.
 
 import importlib
 import logging
+import os
 import threading
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 
 from labkit.node import ros2_types
 from labkit.node.bus import Transport
@@ -20,6 +22,9 @@ logger = logging.getLogger(__name__)
 STATIC = "tf_static"  # the last part of the topic whose messages a late listener must get, too
 RELIABILITIES = ("reliable", "best_effort")
 SILENT = "nobody publishes it"
+# Shared memory that holds images, and where Fast DDS 3 (Kilted) and 2 (Jazzy) are told to read it.
+SETTINGS = Path(__file__).parent / "share/fastdds.xml"
+SETTINGS_VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 MISSING = "rclpy is missing; ROS 2: source a distribution's setup file, or `make ros2` for wheels in .venv-ros2"
 
 
@@ -31,6 +36,12 @@ def ros(module: str):
         raise ModuleNotFoundError(f"{MISSING} ({error})") from error
 
 
+def set_up_shared_memory() -> None:
+    """Have Fast DDS read the kit's settings, for the processes started from here, too; the user's own settings win."""
+    if not any(name in os.environ for name in (*SETTINGS_VARIABLES, "FASTDDS_BUILTIN_TRANSPORTS")):
+        os.environ.update(dict.fromkeys(SETTINGS_VARIABLES, str(SETTINGS)))
+
+
 class Ros2Transport(Transport):
     """A node of ROS 2 as a transport.
 
@@ -40,6 +51,7 @@ class Ros2Transport(Transport):
 
     def __init__(self, name: str, arguments=()):
         rclpy = ros("rclpy")
+        set_up_shared_memory()
         self.quality()
         self._wire = Wire(ros1=False)
         self._publishers, self._readers, self._numbers = {}, {}, {}

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import threading
 import time
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -247,6 +248,40 @@ def test_every_frame_is_answered_or_superseded(peer, frame):
             wait_for(lambda: counts.answered + counts.dropped == 200, "the last frame")
             wait_for(lambda: len(fast.heard["mask"]) == counts.answered, "the masks")
             assert counts.answered > 1 < counts.dropped and counts.lost == counts.failed == counts.skipped == 0
+
+
+@pytest.mark.parametrize("quality", ros2.RELIABILITIES)
+def test_full_size_at_a_camera_s_rate(quality):
+    """Three seconds of 640x480 at 30 Hz from another process: each frame that arrives whole is answered or superseded.
+
+    Over reliable topics each one arrives. The shared memory that Fast DDS takes by default holds no such image.
+    """
+    frame, depth = data_gen.render(data_gen.sample_scene(620000, "test"), (640, 480)), 100
+    camera = join("camera", depth=depth)
+    with camera.transport, camera.node(*NODE, "--qos-inputs", quality, "--qos-depth", str(depth)):
+        camera.ask(frame, 1)
+        assert camera.camera.run(itertools.repeat(frame, 90), 30.0) == 90
+
+        def ended() -> bool:
+            return sum(camera.counted()[what] for what in ("answered", "dropped", "lost")) >= 91
+
+        wait_for(ended, "the last frame")
+        counts, told = camera.counted(), camera.told()
+        assert counts["answered"] + counts["dropped"] + counts["lost"] == 91 and counts["failed"] == 0, told
+        assert counts["lost"] == 0 or (quality == "best_effort" and "lost on the way" in str(told)), told
+
+
+@pytest.mark.parametrize("chosen", [*ros2.SETTINGS_VARIABLES, "FASTDDS_BUILTIN_TRANSPORTS"])
+def test_settings_of_fast_dds_that_the_user_chose_win(chosen, monkeypatch):
+    names = {*ros2.SETTINGS_VARIABLES, "FASTDDS_BUILTIN_TRANSPORTS"}
+    for name in names:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(chosen, "mine")
+    ros2.set_up_shared_memory()
+    assert {name: os.environ[name] for name in names & os.environ.keys()} == {chosen: "mine"}
+    monkeypatch.delenv(chosen)
+    ros2.set_up_shared_memory()
+    assert {Path(os.environ[name]).read_bytes() for name in ros2.SETTINGS_VARIABLES} == {ros2.SETTINGS.read_bytes()}
 
 
 def test_what_the_network_loses_stands_in_diagnostics(peer, frame):
