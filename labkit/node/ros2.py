@@ -22,9 +22,8 @@ logger = logging.getLogger(__name__)
 STATIC = "tf_static"  # the last part of the topic whose messages a late listener must get, too
 RELIABILITIES = ("reliable", "best_effort")
 SILENT = "nobody publishes it"
-# Shared memory that holds images, and where Fast DDS 3 (Kilted) and 2 (Jazzy) are told to read it.
 SETTINGS = Path(__file__).parent / "share/fastdds.xml"
-SETTINGS_VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+FAST_DDS_3, FAST_DDS_2 = "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE"  # Kilted's and Jazzy's
 MISSING = "rclpy is missing; ROS 2: source a distribution's setup file, or `make ros2` for wheels in .venv-ros2"
 
 
@@ -37,9 +36,12 @@ def ros(module: str):
 
 
 def set_up_shared_memory() -> None:
-    """Have Fast DDS read the kit's settings, for the processes started from here, too; the user's own settings win."""
-    if not any(name in os.environ for name in (*SETTINGS_VARIABLES, "FASTDDS_BUILTIN_TRANSPORTS")):
-        os.environ.update(dict.fromkeys(SETTINGS_VARIABLES, str(SETTINGS)))
+    """Have Fast DDS share enough memory for images, here and in processes that are started from here.
+
+    It finds the file by an environment variable. Settings that the user chose are left alone.
+    """
+    if not {FAST_DDS_3, FAST_DDS_2, "FASTDDS_BUILTIN_TRANSPORTS"} & os.environ.keys():
+        os.environ[FAST_DDS_2 if os.environ.get("ROS_DISTRO") == "jazzy" else FAST_DDS_3] = str(SETTINGS)
 
 
 class Ros2Transport(Transport):

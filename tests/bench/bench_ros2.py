@@ -1,11 +1,11 @@
 """The node on ROS 2: what it adds to a bare relay, and a minute of a camera's 30 frames a second, on loopback.
 
-Added latency: from the camera's call to the mask's arrival in another process, less what the pipeline took of it. A
-bare relay is thirty lines of rclpy that take the same three messages and send a mask of the same size; frames go to
-relay and node in turn. On a machine that others use as well, the least times say more than the medians. Then the camera
-keeps its rate for a minute. Each frame that the node receives is answered or superseded by a newer one; with best
-effort some never arrive, and diagnostics say how many. Memory is flat if the last tenth of the minute finds the node's
-within 2 % of the second tenth's. Runs with the wheels of `make ros2`.
+Added latency: from the camera's call to the mask's arrival in another process, less what the pipeline took of it.
+Discovery is limited to localhost. A bare relay is thirty lines of rclpy that take the same three messages and send a
+mask of the same size; frames go to relay and node in turn. On a machine that others use as well, the least times say
+more than the medians. Then the camera keeps its rate for a minute. Each frame that the node receives is answered or
+superseded by a newer one; with best effort some may never arrive, and diagnostics say how many. Memory is flat if the
+last tenth of the minute finds the node's within 2 % of the second tenth's. Runs with the wheels of `make ros2`.
 """
 
 import importlib.util

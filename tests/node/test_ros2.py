@@ -10,7 +10,6 @@ import signal
 import subprocess
 import threading
 import time
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -271,17 +270,13 @@ def test_full_size_at_a_camera_s_rate(quality):
         assert counts["lost"] == 0 or (quality == "best_effort" and "lost on the way" in str(told)), told
 
 
-@pytest.mark.parametrize("chosen", [*ros2.SETTINGS_VARIABLES, "FASTDDS_BUILTIN_TRANSPORTS"])
-def test_settings_of_fast_dds_that_the_user_chose_win(chosen, monkeypatch):
-    names = {*ros2.SETTINGS_VARIABLES, "FASTDDS_BUILTIN_TRANSPORTS"}
-    for name in names:
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv(chosen, "mine")
+@pytest.mark.parametrize("distribution, used", [("jazzy", ros2.FAST_DDS_2), ("kilted", ros2.FAST_DDS_3)])
+@pytest.mark.parametrize("chosen", [None, ros2.FAST_DDS_3, ros2.FAST_DDS_2, "FASTDDS_BUILTIN_TRANSPORTS"])
+def test_settings_of_fast_dds_that_the_user_chose_win(chosen, distribution, used, monkeypatch):
+    given = {"ROS_DISTRO": distribution} | ({chosen: "mine"} if chosen else {})
+    monkeypatch.setattr(os, "environ", dict(given))
     ros2.set_up_shared_memory()
-    assert {name: os.environ[name] for name in names & os.environ.keys()} == {chosen: "mine"}
-    monkeypatch.delenv(chosen)
-    ros2.set_up_shared_memory()
-    assert {Path(os.environ[name]).read_bytes() for name in ros2.SETTINGS_VARIABLES} == {ros2.SETTINGS.read_bytes()}
+    assert os.environ == given | ({} if chosen else {used: str(ros2.SETTINGS)})
 
 
 def test_what_the_network_loses_stands_in_diagnostics(peer, frame):
