@@ -108,3 +108,8 @@ def double_angle_not_halved(Sigma):
 @wrong(QUESTION, "Your yaw does not see the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.")
 def variances_as_a_direction(Sigma):
     return np.arctan2(Sigma[1, 1], Sigma[0, 0]) + np.pi / 2
+
+
+@wrong(QUESTION, "Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?")
+def smaller_of_the_two_variances(Sigma):
+    return 0.0 if Sigma[0, 0] < Sigma[1, 1] else np.pi / 2

@@ -95,6 +95,13 @@ def closing_taken_as_it_is(position, approach, closing):
     return pose(np.cross(y, z), y, z, position)
 
 
+@wrong(QUESTION, "A cross product with closing is at right angles to it: your jaws close across what was asked for.")
+def closing_crossed_with_the_approach(position, approach, closing):
+    z = unit(approach)
+    y = unit(np.cross(z, closing))
+    return pose(np.cross(y, z), y, z, position)
+
+
 @wrong(QUESTION, "The hand goes where the approach says; it is the closing direction that gives way, not z.")
 def approach_bent(position, approach, closing):
     y = unit(closing)

@@ -79,6 +79,13 @@ def whole_cloud(P, T_base_grasp, half):
     return middle_and_width(in_grasp(P, T_base_grasp)[1])
 
 
+@wrong(QUESTION, "A median leans to the side that shows more points; the jaws meet the two outermost ones.")
+def median_for_the_middle(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return (np.median(y), np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
 @wrong(QUESTION, "A mean leans to the side that shows more points; the jaws meet the two outermost ones.")
 def mean_for_the_middle(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
@@ -108,3 +115,9 @@ def one_side_of_the_pad(P, T_base_grasp, half):
 def half_of_the_width(P, T_base_grasp, half):
     width = pad_slice(P, T_base_grasp, half)[1]
     return width / 2, width
+
+
+@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])

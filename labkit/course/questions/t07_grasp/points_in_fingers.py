@@ -14,8 +14,9 @@ def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
 
 
 def _scene_round_a_grasp(rng):
-    """Draw a grasp that leans, and points all round it, with more on one side than on the other."""
+    """Draw a grasp that leans near the base's origin, and points all round it, more on one side than on the other."""
     T = leaning_grasp(rng)
+    T[:3, 3] = rng.uniform(0.005, 0.02, 3)  # little: whoever forgets it or takes it off too late still counts some
     in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (400, 3))
     P = in_grasp @ T[:3, :3].T + T[:3, 3]
     width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
@@ -93,9 +94,20 @@ def transform_not_inverted(P, T_base_grasp, *boxes):
     return in_boxes(*moved(P, T_base_grasp), *boxes)
 
 
+@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(P, T_base_grasp, *boxes):
+    return in_boxes(*(P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T, *boxes)
+
+
 @wrong(QUESTION, "What lies lower than the tips is in nobody's way. The frame's z points down.")
 def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
+
+
+@wrong(QUESTION, "z of the grasp frame points down: the tips are at z = tips, and what is above them has smaller z.")
+def z_taken_for_upwards(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, -z, *boxes)
 
 
 @wrong(QUESTION, "You count what is under the tips: the grasp frame's z points down, so above is smaller z.")

@@ -93,3 +93,10 @@ def in_the_base_frame_of_the_example(T_base_grasp, middle):
 def position_taken_off_after_the_turn(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ middle - T_base_grasp[:3, 3])
     return off[1], off[0]
+
+
+@wrong(QUESTION, "Distances at right angles add as squares: the whole less the pushed part is not the slip.")
+def lengths_subtracted(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    pushed = np.abs(off @ T_base_grasp[:3, 1])
+    return pushed, np.linalg.norm(off[:2]) - pushed
