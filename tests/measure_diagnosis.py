@@ -10,6 +10,7 @@ each was compared with the reference: 10,000, random ones and such with ties and
 """
 
 import argparse
+import contextlib
 import random
 import sys
 import time
@@ -17,12 +18,14 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from unittest import mock
 
 import numpy as np
 from alternatives import alternatives
 from mutants import mutants
 
-from labkit.course.questions.comparison import Problem, compare, expected_cases, parts, trusted
+from labkit.course.questions import diagnosis
+from labkit.course.questions.comparison import Problem, alike, compare, expected_cases, trusted
 from labkit.course.questions.diagnosis import Sentence, sentences
 from labkit.course.questions.question import TOPICS, Question, of_topic
 from labkit.course.questions.run import run
@@ -56,7 +59,7 @@ class Named:
 
 def wrong_answers(question: Question, held_out: bool | None, sample: int | None) -> dict[str, list[object]]:
     """Mutants that are refused, by their names, with their outputs; those of the same outputs once."""
-    cases, found, seen = expected_cases(question, 0), {}, set()
+    cases, found = expected_cases(question, 0), {}
     right = [question.reference, *(a for a in alternatives(question) if "torch" not in a.__name__)]
     everything = [mutant for function in right for mutant in mutants(function, held_out)]
     random.Random(question.name).shuffle(everything)
@@ -64,30 +67,27 @@ def wrong_answers(question: Question, held_out: bool | None, sample: int | None)
         if sample is not None and len(found) == sample:
             break
         outputs, _ = run(mutant.function, [case.args for case in cases], 1.0)
-        pairs = zip(cases, outputs, strict=True)
-        refused = any(isinstance(got, Problem) or compare(question, case.expected, got) for case, got in pairs)
-        if refused and behaviour(outputs) not in seen:
-            seen.add(behaviour(outputs))
+        refused = any(compare(question, case.expected, got) for case, got in zip(cases, outputs, strict=True))
+        if refused and not any(same(question, outputs, others) for others in found.values()):
             found[mutant.name] = outputs
     return found
 
 
-def behaviour(outputs: Sequence[object]) -> str:
-    """The same for outputs that are the same up to rounding."""
-    told = []
-    for got in outputs:
-        if isinstance(got, Problem):
-            told.append(got.says)
-            continue
-        told += [(np.shape(part), np.round(np.nan_to_num(np.asarray(part, float)), 6).tolist()) for part in parts(got)]
-    return repr(told)
+def same(question: Question, outputs: Sequence[object], others: Sequence[object]) -> bool:
+    """Whether two wrong answers give the same, within the tolerance, or fail in the same words, in every case."""
+    for a, b in zip(outputs, others, strict=True):
+        failed = isinstance(a, Problem) or isinstance(b, Problem)
+        if getattr(a, "says", 0) != getattr(b, "says", 1) if failed else not alike(question, a, b):
+            return False
+    return True
 
 
 def measure(question: Question, held_out: bool | None = None, sample: int | None = None) -> Named:
     """Diagnose the wrong answers to a question."""
     cases = expected_cases(question, 0)
     wrong = wrong_answers(question, held_out, sample)
-    said = {name: list(dict.fromkeys(sentences(question, cases, outputs))) for name, outputs in wrong.items()}
+    with remembering():
+        said = {name: list(dict.fromkeys(sentences(question, cases, outputs))) for name, outputs in wrong.items()}
     true_of = Counter(sentence for found in said.values() for sentence in found)
     result = Named(wrong=len(wrong))
     for name, found in said.items():
@@ -100,6 +100,25 @@ def measure(question: Question, held_out: bool | None = None, sample: int | None
         if not good:
             result.unnamed.append(f"{question.name}: {name}\n    {first(found)}")
     return result
+
+
+@contextlib.contextmanager
+def remembering() -> Iterator[None]:
+    """What a diagnosis tries is computed once for many wrong answers; what is said stays the same."""
+
+    def once(function: Callable, listed: bool) -> Callable:
+        def recalled(first: object, args: tuple) -> object:
+            key = id(first), id(args)  # both stay, so that no other gets their numbers
+            if key not in known:
+                known[key] = first, args, list(function(first, args)) if listed else function(first, args)
+            return known[key][-1]
+
+        known = {}
+        return recalled
+
+    tried = {name: once(getattr(diagnosis, name), name != "made") for name in ("of_inputs", "of_answers", "made")}
+    with mock.patch.multiple(diagnosis, **tried):
+        yield
 
 
 def survivors(question: Question, seconds: float) -> Iterator[str]:
@@ -133,10 +152,11 @@ def searched(question: Question, function: Callable, seconds: float) -> str:
 
 
 def spoilt(value: object, rng: np.random.Generator) -> object:
-    """An array of numbers with ties, or with zeros; not a matrix, which may not stay what it is."""
+    """An array of numbers with ties, or with zeros, not all of them; not a matrix, which may not stay what it is."""
     if not isinstance(value, np.ndarray) or value.dtype.kind != "f" or value.shape in ((3, 3), (4, 4)):
         return value
-    return np.round(value, 1) if rng.random() < 0.5 else np.where(rng.random(value.shape) < 0.1, 0, value)
+    new = np.round(value, 1) if rng.random() < 0.5 else np.where(rng.random(value.shape) < 0.1, 0, value)
+    return new if new.any() else value  # no direction is all zeros
 
 
 def first(found: Sequence[Sentence]) -> str:

@@ -77,16 +77,6 @@ def icm_costs__by_energies(y, psi, weights, v, u):
     return np.array(costs) - (energy__loops(y, psi, rest) - psi[v, u, y[v, u]])
 
 
-def icm_costs__padded(y, psi, weights, v, u):
-    """With a ring of pixels around the image that cost nothing."""
-    Y, w = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0))), np.pad(weights, ((0, 0), (1, 1), (1, 1)))
-    v, u, costs = v + 1, u + 1, psi[v, u].copy()
-    for d, (down, right) in enumerate(STEPS):
-        costs += w[d, v, u] * (1 - Y[v + down, u + right])
-        costs += w[d, v - down, u - right] * (1 - Y[v - down, u - right])
-    return torch.from_numpy(costs).numpy()
-
-
 def terminal_capacities__torch(psi):
     """In torch."""
     psi = torch.as_tensor(psi)

@@ -14,13 +14,11 @@ DIRECTIONS: list[Relation] = []  # true of many wrong answers, so they are asked
 
 @relation(NUMBERS)
 def always_the_same(view: View) -> str:
-    """One number, whatever the arguments are."""
-    if not view.shaped:
-        return ""
+    """One number, whatever the arguments are, also in another shape."""
     e, g, _ = view.numbers()
     if g.size < 2 or np.isnan(g[0]) or not view.same(g, np.full(g.shape, g[0])):
         return ""
-    if view.same(e, np.full(e.shape, e[0])) and not np.isnan(e[0]):
+    if e.size and view.same(e, np.full(e.shape, e[0])) and not np.isnan(e[0]):
         return ""  # then it is an offset
     first = next(a.flat[0] for a in view.got if a.size)
     said = first if first.dtype.kind == "b" else f"{0 if abs(first) < 1e-7 else first:.4g}"
@@ -64,6 +62,7 @@ FUNCTIONS = {
     "Yours are sines of the right values.": np.sin,
     "Yours are rounded down to whole numbers.": np.floor,
     "Yours are rounded to whole numbers.": np.round,
+    "Yours are whole numbers: the right ones without their fractions.": np.trunc,
     "Yours are rounded up to whole numbers.": np.ceil,
     "Yours are cut off below 0.": lambda e: np.maximum(e, 0),
     "Yours are cut off above 1.": lambda e: np.minimum(e, 1),

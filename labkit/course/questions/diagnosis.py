@@ -26,6 +26,7 @@ from labkit.course.questions.slips import Slip, slips
 from labkit.course.questions.steps import changed_steps, steps
 
 MOST_TRIES = 4000  # functions that are tried for one answer: a number, so that all machines say the same
+ENDLESS = "A loop does not end, or has far too many turns: what changes in each turn, and when does `while` stop?"
 
 
 @dataclass(frozen=True)
@@ -60,18 +61,10 @@ def sentences(question: Question, cases: Sequence[Case], outputs: Sequence[objec
         yield from related(name, view, (*ARRANGED, *NUMBERS, *COMBINED))
     yield from another_form(question, cases, outputs)
     tried = Tried(question, cases, outputs)
-    for says, change in changes(question, cases[0].args):
-        if tried.explains(lambda args, change=change: question.reference(*change(args))):
-            yield Sentence("input", says)
+    yield from (sentence for sentence, function in of_inputs(question, cases[0].args) if tried.explains(function))
     for name, view in views:
         yield from local(name, view)
-    for right in (question.reference, *question.ways):
-        for says, function in changed_steps(right, tried.args):
-            if tried.explains(function):
-                yield Sentence("step", says)
-    for slip in slips_of(question.reference):
-        if tried.explains(lambda args, slip=slip: slip.function(*args)):
-            yield Sentence("slip", str(slip))
+    yield from (sentence for sentence, function in of_answers(question, tried.args) if tried.explains(function))
     for name, view in views:
         yield from related(name, view, LOOSE, "loose")
     yield from broken_properties(question, cases, outputs)
@@ -114,7 +107,9 @@ def output_of(misconception: Misconception, args: tuple) -> object:
 
 
 def explained(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
-    """What the first exception means in this task, and in which cases there is one."""
+    """What the first exception means in this task, and in which cases there is one; or that it does not end."""
+    if any(isinstance(got, Problem) and got.kind == "time" for got in outputs):
+        yield Sentence("exception", ENDLESS)
     raised = [isinstance(got, Problem) and got.kind == "exception" for got in outputs]
     if not any(raised):
         return
@@ -236,6 +231,21 @@ def tuple_in_another_order(question: Question, cases: Sequence[Case], outputs: S
 
 
 # ---------------------------------------------------------------------------------------- functions that are tried
+
+
+def of_inputs(question: Question, args: tuple) -> Iterator[tuple[Sentence, Callable]]:
+    """The right answer for changed arguments, as functions of a tuple of arguments, and what each explains."""
+    for says, change in changes(question, args):
+        yield Sentence("input", says), lambda args, change=change: question.reference(*change(args))
+
+
+def of_answers(question: Question, args: tuple) -> Iterator[tuple[Sentence, Callable]]:
+    """Right answers with one step taken otherwise, and slips of the reference; args: those of a wrong case."""
+    for right in (question.reference, *question.ways):
+        for says, function in changed_steps(right, args):
+            yield Sentence("step", says), function
+    for slip in slips_of(question.reference):
+        yield Sentence("slip", str(slip)), lambda args, slip=slip: slip.function(*args)
 
 
 class Tried:

@@ -30,7 +30,7 @@ NUMBERS: dict[str, Callable] = {
     "were 90 degrees less": lambda x: None if isinstance(x, int) else x - np.pi / 2,
     "were 90 degrees more": lambda x: None if isinstance(x, int) else x + np.pi / 2,
     "had no sign": lambda x: abs(x),
-    "were a whole number": lambda x: None if isinstance(x, int) else float(np.floor(x)),
+    "were cut to a whole number": lambda x: None if isinstance(x, int) else float(np.trunc(x)),
 }
 
 

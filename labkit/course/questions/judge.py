@@ -46,7 +46,7 @@ class Verdict:
     @cached_property
     def sentence(self) -> Sentence | None:
         """The most specific thing that is true of a wrong answer; looked for when it is asked for."""
-        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "time", "altered"):
+        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "altered"):
             return None
         return diagnose(self.question, self.cases, self.outputs)
 

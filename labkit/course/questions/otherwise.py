@@ -146,10 +146,27 @@ def spread(side: object, value: object) -> object:
 
 @of(ast.Compare)
 def comparison(node: ast.Compare) -> Changes:
-    """With another sign, or of one more or less; the tested thing itself."""
-    for kind, (sign, other) in COMPARISONS.items():
-        if kind is not type(node.ops[0]):
-            yield f"were made with {sign}", lambda compute, a, b, other=other: other(a, b)
+    """With another sign; of a chain a < b < c one part with another sign, or left out."""
+    ops = [type(op) for op in node.ops]
+    if not all(kind in COMPARISONS for kind in ops):
+        return
+    for i in range(len(ops)):
+        chain = f", in its part number {i + 1}" if len(ops) > 1 else ""
+        for kind, (sign, _) in COMPARISONS.items():
+            if kind is not ops[i]:
+                other = compared(*ops[:i], kind, *ops[i + 1 :])
+                yield f"were made with {sign}{chain}", lambda compute, *values, other=other: other(*values)
+    if len(ops) == 2:
+        yield "were its first part alone", lambda compute, a, b, c: COMPARISONS[ops[0]][1](a, b)
+        yield "were its second part alone", lambda compute, a, b, c: COMPARISONS[ops[1]][1](b, c)
+
+
+def compared(*kinds: type[ast.cmpop]) -> Callable:
+    """A comparison of two values, or a chain of comparisons."""
+    signs = [COMPARISONS[kind][1] for kind in kinds]
+    if len(signs) == 1:
+        return signs[0]
+    return lambda *values: all(sign(a, b) for sign, a, b in zip(signs, values, values[1:], strict=False))
 
 
 @of(ast.UnaryOp)

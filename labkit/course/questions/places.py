@@ -44,9 +44,7 @@ def in_the_array(view: View) -> Iterator[tuple[str, Masks]]:
         last = {e.shape[-1] for e in view.expected}
         for c in range(next(iter(last))) if len(last) == 1 and next(iter(last)) <= 6 else ():
             yield f"in column {c} of the last axis", [at(e, (..., c)) for e in view.expected]
-        for name, index in LINES.items():
-            if ndims != {2}:  # the first axis of three need not be an image's rows
-                name = name.replace("row", "entry along axis 0").replace("column", "entry along axis 1")
+        for name, index in lines(*ndims):
             yield name, [at(e, index) for e in view.expected]
         yield "at the border", [border(e) for e in view.expected]
         if all(e.ndim == 2 and e.shape[0] == e.shape[1] for e in view.expected):
@@ -54,16 +52,14 @@ def in_the_array(view: View) -> Iterator[tuple[str, Masks]]:
             yield "off the diagonal", [~np.eye(len(e), dtype=bool) for e in view.expected]
 
 
-LINES = {
-    "in the first row": (0,),
-    "in the last row": (-1,),
-    "in the first column": (slice(None), 0),
-    "in the last column": (slice(None), -1),
-    "outside of the last row": (slice(None, -1),),
-    "outside of the first row": (slice(1, None),),
-    "outside of the last column": (slice(None), slice(None, -1)),
-    "outside of the first column": (slice(None), slice(1, None)),
-}
+def lines(ndim: int) -> Iterator[tuple[str, tuple]]:
+    """The first and the last one along each axis, and all others, by their indices."""
+    for axis, name in enumerate(("row", "column") if ndim == 2 else [f"entry along axis {k}" for k in range(ndim)]):
+        before = (slice(None),) * axis
+        yield f"in the first {name}", (*before, 0)
+        yield f"in the last {name}", (*before, -1)
+        yield f"outside of the last {name}", (*before, slice(None, -1))
+        yield f"outside of the first {name}", (*before, slice(1, None))
 
 
 def at(e: np.ndarray, index: tuple) -> np.ndarray:

@@ -7,13 +7,14 @@ otherwise than the reference does (`otherwise`), or another one in its place.
 import ast
 import copy
 import functools
+import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from labkit.course.questions.comparison import quiet
-from labkit.course.questions.otherwise import COMPARISONS, OPERATIONS, Change, done_otherwise
+from labkit.course.questions.otherwise import COMPARISONS, OPERATIONS, Change, compared, done_otherwise
 from labkit.course.questions.slips import Path, below, compiled, definition_of, follow, made_of, names_in, put
 
 KINDS = {kind: f"the {name.removeprefix('a ')}" for kind, (name, _) in OPERATIONS.items()} | {
@@ -64,24 +65,30 @@ class Traced:
     function: Callable = print
     steps: list[Step] = field(default_factory=list)
     calls: dict[int, list] = field(default_factory=dict)  # of the last run: operands, options and value of each
-    change: tuple[int, Change] | None = None
+    change: tuple[int, Change, int | None] | None = None
     parameters: tuple[str, ...] = ()
     given: tuple = ()
     count: int = 0
 
-    def run(self, args: tuple, change: tuple[int, Change] | None = None) -> object:
-        """Run it, with a change of the step of some number; with a change it may alter its arguments."""
+    def run(self, args: tuple, change: tuple[int, Change, int | None] | None = None) -> object:
+        """Run it, with a change of the step of some number; with a change it may alter its arguments.
+
+        Without a change the calls of all steps are kept, with one those of the third entry's step: few, to be fast.
+        """
         self.calls, self.change, self.given, self.count = {}, change, args, 0
         return self.function(*args)
 
     def step(self, number: int, *operands: object, **options: object) -> object:
         """Compute a step; its reference calls this in the place of its expression."""
         compute = self.steps[number].compute
-        self.count += 1
-        if self.change and self.count > MOST_STEPS:
-            raise RuntimeError("a change of a step has made a loop that does not end")
-        if self.change and self.change[0] == number:
-            return self.change[1](compute, *operands, **options)
+        if self.change:
+            self.count += 1
+            if self.count > MOST_STEPS:
+                raise RuntimeError("a change of a step has made a loop that does not end")
+            if self.change[0] == number:
+                return self.change[1](compute, *operands, **options)
+            if self.change[2] != number:
+                return compute(*operands, **options)
         value = compute(*operands, **options)
         self.calls.setdefault(number, []).append((operands, options, kept(value)))
         return value
@@ -146,15 +153,14 @@ def changed_steps(reference: Callable, args: tuple) -> Iterator[tuple[str, Calla
                 continue
             words = step.words.removesuffix(",") + "," * (", made of" in step.words or ", in one of" in step.words)
             yield told(trace, f"{words} {says}", number, change)
-    for number, words, instead in exchanges(trace, args, calls):
-        yield told(
-            trace, f"{words} stood in the place of {trace.steps[number].words.removesuffix(',')}", number, instead
-        )
+    for number, words, instead, needed in exchanges(trace, args, calls):
+        place = trace.steps[number].words.removesuffix(",")
+        yield told(trace, f"{words} stood in the place of {place}", number, instead, needed)
 
 
-def told(trace: Traced, words: str, number: int, change: Change) -> tuple[str, Callable]:
-    """The sentence about a change of a step, and the reference with it."""
-    return f"Your output is right as if {words}.", lambda args: trace.run(args, (number, change))
+def told(trace: Traced, words: str, number: int, change: Change, needed: int | None = None) -> tuple[str, Callable]:
+    """The sentence about a change of a step, which may need another step, and the reference with it."""
+    return f"Your output is right as if {words}.", lambda args: trace.run(args, (number, change, needed))
 
 
 def matters(change: Change, step: Step, operands: tuple, options: dict, value: object) -> bool:
@@ -174,23 +180,23 @@ def same(a: object, b: object) -> bool:
     return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f" == np.asarray(b).dtype.kind)
 
 
-def exchanges(trace: Traced, args: tuple, calls: dict[int, list]) -> Iterator[tuple[int, str, Change]]:
+def exchanges(trace: Traced, args: tuple, calls: dict[int, list]) -> Iterator[tuple[int, str, Change, int | None]]:
     """Steps by their numbers, and what of the same shape, an argument or an earlier step, could stand in its place."""
     known = [
-        (name, value, lambda *a, i=i, **o: trace.given[i])
+        (name, value, lambda *a, i=i, **o: trace.given[i], None)
         for i, (name, value) in enumerate(zip(trace.parameters, args, strict=False))  # not those of *arguments
     ]
     for number in calls:
         step, value = trace.steps[number], calls[number][-1][2]
         if isinstance(step.node, ast.Constant) or as_array(value) is None:
             continue
-        for words, other, instead in known:
+        for words, other, instead, needed in known:
             truths = {np.asarray(v).dtype.kind == "b" for v in (value, other)}
             if np.shape(value) == np.shape(other) and len(truths) == 1 and not same(value, other):
-                yield number, words, instead
+                yield number, words, instead, needed
         if not isinstance(step.node, ast.Name):
             words = step.words.removesuffix(",")
-            known.append((words, value, lambda *a, number=number, **o: kept(trace.last(number))))
+            known.append((words, value, lambda *a, number=number, **o: kept(trace.last(number)), number))
 
 
 class InFull(ast.NodeTransformer):
@@ -235,8 +241,8 @@ def taken_apart(what: ast.AST, node: ast.AST, sources: dict) -> tuple[Callable, 
     """How a step is computed, and what of: expressions of its operands and its options."""
     if isinstance(what, ast.BinOp):
         return OPERATIONS[type(node.op)][1], [node.left, node.right], []
-    if isinstance(what, ast.Compare) and len(what.ops) == 1 and type(what.ops[0]) in COMPARISONS:
-        return COMPARISONS[type(what.ops[0])][1], [node.left, *node.comparators], []
+    if isinstance(what, ast.Compare) and all(type(op) in COMPARISONS for op in what.ops):
+        return compared(*map(type, what.ops)), [node.left, *node.comparators], []
     if isinstance(what, ast.Subscript):
         return (lambda whole, index: whole[index]), [node.value, index_of(node.slice)], []
     if isinstance(what, ast.UnaryOp):
@@ -283,6 +289,10 @@ def words_for(what: ast.AST, outer: Sequence[ast.AST], path: Path, sources: dict
         option = next((o.arg for o in reversed(outer) if isinstance(o, ast.keyword)), "a number")
         return "" if option == "axis" else f"{option} in {next(filter(None, around), 'the formula').removesuffix(',')}"
     if path and path[-1][0] == "iter" and isinstance(what, ast.For | ast.comprehension):
+        if sized := re.fullmatch(r"range\((?:(\w+)\.shape\[(\d)\]|len\((\w+)\))\)", ast.unparse(what.iter)):
+            name, axis = sized[1] or sized[3], sized[2] or 0
+            if name in arguments:
+                return f"the loop over axis {axis} of {name}"
         made = sorted(set().union(*(sources.get(name, set()) for name in names_in(what.iter)))) or made
         return f"the loop over what is made of {listed(made)}" if made else "the loop"
     kind = kind_of(what, arguments)

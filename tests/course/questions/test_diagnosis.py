@@ -60,6 +60,7 @@ RELATIONS = [
     (lambda a, k: table(a, k) - k, "too small by k"),
     (lambda a, k: 3 * table(a, k) + 2, "3 times the right value plus 2"),
     (lambda a, k: np.zeros(a.shape), "Yours is always 0"),
+    (lambda a, k: np.zeros(len(a)), "Yours is always 0"),
     (lambda a, k: table(a, k) * a, "times a"),
     (lambda a, k: a / a.sum(axis=0), "a divided by the sum of a over axis 0"),
     (lambda a, k: table(a, 1.0), "too small by a factor that is k"),
@@ -104,7 +105,18 @@ def test_what_says_nothing_is_not_said():
     column, square = np.arange(4.0)[:, None], np.ones((2, 2))
     view = View((column, square), (column + 9, square), ((), ()), (), 1e-6, 1e-6)
     assert "in the first column" not in dict(places(view))
+    blob = np.ones((1, 2, 3, 4))
+    of_blob = View((blob,), (blob * [1, 1, 1, 2],), ((),), (), 1e-6, 1e-6)
+    assert "in the last entry along axis 3" in dict(places(of_blob))
     assert not View((square,), (0 * square,), ((),), (), 1e-6, 1e-6).gives(lambda e: 1e-60 * e)
+
+
+def test_an_endless_loop_is_told_what_to_look_at():
+    def endless(a, k):
+        while True:
+            k += 1
+
+    assert "does not end" in judge(TABLE, endless, seed=1, limit_s=0.2).hint
 
 
 def test_a_right_answer_is_told_nothing():

@@ -69,7 +69,10 @@ TAKEN_OTHERWISE = [
     (answer(larger=lambda a, b: a), "the result of maximum, made of a and limit, were not taken"),
     (answer(place=(1, 0)), "a[0, 1] had its indices 0 and 1 exchanged"),
     (answer(place=(0, 2)), "a number in a[0, 1] were one larger"),
-    (lambda a, k, limit: shares(a, k, limit) * (np.arange(len(a)) < len(a) - 1)[:, None], "ended one turn earlier"),
+    (
+        lambda a, k, limit: shares(a, k, limit) * (np.arange(len(a)) < len(a) - 1)[:, None],
+        "the loop over axis 0 of a ended one turn earlier",
+    ),
 ]
 
 
@@ -115,6 +118,18 @@ def passed_on(a, *others):
 
 def test_arguments_without_names_of_their_own_are_no_obstacle():
     assert list(changed_steps(passed_on, (np.ones(2), 3, 4)))
+
+
+def inside(a, low, high):
+    """How many numbers of a lie between two limits."""
+    return sum(low <= x <= high for x in a)
+
+
+def test_a_chain_of_comparisons_has_two_parts():
+    args = np.arange(5.0), 1.0, 3.0
+    known = {says.rpartition("low ")[2]: function for says, function in changed_steps(inside, args)}
+    assert known["were made with <, in its part number 2."](args) == 2
+    assert known["were its first part alone."](args) == 4
 
 
 def halvings(x):

@@ -11,7 +11,7 @@ def undistort(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     seen = (pixels - c) / f
     ideal = seen
-    for _ in range(100):
+    for _ in range(30):
         r2 = (ideal**2).sum(axis=1, keepdims=True)
         ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * ideal
@@ -68,7 +68,7 @@ def newton(pixels, K, k):
     x = (pixels - c) / f
     seen = np.hypot(*x.T)
     r = seen.copy()
-    for _ in range(30):
+    for _ in range(10):
         r -= (r + k[0] * r**3 + k[1] * r**5 - seen) / (1 + 3 * k[0] * r**2 + 5 * k[1] * r**4)
     return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
 
@@ -124,7 +124,7 @@ def powers_too_low(pixels, K, k):
 def one_radius_for_all(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     seen = ideal = (pixels - c) / f
-    for _ in range(100):
+    for _ in range(30):
         r2 = (ideal**2).sum()
         ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * ideal

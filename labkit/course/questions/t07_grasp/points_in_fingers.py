@@ -17,7 +17,7 @@ def _scene_round_a_grasp(rng):
     """Draw a grasp that leans near the base's origin, and points all round it, more on one side than on the other."""
     T = leaning_grasp(rng)
     T[:3, 3] = rng.uniform(0.005, 0.02, 3)  # little: whoever forgets it or takes it off too late still counts some
-    in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (400, 3))
+    in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (120, 3))
     P = in_grasp @ T[:3, :3].T + T[:3, 3]
     width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
     return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
