@@ -42,6 +42,31 @@ def shape_checks_off_for_bad_input(request):
     jaxtyping.config.update("jaxtyping_disable", False)
 
 
+@pytest.fixture
+def labkit(monkeypatch):
+    """A function that runs a command of the kit in this process and returns its exit status."""
+    from labkit.apps import cli
+
+    def run(*words) -> int:
+        monkeypatch.setattr(sys, "argv", ["labkit", *map(str, words)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        return stop.value.code
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def one_thread():
+    """PyTorch computes in one thread."""
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
 # ------------------------------------------------------------------------------------------- other systems
 
 # What is tested on some systems only: the start of a test's id, the systems, and why not on others.

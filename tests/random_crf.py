@@ -3,6 +3,13 @@
 import numpy as np
 
 from labkit.crf.energy import PottsCRF
+from labkit.crf.integers import IntegerPotts, inside
+
+
+def as_crf(integer: IntegerPotts) -> PottsCRF:
+    """The integer model as one with real costs."""
+    unary, weights = (inside(flat, integer.size).astype(float) for flat in (integer.unary, integer.weights))
+    return PottsCRF(unary, weights.transpose(2, 0, 1))
 
 
 def random_crf(seed, H, W, C, connectivity=4, lam=1.0, forbidden=0.0) -> PottsCRF:

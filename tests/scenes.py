@@ -1,4 +1,4 @@
-"""What tests share: boxes on a table, seen by a camera in front of it; random poses."""
+"""What tests share: boxes on a table, seen by a camera in front of it; random poses, images, frames."""
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -24,6 +24,11 @@ def pose(seed: int) -> np.ndarray:
     """A random rigid transform (4, 4)."""
     rng = np.random.default_rng(seed)
     return RigidTransform.from_components(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=rng)).as_matrix()
+
+
+def random_image(height: int, width: int) -> np.ndarray:
+    """Colours without any order."""
+    return np.random.default_rng(0).integers(0, 256, (height, width, 3), dtype=np.uint8)
 
 
 def random_frame(seed: int, shape: tuple[int, int] = (24, 32)) -> RGBDFrame:

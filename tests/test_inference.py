@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from scenes import random_image
 from torch import nn
 from torch.nn import functional as F
 
@@ -15,10 +16,6 @@ from labkit.network import SmallSegNet, TorchEngine, UNet, UNetRGBD, evaluating,
 from labkit.pipeline import Pipeline
 from labkit.stacks.engines import ENGINES, open_engine
 from labkit.training import ImagesInMemory, evaluate
-
-
-def random_image(height: int, width: int) -> np.ndarray:
-    return np.random.default_rng(0).integers(0, 256, (height, width, 3), dtype=np.uint8)
 
 
 def tensor(rgb: np.ndarray, mean=0.0, std=255.0) -> torch.Tensor:

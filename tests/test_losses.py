@@ -17,13 +17,7 @@ WEIGHTS = np.array([0.5, 1.0, 20.0, 3.0])
 untimed = settings(deadline=None)
 
 
-@pytest.fixture(autouse=True, scope="module")
-def one_thread():
-    """These tensors are tiny; on a busy machine more threads would only wait for one another."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("one_thread")  # tensors are tiny: more threads would wait for one another
 
 
 @st.composite

@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 import torch
+from scenes import random_image
 from torch.nn import functional as F
 
 from labkit.frame import RGBDFrame
@@ -23,10 +24,6 @@ from labkit.network import (
 def small_unet(num_classes: int = 4) -> UNet:
     torch.manual_seed(0)
     return UNet(num_classes, widths=(8, 8, 16), blocks=(1, 0, 1))
-
-
-def random_image(height: int, width: int) -> np.ndarray:
-    return np.random.default_rng(0).integers(0, 256, (height, width, 3), dtype=np.uint8)
 
 
 def test_smallsegnet_has_the_layers_of_the_text():

@@ -10,13 +10,15 @@ from pathlib import Path
 
 import pytest
 import torch
-from test_training import CONFIG, frames, scenes
+from test_training import CONFIG, batch, frames, scenes
 
 import data_gen
 from labkit import training
 from labkit.support.augment import augment
 
 ROOT = Path(__file__).parent.parent
+# As each rank has: sums of two threads are rounded otherwise, and Adam's first steps magnify that.
+pytestmark = pytest.mark.usefixtures("one_thread")
 # Loopback by its number: on some machines the own name leads nowhere, and ranks would wait for it.
 LAUNCH = (sys.executable, "-m", "torch.distributed.run", "--standalone", "--local-addr=127.0.0.1", "--nproc-per-node=2")
 
@@ -36,15 +38,6 @@ def environment() -> dict[str, str]:
 def by_two(*words: str, check: bool = True) -> subprocess.CompletedProcess:
     command = [*LAUNCH, *words]
     return subprocess.run(command, env=environment(), cwd=ROOT, capture_output=True, text=True, check=check)
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    """As each rank has: sums of two threads are rounded otherwise, and Adam's first steps magnify that."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
 
 
 @pytest.mark.parametrize(("model", "memory_gb"), [("smallsegnet", 1.0), ("unet", 0.0), ("unet_rgbd", 0.0)])
@@ -85,16 +78,16 @@ def test_the_command_prints_once(tmp_path):
 
 
 def test_a_part_of_a_batch_is_changed_as_in_the_whole():
-    rgb = torch.randint(0, 256, (5, 20, 28, 3), dtype=torch.uint8, generator=torch.Generator().manual_seed(0))
+    rgb, y = batch(5)
     for seed in range(4):  # with and without zoom
 
         def changed(part, *where, seed=seed):
-            return augment(rgb[part], rgb[part][..., 0] % 5, (8, 12), torch.Generator().manual_seed(seed), *where)
+            return augment(rgb[part], y[part], (8, 12), torch.Generator().manual_seed(seed), *where)
 
-        x, y = changed(slice(None))
+        x, labels = changed(slice(None))
         parts = [changed(slice(0, 2), 0, 5), changed(slice(2, 5), 2, 5)]
         assert torch.allclose(x, torch.cat([part[0] for part in parts]), atol=1e-6)
-        assert torch.equal(y, torch.cat([part[1] for part in parts]))
+        assert torch.equal(labels, torch.cat([part[1] for part in parts]))
 
 
 def dies_at_step_three(rank: int, name: str) -> None:

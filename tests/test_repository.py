@@ -191,6 +191,16 @@ def make(folder: Path, *arguments: str, path: str | None = None) -> subprocess.C
     return subprocess.run(["make", *arguments], cwd=folder, env=environment, capture_output=True, text=True)
 
 
+def write_program(path: Path, text: str) -> None:
+    """Write a program, and its folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(0o755)
+
+
+FAILS = "#!/bin/sh\nexit 1\n"
+
+
 @pytest.fixture
 def checkout(tmp_path):
     """A checkout of nothing but what the setup needs, with a Python 3.11 that only writes down what it is asked.
@@ -199,16 +209,14 @@ def checkout(tmp_path):
     """
     for name in ("Makefile", "pyproject.toml", "constraints.txt"):
         shutil.copy(ROOT / name, tmp_path)
-    (tmp_path / "bin").mkdir()
-    python = tmp_path / "bin" / "python3.11"
-    python.write_text(
+    write_program(
+        tmp_path / "bin/python3.11",
         "#!/bin/bash\n"
         'if [ "$1" = -c ]; then exit 0; fi\n'
         f'echo "$@" >> "{tmp_path}/log"\n'
         'if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; fi\n'
-        f'if [ "$2" = pip ] && [ -e "{tmp_path}/offline" ]; then exit 1; fi\n'
+        f'if [ "$2" = pip ] && [ -e "{tmp_path}/offline" ]; then exit 1; fi\n',
     )
-    python.chmod(0o755)
     return tmp_path
 
 
@@ -279,9 +287,8 @@ def test_the_versions_of_python_are_the_same_everywhere(checkout):
         if not fits:
             assert "ImportError: labkit needs Python 3.11, 3.12 or 3.13, this is" in done.stderr.splitlines()[-1]
     toy = (checkout / "bin/python3.11").read_text()
-    for name, text in {"python3.13": "#!/bin/sh\nexit 1\n", "python3.12": toy.replace("echo", "echo 3.12")}.items():
-        (checkout / "bin" / name).write_text(text)
-        (checkout / "bin" / name).chmod(0o755)
+    for name, text in {"python3.13": FAILS, "python3.12": toy.replace("echo", "echo 3.12")}.items():
+        write_program(checkout / "bin" / name, text)
     make(checkout, ".venv/installed", path=f"{checkout / 'bin'}:{os.environ['PATH']}")
     assert (checkout / "log").read_text().startswith("3.12 -m venv .venv\n")
 
@@ -294,8 +301,7 @@ def test_the_wrong_python_gets_one_line(checkout, arguments):
     for tool in ("make", "bash", "sh", "env"):
         (tools / tool).symlink_to(shutil.which(tool))
     for folder, name in ((tools, "python3"), (tools, "python3.11"), (checkout, "python3.12")):
-        (folder / name).write_text("#!/bin/sh\nexit 1\n")
-        (folder / name).chmod(0o755)
+        write_program(folder / name, FAILS)
     done = make(checkout, "test", *arguments, path=str(tools))
     assert done.returncode != 0
     lines = [line for line in done.stderr.splitlines() if not line.startswith("make")]
@@ -338,11 +344,9 @@ def test_clean_removes_what_was_generated_and_nothing_else(checkout):
 def test_the_suite_goes_on_where_a_part_fails_and_names_it(checkout, fails, last):
     """In a checkout where ruff and every pytest are toys, of which those that meet a word in their arguments fail."""
     (checkout / "tests").mkdir()
-    (checkout / ".venv/bin").mkdir(parents=True)
     shutil.copy(ROOT / "tests/run", checkout / "tests")
     for name in ("ruff", "python"):
-        (checkout / ".venv/bin" / name).write_text('#!/bin/bash\n[[ " $* " != *" $FAILS "* ]]\n')
-        (checkout / ".venv/bin" / name).chmod(0o755)
+        write_program(checkout / ".venv/bin" / name, '#!/bin/bash\n[[ " $* " != *" $FAILS "* ]]\n')
 
     done = subprocess.run([checkout / "tests/run"], env=os.environ | {"FAILS": fails}, capture_output=True, text=True)
     said = done.stdout.splitlines()

@@ -24,14 +24,6 @@ def data(tmp_path_factory):
     return folder
 
 
-def run(monkeypatch, *arguments) -> int:
-    """Run a command in this process and return its exit status."""
-    monkeypatch.setattr(sys, "argv", ["labkit", *map(str, arguments)])
-    with pytest.raises(SystemExit) as stop:
-        cli.main()
-    return stop.value.code
-
-
 def test_help_names_the_commands_and_imports_nothing_heavy():
     code = (
         "import sys; sys.argv = ['labkit', '--help']\n"
@@ -44,9 +36,9 @@ def test_help_names_the_commands_and_imports_nothing_heavy():
     assert shown.splitlines()[-1] == "heavy: []"
 
 
-def test_every_command_says_what_it_does(monkeypatch, capsys):
+def test_every_command_says_what_it_does(labkit, capsys):
     for command in cli.app.registered_commands:
-        assert run(monkeypatch, command.callback.__name__, "--help") == 0
+        assert labkit(command.callback.__name__, "--help") == 0
         assert command.callback.__doc__.splitlines()[0].split(";")[0] in " ".join(capsys.readouterr().out.split())
 
 
@@ -62,25 +54,25 @@ def test_every_command_says_what_it_does(monkeypatch, capsys):
         (ModuleNotFoundError("No module named 'torch'"), "labkit: No module named 'torch'; `labkit doctor` tells"),
     ],
 )
-def test_what_the_user_can_mend_is_one_line_and_status_2(monkeypatch, capsys, error, line):
+def test_what_the_user_can_mend_is_one_line_and_status_2(monkeypatch, labkit, capsys, error, line):
     def fail():
         raise error
 
     monkeypatch.setattr(doctor, "examine", fail)
-    assert run(monkeypatch, "doctor") == 2
+    assert labkit("doctor") == 2
     said = capsys.readouterr().err
     assert said.startswith(line) and said.count("\n") == 1
-    assert run(monkeypatch, "--debug", "doctor") == 2 and "Traceback" in capsys.readouterr().err
+    assert labkit("--debug", "doctor") == 2 and "Traceback" in capsys.readouterr().err
     error = TypeError("a bug")  # a mistake in the program keeps its traceback, and is nothing to look at
-    assert run(monkeypatch, "doctor") == 2
+    assert labkit("doctor") == 2
     said = capsys.readouterr().err
     assert "Traceback" in said and "TypeError: a bug" in said
 
 
 @pytest.mark.parametrize("state, status", [(doctor.OK, 0), (doctor.NOTE, 0), (doctor.WRONG, 1)])
-def test_doctor_fails_only_when_something_needed_is_missing(monkeypatch, capsys, state, status):
+def test_doctor_fails_only_when_something_needed_is_missing(monkeypatch, labkit, capsys, state, status):
     monkeypatch.setattr(doctor, "examine", lambda: [doctor.Finding("thing", state, "as it is")])
-    assert run(monkeypatch, "doctor") == status
+    assert labkit("doctor") == status
     assert "as it is" in capsys.readouterr().out
 
 
@@ -88,8 +80,8 @@ def test_doctor_fails_only_when_something_needed_is_missing(monkeypatch, capsys,
     "arguments, name",
     [(["train", "--model", "x"], "model"), (["train", "--epochs", "x"], "--epochs"), (["lift"], "lift")],
 )
-def test_wrong_usage_is_status_2_and_names_the_option(monkeypatch, capsys, arguments, name):
-    assert run(monkeypatch, *arguments) == 2
+def test_wrong_usage_is_status_2_and_names_the_option(labkit, capsys, arguments, name):
+    assert labkit(*arguments) == 2
     assert name in capsys.readouterr().err
 
 
@@ -102,41 +94,41 @@ def test_wrong_usage_is_status_2_and_names_the_option(monkeypatch, capsys, argum
         (["--seed", -1], "seed"),
     ],
 )
-def test_bad_training_arguments_are_named(monkeypatch, capsys, data, tmp_path, arguments, name):
+def test_bad_training_arguments_are_named(labkit, capsys, data, tmp_path, arguments, name):
     given = arguments if arguments[0] == "nowhere" else [data, *arguments]
-    assert run(monkeypatch, "train", *given, "--out", tmp_path) == 2
+    assert labkit("train", *given, "--out", tmp_path) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.startswith("labkit: ") and name in said
 
 
-def test_train_writes_weights_and_a_second_run_finds_it_done(monkeypatch, capsys, data, tmp_path):
+def test_train_writes_weights_and_a_second_run_finds_it_done(labkit, capsys, data, tmp_path):
     command = ["train", data, "--val", data, "--epochs", 2, "--device", "cpu", "--out", tmp_path]
-    assert run(monkeypatch, *command) == 0
+    assert labkit(*command) == 0
     assert "2 epochs" in capsys.readouterr().out
     history = json.loads((tmp_path / "unet.history.json").read_text())
     assert [row["epoch"] for row in history] == [1, 2] and "mean_iou" in history[1]
     assert load_model(tmp_path / "unet.pt", 4) is not None
     weights = (tmp_path / "unet.pt").read_bytes()
-    assert run(monkeypatch, *command) == 0
+    assert labkit(*command) == 0
     assert (tmp_path / "unet.pt").read_bytes() == weights
-    assert run(monkeypatch, *command, "--seed", 1) == 2  # not the run that the checkpoint belongs to
+    assert labkit(*command, "--seed", 1) == 2  # not the run that the checkpoint belongs to
     assert "seed" in capsys.readouterr().err
-    assert run(monkeypatch, *command, "--seed", 1, "--no-resume") == 0
+    assert labkit(*command, "--seed", 1, "--no-resume") == 0
     assert (tmp_path / "unet.pt").read_bytes() != weights
 
 
-def test_training_goes_on_from_given_weights_on_part_of_two_data_sets(monkeypatch, capsys, data, tmp_path):
+def test_training_goes_on_from_given_weights_on_part_of_two_data_sets(labkit, capsys, data, tmp_path):
     """A learning rate of next to nothing leaves the weights as they were; four frames are one batch of eight."""
     start, out = tmp_path / "start.pt", tmp_path / "out"
     save_model(UNetRGBD(), start)
     settings = "--scenes 2 --model unet_rgbd --epochs 1 --device cpu --lr 1e-9"
     command = ["train", data, data, *settings.split()]
-    assert run(monkeypatch, *command, "--init", start, "--out", out) == 0
+    assert labkit(*command, "--init", start, "--out", out) == 0
     assert json.loads((out / "unet_rgbd.history.json").read_text())[0]["steps"] == 1
     trained = dict(load_model(out / "unet_rgbd.pt").named_parameters())
     for name, weight in load_model(start).named_parameters():
         assert torch.allclose(weight, trained[name], atol=1e-6), name
-    assert run(monkeypatch, *command, "--init", "unet", "--out", tmp_path) == 2
+    assert labkit(*command, "--init", "unet", "--out", tmp_path) == 2
     assert "init: expected weights of unet_rgbd, got unet of unet" in capsys.readouterr().err
 
 

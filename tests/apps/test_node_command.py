@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 
 import data_gen
-from labkit.apps import cli
 from labkit.apps.node_command import Settings
 from labkit.node.actors import Camera
 from labkit.node.bags import BagWriter
 from labkit.node.messages import DEFAULT_TOPICS, Image
-
-
-def run(monkeypatch, *arguments) -> int:
-    """Run the command in this process and return its exit status."""
-    monkeypatch.setattr(sys, "argv", ["labkit", "node", *map(str, arguments)])
-    with pytest.raises(SystemExit) as stop:
-        cli.main()
-    return stop.value.code
 
 
 def test_sim_goes_from_camera_topic_to_lift_in_one_line():
@@ -31,24 +22,24 @@ def test_sim_goes_from_camera_topic_to_lift_in_one_line():
     assert line.startswith("scene 0: frame answered") and "lifted lego_0" in line
 
 
-def test_bag_says_what_became_of_the_frames(monkeypatch, capsys, tmp_path):
+def test_bag_says_what_became_of_the_frames(labkit, capsys, tmp_path):
     frame = data_gen.render(data_gen.sample_scene(620000, "test"), (64, 48))
     with BagWriter(tmp_path / "in.bag") as bag:
         Camera(bag).publish(frame, 1)
     out = tmp_path / "out"
-    assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 0
+    assert labkit("node", "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 0
     assert f"wrote {out}: 1 frames answered, 0 lost, 0 unusable, 0 malformed messages" in capsys.readouterr().out
     assert (out / "metadata.yaml").is_file()
-    assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 2
+    assert labkit("node", "--bag", tmp_path / "in.bag", "--out", out, "--model", "smallsegnet") == 2
     assert "it is there already" in capsys.readouterr().err
 
 
-def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(monkeypatch, capsys, tmp_path):
+def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(labkit, capsys, tmp_path):
     frame = data_gen.render(data_gen.sample_scene(620000, "test"), (64, 48))
     with BagWriter(tmp_path / "in.bag") as bag:
         Camera(bag, topics=replace(DEFAULT_TOPICS, depth="/elsewhere")).publish(frame, 1)
         bag.advertise(DEFAULT_TOPICS.depth, Image)
-    assert run(monkeypatch, "--bag", tmp_path / "in.bag", "--out", tmp_path / "out", "--model", "smallsegnet") == 1
+    assert labkit("node", "--bag", tmp_path / "in.bag", "--out", tmp_path / "out", "--model", "smallsegnet") == 1
     said = "0 frames answered, 1 lost, 0 unusable, 0 malformed messages: frame lost: no /camera/depth/image_raw within"
     assert said in capsys.readouterr().out
 
@@ -70,8 +61,8 @@ def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(
         (["--sim", "--model", "smallsegnet", "--target", "9"], "target_class"),
     ],
 )
-def test_wrong_words_are_one_line_and_status_2(monkeypatch, capsys, arguments, said):
-    assert run(monkeypatch, *arguments) == 2
+def test_wrong_words_are_one_line_and_status_2(labkit, capsys, arguments, said):
+    assert labkit("node", *arguments) == 2
     assert said in capsys.readouterr().err.splitlines()[-1]
 
 

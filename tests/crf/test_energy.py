@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_crf import random_crf
+from random_crf import as_crf, random_crf
 
 from labkit.crf import PottsCRF, log_partition, marginals, refine, solve, unary_from_probabilities
-from labkit.crf.integers import IntegerPotts, inside, quantise
+from labkit.crf.integers import quantise
 
 
 def energy_by_loop(unary, image, lam, sigma_I, sigma_p, connectivity, y):
@@ -56,12 +56,6 @@ def test_a_forbidden_class_costs_infinity():
     crf = PottsCRF(unary, np.zeros((2, 1, 2)))
     assert crf.energy(np.array([[1, 0]])) == np.inf
     assert crf.energy(np.array([[0, 1]])) == 0.0
-
-
-def as_crf(integer: IntegerPotts) -> PottsCRF:
-    """The integer model as one with real costs."""
-    unary, weights = (inside(flat, integer.size).astype(float) for flat in (integer.unary, integer.weights))
-    return PottsCRF(unary, weights.transpose(2, 0, 1))
 
 
 @settings(max_examples=60, deadline=None)

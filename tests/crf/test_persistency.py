@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_crf import random_crf
+from random_crf import as_crf, random_crf
 from scipy.ndimage import gaussian_filter
 
 from labkit.crf import PottsCRF, refine, solve
@@ -29,8 +29,7 @@ def test_some_best_labelling_keeps_every_certain_pixel(shape, seed, connectivity
     integer = quantise(crf)
     cheapest = crf.unary.argmin(axis=2)
     moves = Moves(integer, cheapest)
-    unary, weights = (inside(flat, integer.size).astype(float) for flat in (integer.unary, integer.weights))
-    ((y, energies),) = enumerate_labellings(PottsCRF(unary, weights.transpose(2, 0, 1)))  # integers, and so exact
+    ((y, energies),) = enumerate_labellings(as_crf(integer))  # integers, and so exact
     keeps = np.ones(len(y), bool)
     for alpha in order:
         if alpha is None or alpha < shape[2]:

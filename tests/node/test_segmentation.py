@@ -8,8 +8,9 @@ import time
 import numpy as np
 import pytest
 from peers import MS, small, wait_for
+from scenes import box, scene
 
-from labkit.labels import SURFACE, TARGET, one_hot, overlay
+from labkit.labels import SURFACE, one_hot, overlay
 from labkit.node import convert
 from labkit.node.actors import Arm, Camera
 from labkit.node.bus import Bus
@@ -17,32 +18,25 @@ from labkit.node.messages import CameraInfo, Header, Image, Topics
 from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline
-from labkit.sim.spec import Camera as CameraSpec
-from labkit.sim.spec import ObjectSpec, Part, SceneSpec
 from labkit.sim.world import World
 
 TOPICS = Topics()
-
-
-def block_scene():
-    block = ObjectSpec("block", "block", TARGET, (0.5, 0.05, 0.022), parts=(Part("box", (0.04, 0.06, 0.04)),))
-    return SceneSpec(objects=(block,), camera=CameraSpec.looking_at((0.5, 0.0, 0.0), 0.7, 0.3, 0.8), seed=5)
+SCENE = dataclasses.replace(scene(box("block", 0.5, 0.05)), seed=5)
 
 
 @pytest.fixture(scope="module")
 def frame():
-    with World(block_scene()) as world:
+    with World(SCENE) as world:
         return world.render((160, 120))
 
 
 class Truth:
-    """A "network" that knows the labels of a frame, and counts how often it was asked."""
+    """A "network" that knows the labels of a frame."""
 
     def __init__(self, labels):
-        self.answer, self.asked = one_hot(labels).astype(np.float32), 0
+        self.answer = one_hot(labels).astype(np.float32)
 
     def __call__(self, rgb):
-        self.asked += 1
         return self.answer
 
 
@@ -324,8 +318,7 @@ def test_a_camera_publishes_any_iterable_at_its_rate_until_it_is_stopped(frame):
 
 def test_the_arm_lifts_what_the_node_found():
     """Section 5's diagram, in process: nothing but messages goes from the camera to the arm."""
-    spec = block_scene()
-    with World(spec) as world:
+    with World(SCENE) as world:
         bus = Bus()
         frame = world.render()
         arm = Arm(bus, world)
@@ -340,12 +333,11 @@ def test_the_arm_lifts_what_the_node_found():
 
 
 def test_the_rehearsal_says_in_one_line_what_happened():
-    spec = block_scene()
-    with World(spec) as world:
+    with World(SCENE) as world:
         labels = world.render().labels
-    line = camera_to_lift(spec, Pipeline(Truth(labels)))
+    line = camera_to_lift(SCENE, Pipeline(Truth(labels)))
     assert line.startswith("scene 5: frame answered") and line.endswith("lifted block") and "\n" not in line
-    nothing = camera_to_lift(spec, Pipeline(Truth(np.full(labels.shape, SURFACE))))
+    nothing = camera_to_lift(SCENE, Pipeline(Truth(np.full(labels.shape, SURFACE))))
     assert nothing.endswith("0 target points, grasp: none: no target points")
 
 

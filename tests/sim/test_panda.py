@@ -1,6 +1,7 @@
 """The arm: its kinematics against PyBullet, its planner against PyBullet's collision checks, and honest lifts."""
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import pybullet
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import box, scene
 from scipy.spatial.transform import Rotation
 
 from labkit.grasp import Grasp, GraspPlan
@@ -18,13 +20,12 @@ from labkit.sim.client import Client
 from labkit.sim.kinematics import HOME, LOWER, MAX_EFFORT, MAX_VELOCITY, UPPER
 from labkit.sim.panda import ARM_JOINTS, FINGER_JOINTS, Panda
 from labkit.sim.shapes import data_path
-from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
+from labkit.sim.spec import ObjectSpec
 from labkit.sim.world import World
 
 Q_HOME = np.array(HOME[:7])
 NOTHING = np.zeros((0, 3))
-CAMERA = Camera.looking_at((0.5, 0.0, 0.0), 0.9, 0.4, 0.8)
-CUBE = Part("box", (0.04, 0.04, 0.04))
+CUBE = (0.04, 0.04, 0.04)
 
 
 def top_down(x: float, y: float, z: float, yaw: float = 0.0, tilt=(0.0, 0.0)) -> np.ndarray:
@@ -40,16 +41,13 @@ def grasp(T: np.ndarray, width: float = 0.07) -> SimpleNamespace:
     return SimpleNamespace(T_base_grasp=T, width=width, score=0.0)
 
 
-def thing(x: float, y: float, yaw: float = 0.0, part: Part = CUBE, name: str = "thing", **rest) -> ObjectSpec:
-    quaternion = tuple(Rotation.from_euler("z", yaw).as_quat())
-    settings = {"class_id": TARGET, "mass": 0.1, **rest}
-    return ObjectSpec(
-        name, "box", position=(x, y, part.size[2] / 2 + 0.001), orientation=quaternion, parts=(part,), **settings
-    )
+def thing(x: float, y: float, yaw: float = 0.0, sides=CUBE, **rest) -> ObjectSpec:
+    orientation = tuple(Rotation.from_euler("z", yaw).as_quat())
+    return replace(box("thing", x, y, sides), **{"orientation": orientation, "mass": 0.1} | rest)
 
 
 def world_of(*things: ObjectSpec) -> World:
-    return World(SceneSpec(objects=things, camera=CAMERA))
+    return World(scene(*things))
 
 
 @pytest.fixture(scope="module")
@@ -359,12 +357,12 @@ def test_an_object_off_the_middle_is_pushed_to_it_and_lifted():
         ({"friction": 0.03, "mass": 0.5}, "slipped", None),
         ({"mass": 15.0}, "slipped", None),
         ({"class_id": OBSTACLE}, "lifted obstacle", OBSTACLE),
-        ({"part": Part("box", (0.04, 0.04, 0.1)), "mass": 0.3}, "lifted", TARGET),  # so tall that it stops the palm
+        ({"sides": (0.04, 0.04, 0.1), "mass": 0.3}, "lifted", TARGET),  # so tall that it stops the palm
     ],
 )
 def test_only_the_lift_of_a_target_is_a_success(rest, reason, class_id):
     with world_of(thing(0.5, 0.0, **rest)) as world:
-        result = Panda(world).lift(grasp(top_down(0.5, 0.0, 0.03 if "part" in rest else 0.02)))
+        result = Panda(world).lift(grasp(top_down(0.5, 0.0, 0.03 if "sides" in rest else 0.02)))
     assert (result.success, result.reason, result.class_id) == (reason == "lifted", reason, class_id)
 
 
@@ -381,8 +379,7 @@ def test_closing_on_nothing_and_not_reaching_are_told_apart():
 
 
 def test_what_is_in_the_way_of_a_blind_arm_makes_it_go_back():
-    tower = Part("box", (0.08, 0.3, 0.6))
-    with world_of(thing(0.36, 0.0, part=tower, mass=60.0, class_id=OBSTACLE)) as world:
+    with world_of(thing(0.36, 0.0, sides=(0.08, 0.3, 0.6), mass=60.0, class_id=OBSTACLE)) as world:
         panda = Panda(world)
         result = panda.lift(grasp(top_down(0.6, 0.0, 0.02)))
         assert result.reason == "blocked on the way over"
@@ -390,8 +387,8 @@ def test_what_is_in_the_way_of_a_blind_arm_makes_it_go_back():
 
 
 def test_same_scene_same_lift_and_another_world_is_left_alone():
-    spec = SceneSpec(objects=(thing(0.5, 0.1, 0.3),), camera=CAMERA)
-    with World(spec) as world, World(spec) as other:
+    cube = thing(0.5, 0.1, 0.3)
+    with world_of(cube) as world, world_of(cube) as other:
         bytes_before = other.render((64, 48)).depth.tobytes(), other.pose("thing").tobytes()
         result = Panda(world).lift(grasp(top_down(0.5, 0.1, 0.02, 0.3)))
         assert result.success
@@ -438,7 +435,7 @@ AIM = top_down(0.5, 0.0, 0.02)
         ("grasp", lambda panda: panda.lift(SimpleNamespace(plan=GraspPlan(), clouds=[]))),  # a Perception, not its plan
         ("where", lambda panda: panda.place(np.zeros((4, 3)))),
         ("plan", lambda panda: panda.execute(planning.plan_grasp(AIM, 0.05, STALE, NOTHING, 0.0))),
-        ("world", lambda panda: Panda(World(SceneSpec((), CAMERA, robot=False)))),
+        ("world", lambda panda: Panda(World(replace(scene(), robot=False)))),
     ],
 )
 def test_bad_input_is_named(argument, call):

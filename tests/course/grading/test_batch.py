@@ -35,10 +35,9 @@ BUT_IOU = TOTAL - POINTS["iou"]
 ROOT = Path(__file__).parents[3]
 
 
-def misconceived(number: int) -> dict[str, str]:
-    """Each question answered with one of its misconceptions."""
-    questions = of_topic(TOPIC).items()
-    return {name: kit.as_cell(question.misconceptions[number].answer, name) for name, question in questions}
+def misconceived() -> dict[str, str]:
+    """Each question answered with the first of its misconceptions."""
+    return {name: kit.as_cell(question.misconceptions[0].answer, name) for name, question in of_topic(TOPIC).items()}
 
 
 @pytest.fixture
@@ -47,7 +46,7 @@ def course(tmp_path):
     right = kit.right_answers(TOPIC)
     kit.write_lab(tmp_path, TOPIC)
     kit.submit(tmp_path, "ada", TOPIC, right)
-    kit.submit(tmp_path, "ben", TOPIC, misconceived(0))
+    kit.submit(tmp_path, "ben", TOPIC, misconceived())
     kit.submit(tmp_path, "eve", TOPIC, right | {"iou": "import os\ndef iou(n):\n    os._exit(1)\n"})
     return tmp_path
 
@@ -169,7 +168,7 @@ def test_what_appears_or_changes_while_a_run_grades_waits_for_the_next(course, m
     graded = grade(course)
     assert [record.student for record in graded.records] == ["ada", "ben", "eve"] and graded.records[1].points == 0.0
     shown = (course / "autograded" / "ben" / TOPIC / f"{TOPIC}.ipynb").read_text()
-    assert json.dumps(misconceived(0)["iou"].splitlines()[-1])[1:-1] in shown
+    assert json.dumps(misconceived()["iou"].splitlines()[-1])[1:-1] in shown
     monkeypatch.undo()
     again = grade(course)
     assert again.graded_now == 2 and [record.points for record in again.records] == [TOTAL, TOTAL, TOTAL, BUT_IOU]

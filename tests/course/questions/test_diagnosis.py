@@ -2,7 +2,6 @@
 
 import warnings
 
-import jaxtyping
 import numpy as np
 import pytest
 from measure_diagnosis import Named, measure
@@ -16,11 +15,7 @@ from labkit.course.questions.question import Question, find
 from labkit.course.questions.relations import View
 from labkit.course.questions.run import Printed, call, judge, run
 
-
-@pytest.fixture(autouse=True)
-def as_outside_the_suite(shape_checks_off_for_bad_input):
-    """Without the shape checks."""
-    jaxtyping.config.update("jaxtyping_disable", True)
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 
 
 def table(a, k):

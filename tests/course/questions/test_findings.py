@@ -3,18 +3,13 @@
 ACCEPTED were right by mistake once; NAMED got a count of wrong values and nothing else. `says` is part of the hint.
 """
 
-import jaxtyping
 import numpy as np
 import pytest
 
 from labkit.course.questions.question import find
 from labkit.course.questions.run import judge
 
-
-@pytest.fixture(autouse=True)
-def as_outside_the_suite(shape_checks_off_for_bad_input):
-    """Without the shape checks."""
-    jaxtyping.config.update("jaxtyping_disable", True)
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 
 
 def mask_of_16_bits(segmentation, class_of_body):

@@ -3,7 +3,6 @@
 import contextlib
 import inspect
 
-import jaxtyping
 import numpy as np
 import pytest
 
@@ -13,11 +12,7 @@ from labkit.course.questions.question import TOPICS, Question, of_topic, way
 from labkit.course.questions.run import run
 from labkit.course.questions.steps import MOST_STEPS, changed_steps, traced
 
-
-@pytest.fixture(autouse=True)
-def as_outside_the_suite(shape_checks_off_for_bad_input):
-    """Without the shape checks."""
-    jaxtyping.config.update("jaxtyping_disable", True)
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 
 
 def shares(a, k, limit):

@@ -3,11 +3,10 @@
 import cv2
 import numpy as np
 import pytest
+from references import assert_reference_is
 
 from labkit import metrics
 from labkit.course.questions.question import of_topic
-
-QUESTIONS = of_topic("04_iou")
 
 
 def merge_classes(n, group):
@@ -33,9 +32,6 @@ KIT = {
 }
 
 
-@pytest.mark.parametrize("name", QUESTIONS)
-@pytest.mark.parametrize("seed", range(3))
-def test_a_reference_gives_what_the_kit_gives(name, seed):
-    question = QUESTIONS[name]
-    for arguments in (*question.by_hand, question.inputs(np.random.default_rng(seed))):
-        np.testing.assert_allclose(question.reference(*arguments), KIT[name](*arguments))
+@pytest.mark.parametrize("name", of_topic("04_iou"))
+def test_a_reference_gives_what_the_kit_gives(name):
+    assert_reference_is(f"04_iou.{name}", KIT[name])

@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 import torch
+from references import drawn
 
 from labkit import losses
 from labkit.course.questions.question import of_topic
 
 QUESTIONS = of_topic("05_class_weights")
 SEEDS = pytest.mark.parametrize("seed", range(5))
-
-
-def drawn(name, seed):
-    """The reference of a question, and arguments."""
-    return QUESTIONS[name].reference, QUESTIONS[name].inputs(np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("scheme, power", [("none", 0.0), ("sqrt", 0.5), ("inverse", 1.0)])
@@ -26,7 +22,7 @@ def test_weights_are_the_kits(scheme, power):
 
 @SEEDS
 def test_both_means_are_those_of_torch(seed):
-    two_means, (z, y, w) = drawn("two_means", seed)
+    two_means, (z, y, w) = drawn("05_class_weights.two_means", seed)
     logits, labels = torch.from_numpy(z).permute(2, 0, 1)[None], torch.from_numpy(y).long()[None]
     by_weights = torch.nn.functional.cross_entropy(logits, labels, torch.from_numpy(w), ignore_index=255).item()
     by_pixels = losses.cross_entropy(z, y, w) / np.count_nonzero(y != 255)
@@ -42,7 +38,7 @@ def test_a_promise_that_falls_on_a_pixel_is_kept_by_that_pixel():
 @SEEDS
 def test_no_other_decision_costs_less_on_the_average(seed):
     """A hundred thousand pixels of each kind: what each decision would have cost."""
-    least_cost, (p, cost) = drawn("least_cost", seed)
+    least_cost, (p, cost) = drawn("05_class_weights.least_cost", seed)
     rng = np.random.default_rng(seed)
     for often, said in zip(p[0], least_cost(p, cost)[0], strict=True):
         paid = cost[rng.choice(len(cost), 100_000, p=often)].mean(axis=0)
@@ -51,7 +47,7 @@ def test_no_other_decision_costs_less_on_the_average(seed):
 
 @SEEDS
 def test_the_weight_reaches_the_recall_and_a_smaller_one_does_not(seed):
-    weight_for_recall, (p1, y, recall) = drawn("weight_for_recall", seed)
+    weight_for_recall, (p1, y, recall) = drawn("05_class_weights.weight_for_recall", seed)
     w = weight_for_recall(p1, y, recall)
     reached = [np.mean(v * p1[y] >= 1.0 - p1[y]) for v in (w * 1.000001, w * 0.999999)]
     assert reached[0] >= recall > reached[1]
@@ -59,7 +55,7 @@ def test_the_weight_reaches_the_recall_and_a_smaller_one_does_not(seed):
 
 @SEEDS
 def test_the_adjusted_gradient_is_autograds(seed):
-    adjusted_grad, (z, y, shares, tau) = drawn("adjusted_grad", seed)
+    adjusted_grad, (z, y, shares, tau) = drawn("05_class_weights.adjusted_grad", seed)
     t = torch.from_numpy(z).requires_grad_()
     a = (t + tau * torch.from_numpy(shares).log()).permute(2, 0, 1)[None]
     labels = torch.from_numpy(y).long()[None]

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from references import drawn
 from scipy.optimize import minimize
 
 from labkit import geometry
@@ -12,20 +13,15 @@ QUESTIONS = of_topic("06_back_projection")
 SEEDS = pytest.mark.parametrize("seed", range(5))
 
 
-def drawn(name, seed):
-    """The reference of a question, and arguments."""
-    return QUESTIONS[name].reference, QUESTIONS[name].inputs(np.random.default_rng(seed))
-
-
 @SEEDS
 def test_points_are_the_kits(seed):
-    back_project, (depth, K) = drawn("back_project", seed)
+    back_project, (depth, K) = drawn("06_back_projection.back_project", seed)
     np.testing.assert_allclose(back_project(depth, K), geometry.back_project(depth, K), rtol=1e-5)
 
 
 @SEEDS
 def test_the_lens_is_taken_back_as_opencv_does_it(seed):
-    undistort, (pixels, K, k) = drawn("undistort", seed)
+    undistort, (pixels, K, k) = drawn("06_back_projection.undistort", seed)
     stop = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
     expected = cv2.undistortPoints(pixels[:, None], K, np.array([*k, 0.0, 0.0]), P=K, criteria=stop)[:, 0]
     np.testing.assert_allclose(undistort(pixels, K, k), expected, atol=1e-6)
@@ -47,7 +43,7 @@ def test_a_crop_is_resized_as_opencv_does_it(scale):
 
 @SEEDS
 def test_no_plane_fits_better(seed):
-    fit_plane, (P, sigma) = drawn("fit_plane", seed)
+    fit_plane, (P, sigma) = drawn("06_back_projection.fit_plane", seed)
     n, d = fit_plane(P, sigma)
 
     def misfit(x):
@@ -59,7 +55,7 @@ def test_no_plane_fits_better(seed):
 
 @SEEDS
 def test_the_height_noise_is_the_kits(seed):
-    height_noise, (u, v, d, K, T_base_cam, sigma_pixel, sigma_depth) = drawn("height_noise", seed)
+    height_noise, (u, v, d, K, T_base_cam, sigma_pixel, sigma_depth) = drawn("06_back_projection.height_noise", seed)
     R = T_base_cam[:3, :3]
     Sigma = R @ geometry.back_projection_noise(u, v, d, K, sigma_pixel, sigma_depth) @ R.T
     assert height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth) == pytest.approx(np.sqrt(Sigma[2, 2]))
