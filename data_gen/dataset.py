@@ -14,7 +14,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, wait
+from concurrent.futures import Executor
 from pathlib import Path
 
 import cv2
@@ -28,6 +28,7 @@ from labkit.geometry.sensor import DepthSensor
 from labkit.labels import CLASSES
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
+from labkit.support.executors import as_they_come
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
 
@@ -77,7 +78,7 @@ def generate(
     bar = tqdm(total=len(seeds), initial=len(seeds) - len(missing), unit="scene", disable=not progress)
     jobs = ((str(out), i, seeds[i], config, tuple(size), sensor) for i in missing)
     with bar:
-        for _ in _run(write_frame, jobs, executor):
+        for _ in as_they_come(write_frame, jobs, executor):
             bar.update()
     _finish(out, request, [json.loads((unfinished / f"{i:06d}.json").read_bytes()) for i in range(len(seeds))])
     return Dataset(out)
@@ -105,27 +106,6 @@ def _check_same(out: Path, request: dict, found: dict) -> None:
         raise ValueError(
             f"out: {out} holds a dataset with other {', '.join(differs)}; choose another folder, or remove that one"
         )
-
-
-def _run(function, jobs, executor: Executor | None):
-    """Yield the results of function(*job) as they come, with few jobs waiting, so that memory stays flat."""
-    if executor is None:
-        for job in jobs:
-            yield function(*job)
-        return
-    pending = set()
-    try:
-        for job in jobs:
-            pending.add(executor.submit(function, *job))
-            if len(pending) >= 64:
-                done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                yield from (future.result() for future in done)
-        while pending:
-            done, pending = wait(pending, return_when=FIRST_COMPLETED)
-            yield from (future.result() for future in done)
-    finally:
-        for future in pending:
-            future.cancel()
 
 
 def write_frame(out: str, index: int, seed: int, config: str, size, sensor: DepthSensor | None) -> None:

@@ -17,7 +17,6 @@ from labkit.support.validation import require
 DROP_HEIGHT = 0.002  # objects start this far above the table
 TARGET_AREA = ((0.40, 0.62), (-0.20, 0.20))  # x and y of target centres: well within the arm's reach
 OBSTACLE_AREA = ((0.34, 0.72), (-0.36, 0.36))
-ASPECT = 4.0 / 3.0
 
 
 @dataclass(frozen=True)

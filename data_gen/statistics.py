@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool
-from tqdm.auto import tqdm
 
 from data_gen.families import BOXES
 from data_gen.scenes import sample_scene
@@ -33,10 +32,10 @@ class Statistics:
     target_pixels: float
 
 
-def statistics(seeds: Iterable[int], config: str, size=(320, 240), progress: bool = False) -> Statistics:
+def statistics(seeds: Iterable[int], config: str, size=(320, 240)) -> Statistics:
     """Build and render the scenes of `seeds` and count."""
     families, obstacles, hidden, distances, pixels = Counter(), [], [], [], []
-    for seed in tqdm(list(seeds), unit="scene", disable=not progress):
+    for seed in seeds:
         spec = sample_scene(seed, config)
         targets = [thing for thing in spec.objects if thing.class_id == TARGET]
         families.update(thing.family for thing in targets)

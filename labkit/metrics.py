@@ -207,17 +207,6 @@ def reliability_counts(
     return np.column_stack([np.bincount(place, weights, minlength=bins) for weights in columns]).astype(np.float64)
 
 
-def calibration_error(counts: Num[np.ndarray, "B 3"]) -> float:
-    """Expected calibration error: how far probabilities are from frequencies, on average over what was counted.
-
-    counts: of `reliability_counts`; NaN if nothing was counted.
-
-    >>> round(calibration_error(np.array([[10, 2.0, 4], [10, 9.0, 9]])), 3)
-    0.1
-    """
-    return float(_ratio(np.abs(counts[:, 1] - counts[:, 2]).sum(), counts[:, 0].sum()))
-
-
 def _ratio(part, whole):
     """Divide in float64; 0 / 0 is NaN without a warning."""
     with np.errstate(invalid="ignore"):

@@ -304,7 +304,9 @@ def node(
     if on_ros:
         command.run_on_ros(settings, 1 if ros1 else 2, extra or [], render(spec, (320, 240)) if sim else None)
     elif sim:
-        typer.echo(command.rehearse(settings, spec))
+        from labkit.node.rehearsal import camera_to_lift
+
+        typer.echo(camera_to_lift(spec, settings.pipeline(spec.table.z)))
     else:
         line, answered = command.answer_bag(settings, bag, out, probabilities, storage)
         typer.echo(line)

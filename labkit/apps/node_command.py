@@ -11,7 +11,6 @@ from labkit.node.actors import Camera
 from labkit.node.bags import process
 from labkit.node.convert import rigid
 from labkit.node.messages import DEFAULT_TOPICS, ROS_TOPICS, Topics
-from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.pipeline import Pipeline
 from labkit.support.validation import require
@@ -91,11 +90,6 @@ def numbers_of(text: str) -> list[float]:
         return [float(word) for word in re.split(r"[\s,;]+", text.strip(" \t\r\n[]"))]
     except ValueError:
         return []
-
-
-def rehearse(settings: Settings, spec) -> str:
-    """Camera, node and arm on a simulated scene; a line."""
-    return camera_to_lift(spec, settings.pipeline(spec.table.z))
 
 
 def run_on_ros(settings: Settings, version: int = 2, arguments=(), frame: RGBDFrame | None = None) -> Counts | None:

@@ -182,9 +182,7 @@ class Seen:
     plane: Plane | None = None
 
 
-def perceive(
-    frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z: float = 0.0, gripper: Gripper | None = None
-) -> Seen:
+def perceive(frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z: float = 0.0) -> Seen:
     """Run the chain on a frame that is given in the camera's own frame.
 
     model: a network, or None with `labels`, somebody else's. T_base_cam: the camera's pose; without it the largest
@@ -196,7 +194,7 @@ def perceive(
         frame, plane = on_table(frame)
     else:
         frame = replace(frame, T_base_cam=T_base_cam, table_z=table_z)
-    pipeline = Pipeline(model, workspace=WORKSPACE, gripper=gripper)
+    pipeline = Pipeline(model, workspace=WORKSPACE)
     return Seen(frame, pipeline.run(frame) if labels is None else pipeline.locate(frame, labels), plane)
 
 
@@ -252,7 +250,7 @@ def grasps_json(seen: Seen) -> dict:
     }
 
 
-def view(seen: Seen, gripper: Gripper | None = None) -> View:
+def view(seen: Seen) -> View:
     """Cloud, targets and jaws in 3-D."""
     p, table_z = seen.perception, seen.frame.table_z or 0.0
     P, rgb = p.points.reshape(-1, 3), seen.frame.rgb.reshape(-1, 3)
@@ -266,7 +264,7 @@ def view(seen: Seen, gripper: Gripper | None = None) -> View:
     for number, cloud in enumerate(p.clouds, start=1):
         some = cloud[:: max(1, len(cloud) // 3000)]
         shown.points(some, f"target {number}", to_hex(PALETTE[TARGET] / 255), 2.5)
-    hand = gripper or Gripper()
+    hand = Gripper()
     shown.jaws(p.plan.grasps[:1], hand, "best grasp").jaws(p.plan.grasps[1:SHOWN], hand, "other grasps", "#bbbbbb")
     return shown.frame(np.eye(4), "base", 0.1)
 
@@ -282,7 +280,7 @@ def picture(rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]) -
 # -------------------------------------------------------------------------------------------------- what goes out
 
 
-def save(seen: Seen, out, gripper: Gripper | None = None) -> list[Path]:
+def save(seen: Seen, out) -> list[Path]:
     """Write overlay.png, target_N.ply, grasps.json and report.html into the folder `out`; returns their paths."""
     out = Path(out)
     painted = picture(seen.frame.rgb, seen.perception.labels)
@@ -290,7 +288,7 @@ def save(seen: Seen, out, gripper: Gripper | None = None) -> list[Path]:
     for number, (cloud, pixels) in enumerate(zip(seen.perception.clouds, seen.perception.pixels, strict=True), start=1):
         colours = seen.frame.rgb.reshape(-1, 3)[pixels]
         files[f"target_{number}.ply"] = trimesh.PointCloud(cloud, colours).export(file_type="ply")
-    files["report.html"] = report(seen, gripper).encode()
+    files["report.html"] = report(seen).encode()
     for stale in out.glob("target_*.ply"):  # of an earlier picture with more targets
         if stale.name not in files:
             stale.unlink()
@@ -299,7 +297,7 @@ def save(seen: Seen, out, gripper: Gripper | None = None) -> list[Path]:
     return [out / name for name in files]
 
 
-def report(seen: Seen, gripper: Gripper | None = None) -> str:
+def report(seen: Seen) -> str:
     """One HTML page that needs no network: the pictures, what was found, the grasps, and a view to turn."""
     depth = seen.frame.depth
     known = np.isfinite(depth) & (depth > 0.0)
@@ -331,7 +329,7 @@ def report(seen: Seen, gripper: Gripper | None = None) -> str:
         figures=figures,
         words=html.escape(describe(seen)),
         table=table if rows else "",
-        view=view(seen, gripper).html(script=True),
+        view=view(seen).html(script=True),
     )
 
 

@@ -8,7 +8,7 @@ softmax of what the pixel costs on average; sweeping over the pixels lowers F wi
 import numpy as np
 from jaxtyping import Float
 
-from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.energy_kernels import mean_field_sweep
 from labkit.support.validation import require
 
@@ -41,17 +41,3 @@ def mean_field_marginals(
     for T in np.geomspace(first, last, iterations):
         mean_field_sweep(crf.unary, crf.weights, offsets, T, q)
     return q
-
-
-def free_energy(crf: PottsCRF, q: Float[np.ndarray, "H W C"]) -> float:
-    """Return F(q) = <E>_q - entropy(q), which is at least -log Z, and equal to it only if q is the CRF itself.
-
-    Raises ValueError unless q has the model's shape.
-    """
-    require("q", q.shape == crf.shape, f"shape {crf.shape}", q.shape)
-    used = q > 0.0  # 0 log 0 = 0, and a class without probability costs nothing
-    F = (q[used] * (crf.unary[used] + np.log(q[used]))).sum()
-    for w, offset in zip(crf.weights, crf.offsets, strict=True):
-        a, b = pair_slices(offset)
-        F += (w[a] * (1.0 - (q[a] * q[b]).sum(axis=2))).sum()
-    return float(F)

@@ -108,11 +108,6 @@ class Panda:
         """Joint angles within the limits for a grasp frame, near q0 (default: where the arm is), or None."""
         return inverse_kinematics(T_base_grasp, self.q if q0 is None else q0)
 
-    def reachable(self, T_base_grasp: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether the arm can bring the grasp frame there, with the jaws either way round."""
-        turned = check_T("T_base_grasp", T_base_grasp) @ np.diag([-1.0, -1.0, 1.0, 1.0])
-        return any(self.inverse_kinematics(T) is not None for T in (T_base_grasp, turned))
-
     def plan(self, grasp: Any, scene: Float[np.ndarray, "M 3"] | None = None) -> MotionPlan | str:
         """Plan a motion from here to a grasp and up; the reason in words if there is none.
 

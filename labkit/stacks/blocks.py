@@ -1,12 +1,8 @@
-"""A block diagram as Simulink has it: blocks and named signals between them; it runs and draws itself (topic 09)."""
+"""A block diagram as Simulink has it: blocks and named signals between them (topic 09)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
-
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import FancyBboxPatch
 
 from labkit.support.validation import require
 
@@ -65,89 +61,6 @@ class Diagram:
             require(block.name, len(results) == len(block.outputs), f"{len(block.outputs)} outputs", len(results))
             signals.update(zip(block.outputs, results, strict=True))
         return signals
-
-    def columns(self) -> dict[Block, int]:
-        """The column that each block is drawn in: 1 more than those that it waits for; column 0 is the outside."""
-        column: dict[Block, int] = {}
-        for block in self.blocks:
-            column[block] = 1 + max((self._column(column, signal) for signal in block.inputs), default=0)
-        return column
-
-    def _column(self, column: Mapping[Block, int], signal: str) -> int:
-        """The column that a signal comes from."""
-        giver = self.givers[signal]
-        return 0 if giver is None else column[giver]
-
-    def places(self) -> dict[tuple[Block | str, int], tuple[float, float]]:
-        """Where to draw: (block, column) -> (x, y), and (signal, column) where a wire passes through a column.
-
-        In each column the things stand in the order of where their signals come from, so that few wires cross.
-        """
-        column = self.columns()
-        last = dict.fromkeys(self.inputs, 0)
-        for block in self.blocks:
-            last.update({signal: max(last.get(signal, 0), column[block]) for signal in block.inputs})
-        places = {(signal, 0): (0.0, self._height(n, len(self.inputs))) for n, signal in enumerate(self.inputs)}
-        for c in range(1, 1 + max(column.values(), default=0)):
-            passing = [signal for signal in last if self._column(column, signal) < c < last[signal]]
-            things = [block for block in self.blocks if column[block] == c] + passing
-
-            def from_above(thing, c=c):
-                signals = thing.inputs if isinstance(thing, Block) else (thing,)
-                return -np.mean([self._source(places, signal, c)[1] for signal in signals] or [0.0])
-
-            for n, thing in enumerate(sorted(things, key=from_above)):
-                places[thing, c] = (2.0 * c, self._height(n, len(things)))
-        return places
-
-    @staticmethod
-    def _height(n: int, count: int) -> float:
-        return 0.9 * ((count - 1) / 2.0 - n)
-
-    def _source(self, places: Mapping, signal: str, c: int) -> tuple[float, float]:
-        """Where a wire comes from that reaches column c: the column before, or its giver's port there."""
-        if (signal, c - 1) in places:
-            return places[signal, c - 1]
-        giver = self.givers[signal]
-        x, y = places[giver, c - 1]
-        port = (len(giver.outputs) - 1) / 2.0 - giver.outputs.index(signal)
-        return x + 0.6, y + 0.28 * port
-
-    def draw(self, axes: Axes) -> None:
-        """Draw the boxes, the wires, and signals' names where they leave their givers; the outside is at the left."""
-        places = self.places()
-        for (thing, c), (x, y) in places.items():
-            if isinstance(thing, Block):
-                shape = {"boxstyle": "round,pad=0.04", "fc": "#e8eef7", "ec": "#33506f"}
-                axes.add_patch(FancyBboxPatch((x - 0.56, y - 0.26), 1.12, 0.52, zorder=3, **shape))
-                axes.text(x, y, thing.name.replace(" ", "\n"), ha="center", va="center", fontsize=9, zorder=4)
-                self._draw_wires(axes, places, thing, c)
-            elif c == 0:
-                axes.text(x - 0.05, y, thing, ha="right", va="center", style="italic")
-        heights = [y for _, y in places.values()]
-        axes.set(xlim=(-1.2, 2.0 * max(c for _, c in places) + 0.7), ylim=(min(heights) - 0.5, max(heights) + 0.5))
-        axes.axis("off")
-
-    def _draw_wires(self, axes: Axes, places: Mapping, block: Block, c: int) -> None:
-        """Draw what leads to a block, uppermost wire to its uppermost port."""
-        x1, y1 = places[block, c]
-        arriving = sorted(block.inputs, key=lambda signal: -self._source(places, signal, c)[1])
-        for port, signal in enumerate(arriving):
-            points, at = [(x1 - 0.62, y1 + 0.2 * ((len(arriving) - 1) / 2.0 - port))], c
-            while True:
-                points.append(self._source(places, signal, at))
-                at -= 1
-                if at == 0 or (signal, at) not in places:
-                    break
-            end, bend = points[:2]
-            style = {"arrowstyle": "-|>", "color": "0.35", "shrinkA": 0, "shrinkB": 0}
-            axes.annotate("", end, bend, arrowprops=style)
-            axes.plot(*zip(*points[1:], strict=True), color="0.35", lw=1.0)
-            named = {text.get_text() for text in axes.texts}
-            if self.givers[signal] is not None and signal not in named:
-                x, y = points[-1]
-                white = {"fc": "white", "ec": "none", "pad": 0.6}
-                axes.text(x + 0.08, y + 0.03, signal, va="bottom", fontsize=8, bbox=white, zorder=5)
 
 
 def perception_diagram(pipeline, segment: Callable, manipulate: Callable) -> Diagram:

@@ -3,11 +3,12 @@
 import multiprocessing
 import os
 import sys
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, as_completed, wait
 from contextlib import contextmanager
 from hashlib import sha256
 from importlib.metadata import version
+from itertools import starmap
 from pathlib import Path
 
 import labkit
@@ -38,6 +39,33 @@ def executor_for(workers: int = 1, dask: str | None = None) -> Iterator[Executor
         spawn = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, spawn, initializer=one_thread, max_tasks_per_child=400) as executor:
             yield executor
+
+
+def as_they_come(
+    function: Callable, jobs: Iterable[tuple], executor: Executor | None = None, most: int = 64
+) -> Iterator:
+    """Yield the results of function(*job) as they come, with at most so many jobs waiting, so that memory stays flat.
+
+    executor: None for this process.
+
+    >>> list(as_they_come(pow, [(2, 3), (3, 2)]))
+    [8, 9]
+    """
+    if executor is None:
+        yield from starmap(function, jobs)
+        return
+    pending = set()
+    try:
+        for job in jobs:
+            pending.add(executor.submit(function, *job))
+            if len(pending) >= most:
+                done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        for future in as_completed(pending):
+            yield future.result()
+    finally:
+        for future in pending:
+            future.cancel()
 
 
 def one_thread() -> None:

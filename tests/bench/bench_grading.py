@@ -96,7 +96,7 @@ def classes(folder: Path) -> str:
     for topic in TOPICS:
         course = folder / topic
         kit.write_lab(course, topic)
-        lab, _ = reading.read_lab(course, topic)
+        lab = reading.read_lab(course, topic)
         students = list(kit.synthetic_class(topic).values())
         seconds, wrong, torch = [], 0, 0
         for i in range(CLASS):
@@ -117,7 +117,7 @@ def many(course: Path) -> str:
     """The memory of the grader over 1,000 submissions of lab 04."""
     new_course(course)
     shutil.rmtree(course / "submitted" / "ben")
-    lab, _ = reading.read_lab(course, TOPIC)
+    lab = reading.read_lab(course, TOPIC)
     place = course / "submitted/ada"
     sandbox.probe(("numpy",), sandbox.Limits())
     sizes, seconds = {}, []

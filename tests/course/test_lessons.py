@@ -10,37 +10,16 @@ from functools import cache
 from itertools import chain
 from pathlib import Path
 
-import nbformat
 import pytest
+from notebooks import LESSONS, ROOT, SOLUTIONS, code, notebook, prose
 
-from labkit.course.questions.question import TOPICS
-
-ROOT = Path(__file__).parents[2]
-LESSONS = sorted(ROOT.glob("lessons/*.ipynb"))
-SOLUTIONS = sorted(ROOT.glob("solutions/*/*.ipynb"))
 MOST_MINUTES, MOST_LAB_MINUTES, WORDS_PER_MINUTE, NEW = 50, 105, 200, 0.6
-
-
-@cache
-def notebook(path: Path):
-    """Read a notebook once."""
-    return nbformat.read(path, as_version=4)
-
-
-def topic_of(path: Path) -> str:
-    """The number of a notebook's topic."""
-    return path.stem[:2]
 
 
 def holds(paths: list[Path], complaint) -> None:
     """Fail with what a rule has against each notebook; complaint: function of a path to words, empty if it holds."""
     wrong = [f"{path.relative_to(ROOT)}: {said}" for path in paths if (said := complaint(path))]
     assert not wrong, "\n".join(wrong)
-
-
-def prose(path: Path) -> str:
-    """All Markdown of a notebook."""
-    return "\n\n".join(cell.source for cell in notebook(path).cells if cell.cell_type == "markdown")
 
 
 def section(path: Path, title: str) -> str:
@@ -61,8 +40,7 @@ def minutes(path: Path) -> float:
     text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$|```.*?```", " formula ", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->|<[^<>\n]+>|\]\([^)]*\)", " ", text, flags=re.DOTALL)
     words = re.findall(r"[^\W_]+(?:['.,-][^\W_]+)*", text)
-    cells = [cell for cell in notebook(path).cells if cell.cell_type == "code" and cell.source.strip()]
-    return len(words) / WORDS_PER_MINUTE + len(cells)
+    return len(words) / WORDS_PER_MINUTE + len(code(path))
 
 
 def test_a_lesson_is_read_in_fifty_minutes_and_says_so():
@@ -346,7 +324,3 @@ def test_notebooks_and_pages_use_none_of_the_refused_words():
 )
 def test_a_refused_word_is_found(wrong):
     assert refused(wrong) and not refused("ten frames per second, a class of its own, whoever wants more; see `etc.`")
-
-
-def test_every_topic_has_a_lesson_and_a_solution():
-    assert {topic_of(path) for path in LESSONS} == {topic_of(path) for path in SOLUTIONS} == {t[:2] for t in TOPICS}

@@ -11,21 +11,17 @@ import re
 import shlex
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import nbformat
 import pytest
+from notebooks import LABS, LESSONS, ROOT, SOLUTIONS, code, notebook, prose
 
 from labkit.course.checking import describe
 from labkit.course.questions.question import TOPICS, of_topic
 from labkit.course.questions.run import Printed, judge
 from labkit.course.release import mistakes, release
 
-ROOT = Path(__file__).parents[2]
-LESSONS = [path for topic in TOPICS for path in sorted(ROOT.glob(f"lessons/{topic}*.ipynb"))]  # some topics have two
-SOLUTIONS = [ROOT / "solutions" / topic / f"{topic}.ipynb" for topic in TOPICS]
-LABS = [ROOT / "labs" / topic / f"{topic}.ipynb" for topic in TOPICS]
 MAX_LINES, MAX_PNG = 25, 150_000
 # Names that are undefined or unused, statements that do nothing or not what they seem, old NumPy, errors of syntax.
 RULES = "E4,E7,E9,F,W,B,PLE,NPY,UP"
@@ -34,22 +30,6 @@ RULES = "E4,E7,E9,F,W,B,PLE,NPY,UP"
 def each(paths):
     """Run a test once a notebook, named by its folder and topic."""
     return pytest.mark.parametrize("path", paths, ids=[f"{p.relative_to(ROOT).parts[0]}-{p.stem}" for p in paths])
-
-
-@cache
-def notebook(path: Path):
-    """Read a notebook once."""
-    return nbformat.read(path, as_version=4)
-
-
-def code(path: Path) -> list:
-    """The code cells that have something in them."""
-    return [cell for cell in notebook(path).cells if cell.cell_type == "code" and cell.source.strip()]
-
-
-def prose(path: Path) -> str:
-    """All Markdown of a notebook."""
-    return "\n\n".join(cell.source for cell in notebook(path).cells if cell.cell_type == "markdown")
 
 
 def tags(cell) -> set[str]:
@@ -324,18 +304,10 @@ def test_make_test_compares_lessons_and_solutions_and_runs_labs():
 
 def nbval(path: Path) -> subprocess.CompletedProcess:
     """Run nbval on a notebook as `make test` does on lessons."""
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:xdist",
-        *nbval_options("lessons"),
-    ]
-    return subprocess.run([*command, path.name], cwd=path.parent, capture_output=True, text=True)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
+    return subprocess.run(
+        [*command, *nbval_options("lessons"), path.name], cwd=path.parent, capture_output=True, text=True
+    )
 
 
 def test_nbval_fails_when_a_compared_output_changes(tmp_path):

@@ -178,15 +178,6 @@ def test_dense_clouds_agree_with_brute_force_too():
     assert [len(points) for points in cluster(far, 0.01, 1)] == [*sizes, 1]
 
 
-def test_reach_is_the_same_along_a_diagonal_as_along_an_axis():
-    for direction in ([1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0]):
-        for distance, together in ((0.0149, True), (0.0151, False)):
-            step = distance * np.array(direction) / np.linalg.norm(direction)
-            pair = np.array([0.3 * step, 1.3 * step])
-            assert len(cluster(pair, gap=0.015, min_points=1)) == (1 if together else 2)
-            assert len(remove_outliers(pair, radius=0.015, min_neighbours=1)) == (2 if together else 0)
-
-
 def test_flying_pixels_between_an_object_and_the_wall_are_removed_and_the_object_stays():
     rows, columns = np.mgrid[:25, :25] * 0.003
     surface = np.column_stack([columns.ravel(), rows.ravel(), np.full(625, 0.8)])

@@ -8,8 +8,8 @@ The secret belongs to a round of grading: late work is graded with the same one 
 import hashlib
 import json
 import secrets
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -21,6 +21,7 @@ from labkit.course.grading import sandbox
 from labkit.course.grading.grade import Result, grade_submission
 from labkit.course.grading.reading import Lab, Submission
 from labkit.course.grading.sandbox import Limits
+from labkit.support.executors import as_they_come
 from labkit.support.files import write_atomically
 
 SECRET_FILE = "secret_seed"
@@ -82,7 +83,8 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
     waiting = [submission for submission in batch.submissions if submission.student not in records]
     bar = tqdm(total=total, initial=len(records), desc=batch.lab.topic, unit="student", disable=not progress)
     with bar, closing(sandbox.servers), ThreadPoolExecutor(batch.workers) as executor:
-        for submission, results in graded(executor, batch, waiting):
+        jobs = ((batch, submission) for submission in waiting)
+        for submission, results in as_they_come(graded, jobs, executor, 2 * batch.workers):
             student = submission.student
             records[student] = Record(student, submission.reason, results, not batch.unsafe, keys[student])
             write_record(batch.out, records[student])
@@ -90,29 +92,12 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
     return [records[submission.student] for submission in batch.submissions], len(waiting)
 
 
-def graded(
-    executor: Executor, batch: Batch, waiting: Iterable[Submission]
-) -> Iterator[tuple[Submission, tuple[Result, ...]]]:
-    """Grade submissions, a few at a time; gives each with its results, as they are ready."""
-    pending: dict[Future, Submission] = {}
-    queue = iter(waiting)
-    try:
-        while True:
-            for submission in queue:
-                if submission.reason:
-                    yield submission, ()
-                    continue
-                task = (batch.lab, submission, batch.secret, batch.limits, batch.unsafe)
-                pending[executor.submit(grade_submission, *task)] = submission
-                if len(pending) >= 2 * batch.workers:
-                    break
-            if not pending:
-                return
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                yield pending.pop(future), tuple(future.result())
-    finally:
-        for future in pending:
-            future.cancel()
+def graded(batch: Batch, submission: Submission) -> tuple[Submission, tuple[Result, ...]]:
+    """A submission with its results; none if it cannot be read."""
+    if submission.reason:
+        return submission, ()
+    results = grade_submission(batch.lab, submission, batch.secret, batch.limits, batch.unsafe)
+    return submission, tuple(results)
 
 
 # ------------------------------------------------------------------------------------------------------ records

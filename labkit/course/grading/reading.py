@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from labkit.course.questions.program import Cell, cells_of
-from labkit.course.questions.question import Question, of_topic
+from labkit.course.questions.question import of_topic
 
 MOST_BYTES = 20 << 20
 MOST_VALUES = 1_000_000  # of JSON: a second of parsing and 100 MB of memory
@@ -64,8 +64,8 @@ class Unreadable(Exception):
     """A submission that cannot be read; the text says why, for the instructor's table."""
 
 
-def read_lab(course: Path, topic: str) -> tuple[Lab, dict[str, Question]]:
-    """Read course/labs/TOPIC/TOPIC.ipynb and the questions that belong to it, in the lab's order.
+def read_lab(course: Path, topic: str) -> Lab:
+    """Read course/labs/TOPIC/TOPIC.ipynb.
 
     Raises ValueError if it is not a released lab of that topic.
     """
@@ -86,8 +86,7 @@ def read_lab(course: Path, topic: str) -> tuple[Lab, dict[str, Question]]:
     points = {name: float(marks[f"check_{name}"]["points"]) for name in answers}
     written = tuple(name for name, mark in marks.items() if mark.get("grade") and mark.get("solution"))
     digest = hashlib.sha256(data).hexdigest()
-    lab = Lab(topic, answers, points, written, released_by(notebook)[1], notebook, digest)
-    return lab, {name: questions[name] for name in answers}
+    return Lab(topic, answers, points, written, released_by(notebook)[1], notebook, digest)
 
 
 def released_by(notebook: dict) -> tuple[str, dict[str, str]]:

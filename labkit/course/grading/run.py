@@ -53,7 +53,7 @@ def grade_course(
     no sandbox can be made.
     """
     course = Path(course)
-    lab, _ = read_lab(course, topic)
+    lab = read_lab(course, topic)
     read = read_submissions(course / "submitted" if submissions is None else Path(submissions), lab)
     out = course / "grades" / topic if out is None else Path(out)
     with private():

@@ -16,7 +16,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import metadata
@@ -69,7 +69,7 @@ def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
             "uids": UIDS_OF_ONE,
             "path": site_folders() if unsafe else [PACKAGES],
             "load": list(packages),
-            "only": list(allowed_roots(packages)) if unsafe else None,
+            "only": [name.partition(".")[0] for name in package_files(tuple(packages))] if unsafe else None,
             "memory": (limits.torch_memory_mb if "torch" in packages else limits.memory_mb) << 20,
             "file_size": limits.file_mb << 20,
             "threads": None if unsafe else limits.threads,
@@ -312,8 +312,3 @@ def top_levels(distribution: str) -> dict[str, Path]:
     tops = {file.parts[0] for file in files} - {"..", "__pycache__"}
     locate = metadata.distribution(distribution).locate_file
     return {top: Path(str(locate(top))) for top in tops if not top.endswith((".dist-info", ".pth"))}
-
-
-def allowed_roots(packages: Iterable[str]) -> set[str]:
-    """Names that can be imported beside the standard library's."""
-    return {name.partition(".")[0] for name in package_files(tuple(packages))}

@@ -1,16 +1,14 @@
 """Each reference of topic 02 gives what the kit gives; where the kit has no such function, its solvers judge."""
 
 import re
-from pathlib import Path
 
-import nbformat
 import numpy as np
+from notebooks import ROOT, notebook
 
 from labkit.course.questions import t02_crf
 from labkit.course.questions.question import of_topic
 from labkit.crf import PottsCRF, solve, unary_from_probabilities
 
-ROOT = Path(__file__).parents[3]
 SEEDS = range(5)
 QUESTIONS = of_topic("02_crf")
 right = {name: question.reference for name, question in QUESTIONS.items()}
@@ -50,6 +48,6 @@ def test_capacities_and_a_rows_labels_solve_their_problems():
 
 def test_the_labs_open_task_leaves_something_to_win():
     """As the solution shows it: ICM, which is to be beaten, stops well above the bound."""
-    cells = nbformat.read(ROOT / "solutions/02_crf/02_crf.ipynb", as_version=4).cells
+    cells = notebook(ROOT / "solutions/02_crf/02_crf.ipynb").cells
     table = next(cell.outputs[-1].data["text/plain"] for cell in cells if 'score("ICM"' in cell.source)
     assert float(re.search(r"ICM +([\d.]+)% above", table)[1]) > 5.0
