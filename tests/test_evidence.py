@@ -41,3 +41,13 @@ def test_the_lesson_shows_the_same_certainty():
         measured = json.loads((ROOT / "docs" / "results" / f"{kind}.json").read_text())
         assert report["declining"] == [pytest.approx(row, abs=1e-4) for row in measured["declining"]]
         assert report["calibration"] == [pytest.approx(row, abs=1e-4) for row in measured["calibration"]]
+
+
+def test_notebooks_quote_the_target_iou_that_was_measured():
+    files = ("hard_unet", "hard", "test_unet")
+    without, with_depth, trained = (
+        f"{json.loads((ROOT / 'docs' / 'results' / f'{file}.json').read_text())['iou']['target']:.2f}" for file in files
+    )
+    quoted = f"IoU is {without} without depth. With it, and the CRF of topic 02, it is {with_depth};"
+    assert quoted in (ROOT / "lessons" / "03_gradient.ipynb").read_text()
+    assert f"target IoU is {trained}" in (ROOT / "labs" / "04_iou" / "04_iou.ipynb").read_text()

@@ -19,8 +19,8 @@ def geometry_channels(
     """Turn depth into the channels of CHANNELS, float32 in 0..1; a pixel without depth is 0.5 in each.
 
     depth in metres, 0 or NaN where there is no reading; table_z: height of the table plane in the base frame, metres.
-    Heights over the table (up to 0.25 m and, finer, 0.05 m above or below) and the pixel's footprint depth / f do not
-    depend on the viewpoint, so neither does a shape that is told by them. right, away and up are the surface normal's
+    Heights over the table (up to 0.25 m and, finer, 0.05 m above or below) do not depend on the viewpoint; the pixel's
+    footprint depth / f does, and tells the true size of what pixels show. right, away and up are the surface normal's
     parts along the image's right, away from the camera (both horizontal), and up. Topic 06_back_projection.
 
     >>> looking_down = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -146,8 +146,8 @@ TABLE = {
         "The list is shorter than you think in this case: how long is it, and where does the index start?"
     ),
     r"ValueError: matmul.*?size (\d+) is different from (\d+)": (
-        "In a product A @ B the columns of A ({2}) must be as many as the rows of B ({1}). Points that are rows are "
-        "multiplied from the left: P @ R.T."
+        "In a product A @ B the columns of A ({2}) must be as many as the rows of B ({1}). Is a .T "
+        "missing (of rows that are points: P @ R.T), or is there one too many?"
     ),
     r"ValueError: shapes \(([\d,]*)\) and \(([\d,]*)\) not aligned": (
         "Shapes ({1}) and ({2}) have no product: the first has other columns than the second has rows."

@@ -78,6 +78,17 @@ def grad_of_squared_error(z, y):
     return p * (error - (p * error).sum(axis=-1, keepdims=True)) * (y != 255)[..., None]
 
 
+@wrong(QUESTION, "That is the slope of -p[y]. What does the logarithm's derivative, 1 / p[y], make of it?")
+def grad_without_the_logarithm(z, y):
+    Y = one_hot(z, y)
+    return (softmax(z) * Y).sum(axis=-1, keepdims=True) * cross_entropy_grad(z, y)
+
+
+@wrong(QUESTION, "Your gradient sums to 1 over a pixel's classes: the one-hot has not been taken off.")
+def grad_without_the_one_hot(z, y):
+    return softmax(z) * (y != 255)[..., None]
+
+
 @wrong(QUESTION, "The other classes move, too: where c is not the true class the slope is p[c], not 0.")
 def grad_of_the_true_class_alone(z, y):
     return (softmax(z) - 1.0) * one_hot(z, y)

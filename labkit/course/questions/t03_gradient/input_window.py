@@ -102,6 +102,12 @@ def padding_added(kernels, strides, paddings, u):
     return back(kernels, strides, -np.asarray(paddings), u)
 
 
+@wrong(QUESTION, "s u - p: the padding is counted in pixels of the layer's input, so the stride does not multiply it.")
+def padding_before_the_stride(kernels, strides, paddings, u):
+    """s (u - p) in the place of s u - p."""
+    return back(kernels, strides, strides * paddings, u)
+
+
 @wrong(QUESTION, "Each layer makes the window wider: walk the last pixel back on its own.")
 def window_of_the_first_layer(kernels, strides, paddings, u):
     """Only the first pixel is walked back; the first layer's width is added."""

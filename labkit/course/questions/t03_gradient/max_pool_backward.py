@@ -27,7 +27,7 @@ QUESTION = Question(
     inputs=draw,
     by_hand=(
         (np.array([[1.0, 7.0], [3.0, 2.0]]), np.array([[5.0]])),
-        (np.array([[-1.0, -2.0, 4.0, 1.0], [-3.0, -4.0, 0.0, 6.0]]), np.array([[2.0, -3.0]])),
+        (np.array([[-4.0, -2.0, 4.0, 1.0], [-3.0, -1.0, 0.0, 6.0]]), np.array([[2.0, -3.0]])),
         (np.array([[0.0, 1.0], [2.0, 3.0], [9.0, 8.0], [6.0, 7.0]]), np.array([[1.0], [-1.0]])),
     ),
     points=3,
@@ -98,6 +98,13 @@ def clipped_like_a_relu(x, g):
     """Negative pixels get nothing, as behind a ReLU."""
     b = blocks(x)
     return unblocked((b == b.max(axis=2, keepdims=True)) * (b > 0) * g[..., None])
+
+
+@wrong(QUESTION, "All four pixels of a block may be negative: with which value does your search for the largest begin?")
+def searched_from_zero(x, g):
+    """The search begins at 0: no pixel of a negative block is larger, and the first one stays."""
+    b = np.maximum(blocks(x), 0.0)
+    return unblocked(np.eye(4)[b.argmax(axis=2)] * g[..., None])
 
 
 @wrong(QUESTION, "Compare a pixel with the other three of its block, not with the whole row of blocks or image.")

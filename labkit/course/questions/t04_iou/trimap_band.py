@@ -118,6 +118,17 @@ def window_without_its_end(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v < width and u < width]) & (y != 255)
 
 
+@wrong(QUESTION, "Your window reaches only down and right: pixels above and to the left are neighbours, too.")
+def down_and_right_alone(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if v >= 0 and u >= 0]) & (y != 255)
+
+
+@wrong(QUESTION, "Your band is one pixel too wide: the pixels beside an edge are its first step, not its start.")
+def grown_from_the_pixels_beside_the_edge(y, width):
+    beside = np.where(trimap_band(y, 1), 1, 255)
+    return banded(beside, width, square(width), lambda near, _: near == 1) & (y != 255)
+
+
 @wrong(QUESTION, "Pixels of the opposite border come in, as by np.roll: beyond its border an image has no pixels.")
 def rolled_round(y, width):
     near = [np.roll(y, step, axis=(0, 1)) for step in square(width)]

@@ -87,6 +87,18 @@ def raised(z, y, shares, tau):
     return adjusted_grad(z, y, shares, -tau)
 
 
+@wrong(QUESTION, "All logits of a pixel move, each by the share of its class: yours moves only the true one.")
+def true_logit_alone(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * np.log(shares) * parts(z, y)[1], y)
+    return (p - Y) * counted
+
+
+@wrong(QUESTION, "You multiply the probabilities by powers of the shares: what do they sum to then?")
+def not_normalised_again(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p * shares**tau - Y) * counted
+
+
 @wrong(QUESTION, "The labels are not adjusted: only the logits move.")
 def one_hot_adjusted(z, y, shares, tau):
     p, Y, counted = parts(z + tau * np.log(shares), y)

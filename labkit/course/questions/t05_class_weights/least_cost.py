@@ -62,6 +62,11 @@ def one_weight_per_class(p, cost):
     return (p * cost.sum(axis=1)).argmax(axis=-1)
 
 
+@wrong(QUESTION, "With which probability do you pay cost[i, j]: with p[i], or with 1 - p[i]?")
+def saved_where_it_is_not_so(p, cost):
+    return ((1.0 - p) @ cost).argmax(axis=-1)
+
+
 @wrong(QUESTION, "You decide for the class that costs most.")
 def dearest(p, cost):
     return (p @ cost).argmax(axis=-1)

@@ -28,7 +28,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
-        (np.array([0.3, 0.3, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),  # two alike
+        (np.array([0.7, 0.7, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),  # two alike; weight 3/7
     ),
     points=3,
 )
@@ -92,3 +92,8 @@ def one_too_many(p1, y, recall):
     found_first = np.sort(p1[y])[::-1]
     last = found_first[min(int(np.ceil(recall * len(found_first))), len(found_first) - 1)]
     return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "A weight may be below 1: the surest pixels alone may keep the promise.")
+def at_least_one(p1, y, recall):
+    return max(weight_for_recall(p1, y, recall), 1.0)
