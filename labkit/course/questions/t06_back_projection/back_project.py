@@ -123,3 +123,16 @@ def holes_at_depth_zero(depth, K):
 @wrong(QUESTION, "The optical axis meets the image at (cx, cy), where x and y are 0: from where do you count u and v?")
 def counted_from_the_first_pixel(depth, K):
     return back_project(depth, K_of(K[0, 0], K[1, 1], 0.0, 0.0))
+
+
+@wrong(QUESTION, "The principal point is what K says, cx and cy; it need not be the middle of the image.")
+def middle_of_the_image(depth, K):
+    H, W = depth.shape
+    return back_project(depth, K_of(K[0, 0], K[1, 1], (W - 1) / 2, (H - 1) / 2))
+
+
+@wrong(QUESTION, "A hole has no point: its x and y are NaN as well, not 0.")
+def holes_without_z_alone(depth, K):
+    P = np.nan_to_num(back_project(depth, K))
+    P[..., 2:] = holes(depth)
+    return P

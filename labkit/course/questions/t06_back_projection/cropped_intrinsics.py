@@ -87,3 +87,9 @@ def added(K, left, top, scale):
 @wrong(QUESTION, "left and top count old pixels, so take them off first; and corners stay together, not centres.")
 def resized_first_about_centres(K, left, top, scale):
     return with_centre(K, scale, scale * K[0, 2] - left, scale * K[1, 2] - top)
+
+
+@wrong(QUESTION, "Your half pixel has the wrong sign: the corner is at -1/2, so a centre u lies u + 1/2 behind it.")
+def half_pixel_with_the_other_sign(K, left, top, scale):
+    half = (1.0 - scale) / 2.0
+    return with_centre(K, scale, scale * (K[0, 2] - left) + half, scale * (K[1, 2] - top) + half)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.questions.question import Property, Question, way, wrong
-from labkit.course.questions.t06_back_projection import K_SMALL, camera
+from labkit.course.questions.t06_back_projection import K_SMALL, K_of, camera
 
 
 def undistort(pixels, K, k):
@@ -138,3 +138,8 @@ def signs_exchanged(pixels, K, k):
 @wrong(QUESTION, "k2 stands beside r to the fourth: square r squared once more.")
 def k2_beside_r_squared(pixels, K, k):
     return undistort(pixels, K, np.array([k[0] + k[1], 0.0]))
+
+
+@wrong(QUESTION, "Rows have a focal length of their own: v = fy y_d + cy, and fy is the middle entry of K.")
+def one_focal_length(pixels, K, k):
+    return undistort(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), k)
