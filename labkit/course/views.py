@@ -87,10 +87,12 @@ class View:
         import plotly.graph_objects as go
 
         figure = go.Figure()
+        camera = self.camera()
+        smaller = 1.5 / np.linalg.norm(camera)  # from further away a point has fewer pixels
         for layer in self.layers:
             P, name = layer["P"].astype(np.float32), layer["name"]
             if layer["kind"] == "points":
-                marker = {"size": layer["size"], "color": _colours(layer["colour"])}
+                marker = {"size": layer["size"] * smaller, "color": _colours(layer["colour"])}
                 figure.add_scatter3d(x=P[:, 0], y=P[:, 1], z=P[:, 2], mode="markers", name=name, marker=marker)
             elif layer["kind"] == "lines":
                 broken = np.concatenate([P, np.full((len(P), 1, 3), np.nan, np.float32)], axis=1).reshape(-1, 3)
@@ -102,7 +104,7 @@ class View:
                 figure.add_mesh3d(
                     x=x, y=y, z=z, i=i, j=j, k=k, name=name, color=layer["colour"], flatshading=True, showlegend=True
                 )
-        x, y, z = 1.5 * np.array(self.eye) / np.linalg.norm(self.eye)
+        x, y, z = camera
         figure.update_layout(
             title=self.title,
             height=self.height,
@@ -116,6 +118,23 @@ class View:
         )
         return figure
 
+    def camera(self) -> Float[np.ndarray, "3"]:
+        """Where plotly's camera stands so that it sees everything, in plotly's units: a box of volume 1 at the origin.
+
+        Its field of view is 45 degrees from the lower to the upper edge; a page may leave it no more from side to side.
+        """
+        room = np.maximum(np.ptp(self.everything(), axis=0), 1e-3)
+        signs = np.array(list(np.ndindex(2, 2, 2))) - 0.5
+        corners = signs * room / np.cbrt(room.prod())
+        towards = np.array(self.eye) / np.linalg.norm(self.eye)
+        nearer = corners @ towards
+        aside = np.linalg.norm(corners - nearer[:, None] * towards, axis=1)
+        return 1.1 * (nearer + aside / np.tan(np.pi / 8)).max() * towards  # a tenth more for the axes' numbers
+
+    def everything(self) -> Float[np.ndarray, "N 3"]:
+        """All points, ends and corners of the view."""
+        return np.concatenate([layer["P"].reshape(-1, 3) for layer in self.layers] or [np.zeros((1, 3))])
+
     def html(self, script: bool | str = True) -> str:
         """The view as a piece of HTML. script: True puts plotly itself into it (4.8 MB), False leaves it out."""
         import plotly.io
@@ -128,7 +147,6 @@ class View:
         """The view as a still picture, seen from the same side."""
         figure = Figure(figsize=(6.4, self.height / 80), dpi=80, layout="constrained")
         axes = figure.add_subplot(projection="3d")
-        everything = np.concatenate([layer["P"].reshape(-1, 3) for layer in self.layers] or [np.zeros((1, 3))])
         for layer in self.layers:
             P, name, colour = layer["P"], layer["name"], layer["colour"]
             if layer["kind"] == "points":
@@ -141,10 +159,10 @@ class View:
             else:
                 faces = P[:, BOX].reshape(-1, 3, 3)
                 axes.add_collection3d(Poly3DCollection(faces, facecolors=colour, edgecolors="none", label=name))
-        low, high = everything.min(axis=0), everything.max(axis=0)
+        low, high = self.everything().min(axis=0), self.everything().max(axis=0)
         room = np.maximum(high - low, 1e-3)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        axes.set_box_aspect(room, zoom=1.1)
+        axes.set_box_aspect(room, zoom=0.9)
         x, y, z = self.eye
         axes.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
         axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title=self.title)

@@ -36,7 +36,7 @@ def open_notebook(page, url: str, path: str) -> None:
     """Open a notebook alone, without the side bar, and wait for its kernel."""
     page.goto(f"{url}/lab/tree/{path}?token={TOKEN}&reset")
     page.wait_for_selector(".jp-Notebook .jp-CodeCell")
-    page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", state="attached")
+    page.wait_for_selector("#jp-main-statusbar :text('| Idle')")  # what is run earlier JupyterLab forgets
     page.keyboard.press("Control+b")  # the side bar
     page.wait_for_timeout(500)
 
@@ -115,4 +115,48 @@ def test_a_slider_moved_in_lesson_02_changes_the_picture(jupyterlab, page, tmp_p
     page.wait_for_timeout(500)
     assert picture.screenshot() != before
     page.screenshot(path=tmp_path / "lesson_02.png")
+    assert page.errors == []
+
+
+def test_every_explorers_labels_are_read_in_full_and_pressed_pixels_have_the_things_colour(jupyterlab, page):
+    """Run one cell that shows the explorers of all topics, as test_explorer.py makes them."""
+    places = [str(ROOT / "tests"), str(ROOT / "tests/course/widgets")]
+    open_notebook(page, jupyterlab, "lessons/04_iou.ipynb")
+    cell = page.locator(".jp-CodeCell").first
+    cell.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(f"import sys\nsys.path[:0] = {places}\nfrom test_explorer import EXPLORERS\n")
+    page.keyboard.insert_text("for make, _ in EXPLORERS.values(): display(make())")
+    page.keyboard.press("Shift+Enter")
+    cell.locator(".widget-slider", has_text="saturation").wait_for()
+    wait_until_idle(page)
+    labels = cell.locator(".widget-label, .widget-label-basic")
+    assert labels.count() > 40
+    assert labels.evaluate_all("all => all.filter(e => e.scrollWidth > e.clientWidth).map(e => e.innerText)") == []
+    cell.locator("button", has_text="0.72").click()
+    cell.locator("button.mod-warning", has_text="0.72").wait_for()
+    assert cell.locator("button.mod-info").count() == 19
+    assert page.errors == []
+
+
+def test_the_view_in_lesson_08_turns_when_it_is_dragged(jupyterlab, page, tmp_path):
+    """Without a kernel: a still picture, until the mouse is over it."""
+    open_notebook(page, jupyterlab, "lessons/08_node.ipynb")
+    view = page.locator(".jp-RenderedPlotly")
+    view.locator("img").hover(force=True)
+    view.locator("canvas").first.wait_for(state="attached")
+    seen = "view => [...Object.values(view._fullLayout.scene._scene.getCamera().eye)]"
+    before, box = view.evaluate(seen), view.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    after = before
+    while after == before:  # plotly takes a moment until it listens
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 150, y, steps=5)
+        page.mouse.up()
+        page.wait_for_timeout(1000)
+        after = view.evaluate(seen)
+    page.screenshot(path=tmp_path / "view.png")
+    assert abs(before[0] * after[1] - before[1] * after[0]) > 0.1, "it turned about the vertical"
+    assert abs(before[2] - after[2]) < 0.1
     assert page.errors == []

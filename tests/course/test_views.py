@@ -1,5 +1,6 @@
 """Views in 3-D hold what they were given, at the places where it is."""
 
+import io
 import json
 
 import numpy as np
@@ -42,3 +43,21 @@ def test_a_box_is_closed_and_has_its_volume():
     vertices = np.stack([mesh.x, mesh.y, mesh.z], axis=1)
     a, b, c = (vertices[np.asarray(index)] for index in (mesh.i, mesh.j, mesh.k))
     assert abs(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0) == pytest.approx(6.0), "all faces look the same way"
+
+
+@pytest.mark.parametrize("size", [(1.3, 1.2, 2.0), (0.12, 0.24, 0.09), (0.2, 3.0, 0.2)])
+def test_everything_is_seen_before_anybody_turns_it(size):
+    """Plotly's camera looks at the middle of a box of volume 1, and sees 22.5 degrees above and below it."""
+    corners = np.array(list(np.ndindex(2, 2, 2))) * size
+    view = View(eye=(1.2, -1.0, 0.5)).points(corners, "corners")
+    camera = view.plotly().layout.scene.camera
+    eye = np.array([camera.eye[axis] for axis in "xyz"])
+    rays = (corners - corners.mean(axis=0)) / np.cbrt(np.prod(size)) - eye
+    off = np.degrees(np.arccos(rays @ -eye / np.linalg.norm(rays, axis=1) / np.linalg.norm(eye)))
+    assert 17.0 < off.max() < 22.5
+    picture = view.picture()
+    picture.savefig(io.BytesIO())
+    (axes,) = picture.axes
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        x0, y0, x1, y1 = axis.label.get_window_extent().extents
+        assert 0 <= x0 < x1 <= picture.bbox.width and 0 <= y0 < y1 <= picture.bbox.height, axis.label.get_text()

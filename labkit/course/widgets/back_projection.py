@@ -91,12 +91,10 @@ def name_that_bug(frame: RGBDFrame) -> Explorer:
             axes.set_ylabel(f"{'xyz'[vertical]} (m)")
             axes.set_title(("from above", "from the side")[vertical - 1])
         guess = f" | red: mystery {mystery}" if mystery else ""
-        figure.suptitle(
-            f"colours: {'; '.join(BUGS[bug] for bug in bugs) or 'no bug'} | triangle: camera{guess}", size=9
-        )
+        colours = "; ".join(BUGS[bug] for bug in bugs) or "no bug"
+        figure.suptitle(f"colours: {colours} | triangle: camera{guess}", size=9, wrap=True)
 
-    wide = {"layout": ipywidgets.Layout(width="420px"), "indent": False}
-    boxes = {bug: ipywidgets.Checkbox(False, description=text, **wide) for bug, text in BUGS.items()}
+    boxes = {bug: ipywidgets.Checkbox(False, description=text, indent=False) for bug, text in BUGS.items()}
     mystery = ipywidgets.IntSlider(0, min=0, max=len(MYSTERIES) - 1, description="mystery")
     stills = ({"swapped": True}, {"ray": True})
     return Explorer(draw, boxes | {"mystery": mystery}, size=(8.0, 3.6), stills=stills)

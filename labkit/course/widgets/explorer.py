@@ -40,7 +40,14 @@ class Explorer:
         # As large as it is drawn, not stretched over the page; narrower where there is less room.
         self.picture = ipywidgets.Image(format="png", layout={"max_width": "100%", "align_self": "flex-start"})
         self.widget = ipywidgets.VBox([*self.controls.values(), self.picture])
+        # All labels are as wide as the longest needs: by itself ipywidgets cuts one of twelve letters off.
+        unlabelled = ipywidgets.Button | ipywidgets.Checkbox | ipywidgets.ToggleButton
+        labelled = [c for c in self.controls.values() if c.has_trait("description") and not isinstance(c, unlabelled)]
+        for control in labelled:
+            control.style.description_width = f"{max(10, *(len(c.description) for c in labelled))}ch"
         for control in self.controls.values():
+            if isinstance(control, ipywidgets.Checkbox):
+                control.layout.width = "max-content"
             if control.has_trait("value"):
                 control.observe(lambda change: self.redraw(), names="value")
         self.redraw()
