@@ -68,3 +68,9 @@ def dice(n):
 @wrong(QUESTION, "A pixel of class 1 that is called 2 is in neither set of class 0: is it in your union of class 0?")
 def all_but_the_other_hits(n):
     return divide(np.diagonal(n), n.sum() - np.trace(n) + np.diagonal(n))
+
+
+@wrong(QUESTION, "FP is a column, and FN a row, without the cell on the diagonal: how often is it in your union?")
+def overlap_three_times_in_the_union(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true + correct)

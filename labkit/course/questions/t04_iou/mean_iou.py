@@ -103,6 +103,12 @@ def truth_only(n_frames):
     return iou_of(n)[n.sum(axis=1) > 0].mean()
 
 
+@wrong(QUESTION, "A class whose IoU is 0 occurs all the same: it counts. Which number says whether a class occurs?")
+def found_only(n_frames):
+    scores = iou_of(n_frames.sum(axis=0))
+    return scores[scores > 0.0].mean()
+
+
 @wrong(QUESTION, "That is the share of pixels that are right; where are the unions?")
 def accuracy(n_frames):
     n = n_frames.sum(axis=0)

@@ -149,3 +149,12 @@ def one_side(y, width):
 def unjudged_and_frame_are_a_class(y, width):
     framed = np.pad(np.where(y == 255, 9, y), width, constant_values=9)
     return trimap_band(framed, width)[width:-width, width:-width] & (y != 255)
+
+
+@wrong(QUESTION, "Near the border v - width is negative, and a slice counts such a start from the end of the axis.")
+def slices_from_negative_places(y, width):
+    out = np.zeros(y.shape, bool)
+    for v, u in np.argwhere(y != 255):
+        near = y[v - width : v + width + 1, u - width : u + width + 1]
+        out[v, u] = np.any((near != y[v, u]) & (near != 255))
+    return out
