@@ -236,6 +236,9 @@ TABLE = {
     r"TypeError: '(?:numpy\.)?\w+' object is not iterable|TypeError: Value after \* must be an iterable": (
         "You go through something that is one number: is it the length, where `range` or the array itself is meant?"
     ),
+    r"ValueError: invalid literal for int|ValueError: cannot convert float NaN": (
+        "int() makes a whole number, which infinity and NaN are not: is float() meant?"
+    ),
     r"TypeError: '(\w+)' object does not support item assignment": (
         "You assign to an entry of a {1}, which has none that can change: was an array meant?"
     ),

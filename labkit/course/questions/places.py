@@ -53,13 +53,15 @@ def in_the_array(view: View) -> Iterator[tuple[str, Masks]]:
 
 
 def lines(ndim: int) -> Iterator[tuple[str, tuple]]:
-    """The first and the last one along each axis, and all others, by their indices."""
+    """The first and the last one along each axis, all others, and every second one, by their indices."""
     for axis, name in enumerate(("row", "column") if ndim == 2 else [f"entry along axis {k}" for k in range(ndim)]):
         before = (slice(None),) * axis
         yield f"in the first {name}", (*before, 0)
         yield f"in the last {name}", (*before, -1)
         yield f"outside of the last {name}", (*before, slice(None, -1))
         yield f"outside of the first {name}", (*before, slice(1, None))
+        yield f"in every second {name}, from the first on", (*before, slice(0, None, 2))
+        yield f"in every second {name}, from the second on", (*before, slice(1, None, 2))
 
 
 def at(e: np.ndarray, index: tuple) -> np.ndarray:

@@ -289,18 +289,26 @@ def words_for(what: ast.AST, outer: Sequence[ast.AST], path: Path, sources: dict
         option = next((o.arg for o in reversed(outer) if isinstance(o, ast.keyword)), "a number")
         return "" if option == "axis" else f"{option} in {next(filter(None, around), 'the formula').removesuffix(',')}"
     if path and path[-1][0] == "iter" and isinstance(what, ast.For | ast.comprehension):
-        if sized := re.fullmatch(r"range\((?:(\w+)\.shape\[(\d)\]|len\((\w+)\))\)", ast.unparse(what.iter)):
-            name, axis = sized[1] or sized[3], sized[2] or 0
-            if name in arguments:
-                return f"the loop over axis {axis} of {name}"
-        made = sorted(set().union(*(sources.get(name, set()) for name in names_in(what.iter)))) or made
-        return f"the loop over what is made of {listed(made)}" if made else "the loop"
+        return words_for_loop(what, outer[:-1], sources, arguments)
     kind = kind_of(what, arguments)
     if isinstance(what, ast.Subscript) and is_entry(what, arguments):
         return kind
     if isinstance(what, ast.Name) or not kind or (path and path[-1][0] == "slice" and isinstance(what, ast.Tuple)):
         return kind if isinstance(what, ast.Name) else ""
     return f"{kind} made of {listed(made) if made else 'fixed numbers'}"
+
+
+def words_for_loop(loop: ast.AST, outer: Sequence[ast.AST], sources: dict, arguments: Collection[str]) -> str:
+    """Words for a loop: over an axis of an argument, or over what it is made of; the inner one of two alike."""
+    origins = (set().union(*(sources.get(name, set()) for name in names_in(node))) for node in (loop.iter, loop))
+    made = sorted(next(filter(None, origins), ()))
+    words = f"loop over what is made of {listed(made)}" if made else "loop"
+    sized = re.fullmatch(r"range\((?:(\w+)\.shape\[(-?\d)\]|len\((\w+)\))\)", ast.unparse(loop.iter))
+    if sized and {sized[1], sized[3]} & set(arguments):
+        axis = "the last axis" if sized[2] == "-1" else f"axis {sized[2] or 0}"
+        words = f"loop over {axis} of {sized[1] or sized[3]}"
+    around = (words_for_loop(o, (), sources, arguments) for o in outer if isinstance(o, ast.For))
+    return f"the inner {words}" if f"the {words}" in around else f"the {words}"
 
 
 def listed(names: Sequence[str]) -> str:

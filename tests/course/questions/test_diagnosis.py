@@ -155,6 +155,8 @@ EXCEPTIONS = [
     (lambda: np.argmx(1), "np.argmax"),
     (lambda: np.zeros(2).summ(), ".sum"),
     (lambda: {}[3], "no such key"),
+    (lambda: int(np.nan), "is float() meant?"),
+    (lambda: int("inf"), "is float() meant?"),
 ]
 
 

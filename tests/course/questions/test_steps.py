@@ -127,6 +127,22 @@ def test_a_chain_of_comparisons_has_two_parts():
     assert known["were its first part alone."](args) == 4
 
 
+def pairs(a):
+    """How many pairs of numbers in the rows of a are in order."""
+    count = 0
+    for i in range(len(a)):
+        for j in range(a.shape[-1]):
+            for k in range(a.shape[-1]):
+                count += j <= k and a[i, j] <= a[i, k]
+    return count
+
+
+def test_loops_are_told_apart_by_their_axes():
+    known = {s.partition("as if ")[2]: function for s, function in changed_steps(pairs, (np.ones((2, 3)),))}
+    for loop, count in (("loop over axis 0", 6), ("loop over the last axis", 10), ("inner loop over the last axis", 6)):
+        assert known[f"the {loop} of a ended one turn earlier."]((np.ones((2, 3)),)) == count
+
+
 def halvings(x):
     """How often x is halved until it is below 1."""
     n = 0
