@@ -65,6 +65,8 @@ def check(name: str, answer: object) -> Callable:
     printed = Printed()
     verdict = judged(question, answer, printed)
     shown = describe(question, verdict, printed)
+    if verdict.problem is not None and verdict.problem.kind == "unanswered":
+        shown.lines += ("The kit's function takes its place below.",)
     return conclude(shown, answer if verdict.passed else question.reference, verdict.passed)
 
 
@@ -125,7 +127,7 @@ def describe(question: Question, verdict: Verdict, printed: Printed) -> Shown:
         tried = ([f"{by_hand} by hand"] if by_hand else []) + [f"{question.random_cases} random"]
         return Shown("✔", f"{name} is right", f"Cases tried: {', '.join(tried)}.", *said)
     if problem.kind == "unanswered":
-        return Shown("○", f"{name}: not answered yet", "The kit's function takes its place below.")
+        return Shown("○", f"{name}: not answered yet")
     if problem.kind == "refused":
         return Shown("✘", f"{name} cannot be graded: {problem.says}", "The grader would refuse it in these words.")
     lines = [f"line {number}:  {text}" for number, text in problem.lines]

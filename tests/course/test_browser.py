@@ -135,7 +135,7 @@ def test_every_explorers_labels_are_read_in_full_and_pressed_pixels_have_the_thi
     assert labels.evaluate_all("all => all.filter(e => e.scrollWidth > e.clientWidth).map(e => e.innerText)") == []
     cell.locator("button", has_text="0.72").click()
     cell.locator("button.mod-warning", has_text="0.72").wait_for()
-    assert cell.locator("button.mod-info").count() == 19
+    assert cell.locator("button.mod-primary").count() == 19
     assert page.errors == []
 
 

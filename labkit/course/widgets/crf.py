@@ -138,7 +138,7 @@ def you_are_the_solver() -> Explorer:
     def draw(figure: Figure, lam: float, reveal: bool, **values: bool) -> None:
         y = np.array([values[name] for name in pixels]).reshape(H, W).astype(np.uint8)
         for button in pixels.values():
-            button.button_style = "warning" if button.value else "info"  # orange as the thing, blue as the table
+            button.button_style = "warning" if button.value else "primary"  # orange as the thing, blue as the table
         crf = toy_model(lam)
         shown = {"you": y}
         if reveal:
