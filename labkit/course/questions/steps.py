@@ -114,7 +114,7 @@ def steps(reference: Callable, arguments: Sequence[tuple]) -> Steps:
     except (OSError, SyntaxError, ValueError, NameError):  # its source is not complete in itself
         return []
     told = [
-        (step.words, [as_array(found.get(number)) for found in values])
+        (step.words.removesuffix(","), [as_array(found.get(number)) for found in values])
         for number, step in enumerate(trace.steps)
         if not step.looped and isinstance(step.node, TOLD)
     ]

@@ -102,7 +102,14 @@ def adjusted_by_one_maximum(z, y, shares, tau):
     return gradient_by_one_maximum(z + tau * np.log(shares), y)
 
 
+def by_a_number_of_16(rgb, palette):
+    numbers, known = rgb @ [256, 16, 1], palette @ [256, 16, 1]
+    same = numbers[..., None] == known
+    return np.where(same.any(axis=-1), same.argmax(axis=-1), 255)
+
+
 ACCEPTED = {
+    "01_labels.labels_from_colours": by_a_number_of_16,
     "05_class_weights.adjusted_grad": adjusted_by_one_maximum,
     "03_gradient.cross_entropy_grad": gradient_by_one_maximum,
     "01_labels.labels_from_segmentation": mask_of_16_bits,
@@ -242,7 +249,7 @@ NAMED = [
     ("01_labels.labels_from_segmentation", mask_of_16_bits, "has 24 bits"),
     ("01_labels.labels_from_colours", any_channel_in_a_loop, "is one of them enough"),
     ("01_labels.one_hot", planes_up_to_the_largest, "nothing to stack"),
-    ("01_labels.resize_labels", scaled_upside_down, "y holds 3: is it used as an index?"),
+    ("01_labels.resize_labels", scaled_upside_down, "is yours height / H?"),
     ("01_labels.resize_labels", centres_rounded, "which one does np.round take?"),
     ("02_crf.pair_weights", fourth_kind_too_small, "in the last entry along axis 0"),
     ("06_back_projection.cropped_intrinsics", rows_from_one, "entry at [1, 2]. There: Yours are too large by 1"),
@@ -256,6 +263,7 @@ NAMED = [
     ("07_grasp.slip_across", across_twice, "Output 1 holds what output 2 should be"),
     ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
     ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),
+    ("02_crf.terminal_capacities", lambda psi: (psi[..., 1], psi[..., 0], 0.0), "What you return is psi[..., 1]: what"),
     ("06_back_projection.fit_plane", plane_with_the_old_d, "n . m = d"),
     ("06_back_projection.undistort", lens_in_five_rounds, "put into the lens"),
 ]

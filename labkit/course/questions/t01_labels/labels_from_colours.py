@@ -32,7 +32,7 @@ QUESTION = Question(
     inputs=_picture,
     by_hand=(
         (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
-        (np.array([[[0, 0, 0], [0, 255, 0]], [[0, 0, 254], [255, 255, 255]]], np.uint8), _PALETTE),
+        (np.array([[[0, 0, 0], [0, 255, 0], [0, 0, 254], [254, 10, 0], [254, 16, 0]]], np.uint8), _PALETTE),
     ),
     rtol=0.0,
     atol=0.0,
@@ -117,10 +117,20 @@ def by_brightness_of_the_last(rgb, palette):
     return last_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
 
 
-@wrong(QUESTION, "argmax of a row that is all False is 0: is an unknown colour background?")
+@wrong(QUESTION, "An unknown colour is 255, not 0: what does yours start from, and what is argmax of a row of False?")
 def unknown_becomes_0(rgb, palette):
     """Unknown colours become class 0."""
     return first_of(matches(rgb, palette).all(axis=-1), 0)
+
+
+@wrong(QUESTION, "Bytes wrap round: 16 * 16 is 256, and a byte holds 0 for it. Compare the channels themselves.")
+def squares_of_bytes(rgb, palette):
+    return last_of((((rgb[:, :, None].astype(int) - palette) ** 2) % 256 == 0).all(axis=-1))
+
+
+@wrong(QUESTION, "Each turn of your loop undoes the one before: a pixel without this class's colour keeps what it has.")
+def last_class_alone(rgb, palette):
+    return np.where((rgb == palette[-1]).all(axis=-1), len(palette) - 1, 255)
 
 
 @wrong(QUESTION, "Which channel comes first in an RGB image?")

@@ -74,6 +74,12 @@ def loops(y, height, width):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+def copied(y, size, index):
+    """Copy labels by a rule (new index, new length, old length) -> old index, which rows and columns share."""
+    rows, columns = (np.asarray(index(np.arange(n), n, old), int) for n, old in zip(size, y.shape, strict=True))
+    return y[rows[:, None], columns]
+
+
 @wrong(QUESTION, "np.unique before and after? The mean of classes 1 and 3 is not class 2: labels cannot be averaged.")
 def bilinear(y, height, width):
     import cv2
@@ -85,16 +91,27 @@ def bilinear(y, height, width):
     QUESTION, "All is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner."
 )
 def from_the_corner(y, height, width):
-    rows, columns = (np.arange(n) * old // n for n, old in zip((height, width), y.shape, strict=True))
-    return y[rows[:, None], columns]
+    return copied(y, (height, width), lambda i, n, old: i * old // n)
 
 
 @wrong(QUESTION, "You lay the first and last centres on each other; here the images' edges lie on each other.")
 def corner_to_corner(y, height, width):
-    rows, columns = (
-        np.round(np.linspace(0, old - 1, n)).astype(int) for n, old in zip((height, width), y.shape, strict=True)
-    )
-    return y[rows[:, None], columns]
+    return copied(y, (height, width), lambda i, n, old: np.round(np.linspace(0, old - 1, n)))
+
+
+@wrong(QUESTION, "The half belongs to the new pixel: it is added before you scale, (i + 0.5) * H / h, not afterwards.")
+def half_added_afterwards(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.minimum(i * old / n + 0.5, old - 1))
+
+
+@wrong(QUESTION, "Subtract no 0.5 before floor: here old pixel u reaches from u to u + 1, and its centre is u + 0.5.")
+def half_subtracted(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * old / n - 0.5)
+
+
+@wrong(QUESTION, "Rows are multiplied by H / height, old by new: is yours height / H?")
+def scaled_by_new_over_old(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * n / old)
 
 
 @wrong(QUESTION, "np.resize repeats the numbers row after row: is your image still the same scene?")
@@ -110,21 +127,20 @@ def padded_or_cropped(y, height, width):
 
 @wrong(QUESTION, "On the border of two old pixels, floor takes the later one: which one does np.round take?")
 def rounded(y, height, width):
-    H, W = y.shape
-    rows, columns = (np.round((np.arange(n) + 0.5) * old / n - 0.5).astype(int) for n, old in ((height, H), (width, W)))
-    return y[rows[:, None], columns]
+    return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n - 0.5))
 
 
 @wrong(QUESTION, "The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
 def rounded_up(y, height, width):
     """IndexError, where the last centre is rounded to the number of pixels."""
-    rows, columns = (
-        np.round((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip((height, width), y.shape, strict=True)
-    )
-    return y[rows[:, None], columns]
+    return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n))
 
 
 @wrong(QUESTION, "Columns are counted along W and rows along H: you take H for both.")
 def height_for_both(y, height, width):
-    rows, columns = (((np.arange(n) + 0.5) * len(y) / n).astype(int) for n in (height, width))
-    return y[rows[:, None], columns]
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * len(y) / n)
+
+
+@wrong(QUESTION, "Columns have a factor of their own, W / width: yours are scaled by H / height, as rows are.")
+def columns_scaled_as_rows(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))

@@ -141,3 +141,8 @@ def loops_too_short(y, psi, weights):
 @wrong(QUESTION, "The last row has pairs to the right, the last column pairs downward: how far do your loops go?")
 def pairs_of_the_last_row_and_column_skipped(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, :-1].sum()
+
+
+@wrong(QUESTION, "A loop that leaves out the border loses its pairs: ask each neighbour whether it is in the image.")
+def pairs_of_the_border_skipped(y, psi, weights):
+    return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, 1:-1].sum()

@@ -108,6 +108,16 @@ def wrapped_bytes(image, lam, sigma_I, sigma_p):
     return gaussian((byte**2).sum(axis=3, dtype=float), lam, sigma_I, sigma_p)
 
 
+@wrong(QUESTION, "16 bits hold numbers up to 32,767, and 200 * 200 is more: turn the image into floats.")
+def wrapped_words(image, lam, sigma_I, sigma_p):
+    return gaussian((differences(image).astype(np.int16) ** 2).sum(axis=3, dtype=float), lam, sigma_I, sigma_p)
+
+
+@wrong(QUESTION, "lam stands before the exponential, not in its exponent: two like pixels at distance 0 weigh lam.")
+def lam_in_the_exponent(image, lam, sigma_I, sigma_p):
+    return gaussian(squares(image), 1.0, sigma_I, sigma_p) ** lam
+
+
 @wrong(QUESTION, "np.uint8(5) - np.uint8(10) is 251 already: turn the image into floats before you subtract.")
 def converted_late(image, lam, sigma_I, sigma_p):
     """Subtract bytes, and square floats."""

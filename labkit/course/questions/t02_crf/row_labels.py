@@ -84,12 +84,12 @@ def walk(psi, w):
     return np.array(best)
 
 
-def walk_with_origins(psi, w):
-    """The walk, and the class that each came from, (n, C)."""
+def walk_with_origins(psi, w, late=0):
+    """The walk, and the class that each came from, (n, C); late: 1 if the cheapest class is asked for a pixel late."""
     best, came = walk(psi, w), np.zeros(psi.shape, int)
     for u in range(1, len(psi)):
         stays = best[u - 1] <= best[u - 1].min() + w[u - 1]
-        came[u] = np.where(stays, np.arange(psi.shape[1]), best[u - 1].argmin())
+        came[u] = np.where(stays, np.arange(psi.shape[1]), best[u - 1 + late].argmin())
     return best, came
 
 
@@ -136,6 +136,12 @@ def traced_one_pixel_off(psi, w):
     """The way back read one pixel too early."""
     best, came = walk_with_origins(psi, w)
     return traced(came[:-1], best[-1].argmin())
+
+
+@wrong(QUESTION, "A pixel comes from the cheapest class of `best` before psi[u] is added: does yours ask too late?")
+def asked_too_late(psi, w):
+    best, came = walk_with_origins(psi, w, late=1)
+    return traced(came[1:], best[-1].argmin())
 
 
 @wrong(QUESTION, "The last label is the cheapest by `best`, which holds the whole row, not by the last pixel's psi.")
