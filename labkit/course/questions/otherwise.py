@@ -43,6 +43,7 @@ OPERATIONS = {
     ast.LShift: ("bits moved to the left", within(operator.lshift)),
     ast.RShift: ("bits moved to the right", within(operator.rshift)),
 }
+BITS = (ast.BitAnd, ast.BitOr, ast.BitXor)  # of truth values, these are said before + and *
 COMPARISONS = {
     ast.Lt: ("<", operator.lt),
     ast.LtE: ("<=", operator.le),
@@ -132,7 +133,8 @@ def operation(node: ast.BinOp) -> Changes:
     yield "were its first side alone", lambda compute, a, b: spread(a, compute(a, b))
     yield "were its second side alone", lambda compute, a, b: spread(b, compute(a, b))
     yield "had its two sides exchanged", lambda compute, a, b: compute(b, a)
-    for kind, (name, other) in OPERATIONS.items():
+    for kind in sorted(OPERATIONS, key=lambda kind: issubclass(kind, BITS) != isinstance(node.op, BITS)):
+        name, other = OPERATIONS[kind]
         if kind is not type(node.op):
             yield f"were {name}", lambda compute, a, b, other=other: other(a, b)
 

@@ -187,6 +187,19 @@ def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
     return n
 
 
+def mean_not_divided(P, sigma):
+    w = sigma**-2.0
+    centre = w @ P / len(P)
+    n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
+    return n * np.sign(n[2]), n * np.sign(n[2]) @ centre
+
+
+def above_the_tips_or_beside_the_pads(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    out = np.abs(y) - width / 2
+    return int(((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) | (z <= tips)).sum())
+
+
 def across_twice(T_base_grasp, middle):
     return (find("07_grasp.slip_across").reference(T_base_grasp, middle)[1],) * 2
 
@@ -260,6 +273,8 @@ NAMED = [
     ("07_grasp.slip_across", in_metres, "1000"),
     ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
     ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
+    ("06_back_projection.fit_plane", mean_not_divided, "Yours is always 0"),
+    ("07_grasp.points_in_fingers", above_the_tips_or_beside_the_pads, "were an `or`"),
     ("07_grasp.slip_across", across_twice, "Output 1 holds what output 2 should be"),
     ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
     ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),

@@ -98,6 +98,16 @@ def centres_at_halves(depth, K):
     return holes(depth) * rays(depth.shape, K, 0.5)
 
 
+@wrong(QUESTION, "You are off by a pixel: the first one has u = v = 0, not 1.")
+def counted_from_one(depth, K):
+    return holes(depth) * rays(depth.shape, K, 1.0)
+
+
+@wrong(QUESTION, "u and x go with fx and cx, the first row of K; v and y go with fy and cy.")
+def focal_lengths_exchanged(depth, K):
+    return back_project(depth, K_of(K[1, 1], K[0, 0], K[0, 2], K[1, 2]))
+
+
 @wrong(QUESTION, "x is right and y is not: which entry of K belongs to the rows?")
 def one_focal_length(depth, K):
     return back_project(depth, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]))

@@ -73,6 +73,11 @@ def centres_forgotten(K, left, top, scale):
     return with_centre(K, scale, scale * (K[0, 2] - left), scale * (K[1, 2] - top))
 
 
+@wrong(QUESTION, "The principal point is in pixels, too: with twice as many it lies twice as far from the corner.")
+def focal_length_alone_scaled(K, left, top, scale):
+    return with_centre(K, scale, K[0, 2] - left, K[1, 2] - top)
+
+
 @wrong(QUESTION, "First cropped, then resized: left and top count pixels of the image before it was resized.")
 def resized_first(K, left, top, scale):
     half = (scale - 1.0) / 2.0

@@ -99,6 +99,14 @@ def largest_spread(P, sigma):
     return up(np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 2], centre)
 
 
+@wrong(QUESTION, "An eigenvector's sign is arbitrary: where n points down, turn n up, and d with it.")
+def not_turned_up(P, sigma):
+    w = 1.0 / sigma**2
+    centre = w @ P / w.sum()
+    n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
+    return n, float(n @ centre)
+
+
 @wrong(QUESTION, "A plane need not contain the origin: from which point are the directions measured?")
 def through_the_origin(P, sigma):
     return up(np.linalg.svd(P / sigma[:, None], full_matrices=False)[2][2], np.zeros(3))

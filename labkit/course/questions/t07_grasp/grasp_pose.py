@@ -102,6 +102,14 @@ def closing_crossed_with_the_approach(position, approach, closing):
     return pose(np.cross(y, z), y, z, position)
 
 
+@wrong(
+    QUESTION, "Leaving out z suits a hand from above alone: take off what lies along the approach, wherever it points."
+)
+def closing_made_level(position, approach, closing):
+    y, z = unit(closing * (1.0, 1.0, 0.0)), unit(approach)
+    return pose(np.cross(y, z), y, z, position)
+
+
 @wrong(QUESTION, "The hand goes where the approach says; it is the closing direction that gives way, not z.")
 def approach_bent(position, approach, closing):
     y = unit(closing)

@@ -148,6 +148,11 @@ def heights_of_the_base_frame(P, T_base_grasp, width, half, thickness, tips):
     return in_boxes(x, y, T_base_grasp[2, 3] - P[:, 2], width, half, thickness, tips)
 
 
+@wrong(QUESTION, "A finger begins at its pad and reaches outwards; yours has the pad in its middle.")
+def fingers_astride_their_pads(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width - thickness, half, thickness, tips)
+
+
 @wrong(QUESTION, "A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
 def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, np.inf, tips)
