@@ -27,8 +27,10 @@ QUESTION = Question(
     inputs=_pixels,
     by_hand=(
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
-        (np.array([0.7, 0.7, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),  # two alike; weight 3/7
+        # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
+        (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
     ),
     points=3,
 )
@@ -97,3 +99,12 @@ def one_too_many(p1, y, recall):
 @wrong(QUESTION, "A weight may be below 1: the surest pixels alone may keep the promise.")
 def at_least_one(p1, y, recall):
     return max(weight_for_recall(p1, y, recall), 1.0)
+
+
+@wrong(
+    QUESTION,
+    "In floats (1 - p) / p * p may be a hair less than 1 - p: leave the limit a hair of room, or sort the pixels.",
+)
+def tried_without_room(p1, y, recall):
+    odds = np.unique((1.0 - p1) / p1)
+    return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)
