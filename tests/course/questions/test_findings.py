@@ -200,6 +200,11 @@ def above_the_tips_or_beside_the_pads(P, T_base_grasp, width, half, thickness, t
     return int(((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) | (z <= tips)).sum())
 
 
+def slice_round_the_bases_origin(P, T_base_grasp, half):
+    T = T_base_grasp * np.array([1.0, 1.0, 1.0, 0.0])
+    return find("07_grasp.pad_slice").reference(P, T, half)
+
+
 def across_twice(T_base_grasp, middle):
     return (find("07_grasp.slip_across").reference(T_base_grasp, middle)[1],) * 2
 
@@ -275,6 +280,7 @@ NAMED = [
     ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
     ("06_back_projection.fit_plane", mean_not_divided, "Yours is always 0"),
     ("07_grasp.points_in_fingers", above_the_tips_or_beside_the_pads, "were an `or`"),
+    ("07_grasp.pad_slice", slice_round_the_bases_origin, "T_base_grasp were without its translation"),
     ("07_grasp.slip_across", across_twice, "Output 1 holds what output 2 should be"),
     ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
     ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),

@@ -17,7 +17,8 @@ def pad_slice(P, T_base_grasp, half):
 
 def _cloud_and_grasp(rng):
     P, T = cloud(rng), leaning_grasp(rng)
-    T[:3, 3] = P.mean(axis=0) + rng.uniform(-0.02, 0.02, 3)
+    P -= P.mean(axis=0)  # near the base's origin: whoever forgets the grasp's place still meets some points
+    T[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3)
     x, y, _ = ((P - T[:3, 3]) @ T[:3, :3]).T
     half = np.abs(x)[np.abs(y).argsort()[2]] + 0.003  # three points at least, but seldom the outermost
     return P, T, float(half)
