@@ -29,15 +29,15 @@ def draw_logits(figure: Figure, z0: float, z1: float, z2: float, y: int, h: floa
     left, right = figure.subplots(1, 2)
     left.bar(places - 0.2, p, 0.4, color=COLOURS[0], label="p = softmax(z)")
     left.bar(places + 0.2, places == y, 0.4, color=COLOURS[2], label="y, one-hot")
-    left.set(ylim=(0, 1.05), title=f"loss = -log p[{y}] = {cross_entropy(z, np.asarray(y)):.3f}")
+    left.set(ylim=(0, 1.2), title=f"loss = -log p[{y}] = {cross_entropy(z, np.asarray(y)):.3f}")
     right.bar(places - 0.2, grad, 0.4, color=COLOURS[0], label="p - y")
     right.bar(places + 0.2, numerical, 0.4, color=COLOURS[1], label=f"differences, h = {h:.0e}")
     right.axhline(0.0, color="0.4", linewidth=0.8)
     error = np.abs(grad - numerical).max()
-    right.set(ylim=(-1.05, 1.05), title=f"they differ by {error:.0e}; p - y sums to {abs(round(grad.sum(), 12)):.0f}")
+    right.set(ylim=(-1.05, 1.4), title=f"they differ by {error:.0e}; p - y sums to {abs(round(grad.sum(), 12)):.0f}")
     for axes in (left, right):
         axes.set_xticks(places, [f"z = {value:.2f}" for value in z])
-        axes.legend(fontsize=8, loc="upper right")
+        axes.legend(fontsize=8, loc="upper center", ncols=2)
 
 
 def logits(z: tuple[float, float, float] = (2.0, 1.0, -1.0), y: int = 1) -> Explorer:

@@ -23,6 +23,15 @@ def test_the_bars_are_p_and_y_and_their_difference():
     assert left.get_title() == "loss = -log p[1] = 1.349"
 
 
+@pytest.mark.parametrize("y", [0, 1, 2])
+def test_no_legend_covers_a_bar(y):
+    z = np.where(np.arange(3) == y, -8.0, 8.0)  # as wrong as the sliders allow: all bars are at their longest
+    for axes in gradient.logits(tuple(z), y).figure().axes:
+        axes.figure.canvas.draw()
+        bars = [bar.get_window_extent() for bar in axes.patches if bar.get_height()]
+        assert axes.get_legend().get_window_extent().count_overlaps(bars) == 0
+
+
 def test_a_step_that_is_too_small_or_too_large_spoils_the_differences():
     explorer = gradient.logits()
     errors = {}
