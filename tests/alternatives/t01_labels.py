@@ -30,14 +30,6 @@ def one_hot__torch(y, C):
     return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
 
 
-def labels_from_colours__as_numbers(rgb, palette):
-    """Each colour as one number of 24 bits."""
-    weights = np.array([65536, 256, 1])
-    picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
-    found = picture[..., None] == table
-    return (found * np.arange(len(table))).sum(axis=-1) + 255 * ~found.any(axis=-1)
-
-
 def class_shares__one_hot(y, C):
     n = np.einsum("vuc->c", one_hot__eye(y, C).astype(np.float64))
     return n / n.sum()

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from labkit.course.questions.t03_gradient.cross_entropy import one_hot
+from labkit.course.questions.t03_gradient.cross_entropy_grad import in_place
+
 
 def softmax__einsum(z):
     e = np.exp(z - np.maximum.reduce(z, axis=-1)[..., None])
@@ -12,26 +15,12 @@ def softmax__float32(z):
     return softmax__einsum(z.astype(np.float32))
 
 
-def cross_entropy__one_hot(z, y):
-    Y = (y[..., None] == np.arange(z.shape[-1])).astype(float)
-    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
-    return -(Y * log_p).sum()
-
-
 def cross_entropy__float32(z, y):
-    return cross_entropy__one_hot(z.astype(np.float32), y)
-
-
-def cross_entropy_grad__in_place(z, y):
-    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
-    counted = y != 255
-    rows = np.nonzero(counted)
-    p[(*rows, y[rows])] -= 1.0
-    return np.einsum("...c,...->...c", p, counted)
+    return one_hot(z.astype(np.float32), y)
 
 
 def cross_entropy_grad__float32(z, y):
-    return cross_entropy_grad__in_place(z.astype(np.float32), y)
+    return in_place(z.astype(np.float32), y)
 
 
 def softmax_backward__float32(p, g):

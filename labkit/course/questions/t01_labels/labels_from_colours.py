@@ -64,6 +64,15 @@ def class_by_class(rgb, palette):
     return y
 
 
+@way(QUESTION)
+def as_numbers(rgb, palette):
+    """Each colour as one number of 24 bits."""
+    weights = np.array([65536, 256, 1])
+    picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
+    found = picture[..., None] == table
+    return (found * np.arange(len(table))).sum(axis=-1) + 255 * ~found.any(axis=-1)
+
+
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 

@@ -48,6 +48,15 @@ def loops(z, y):
     return out
 
 
+@way(QUESTION)
+def in_place(z, y):
+    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
+    counted = y != 255
+    rows = np.nonzero(counted)
+    p[(*rows, y[rows])] -= 1.0
+    return np.einsum("...c,...->...c", p, counted)
+
+
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
