@@ -24,8 +24,9 @@ class MaskNode(Node):
         self.create_subscription(Image, "image", self.answer, qos_profile_sensor_data)  # best effort: the newest
 
     def answer(self, image: Image) -> None:
-        if image.encoding not in ("rgb8", "bgr8"):
-            self.get_logger().warning(f"expected rgb8 or bgr8, got {image.encoding}")
+        whole = len(image.data) == image.height * image.step and image.step >= 3 * image.width
+        if image.encoding not in ("rgb8", "bgr8") or not whole:
+            self.get_logger().warning(f"skipped {image.encoding}, {len(image.data)} bytes: no whole rgb8 or bgr8")
             return
         rows = np.frombuffer(image.data, np.uint8).reshape(image.height, image.step)
         pixels = rows[:, : 3 * image.width].reshape(image.height, image.width, 3)

@@ -134,10 +134,11 @@ def first_wrong(view: View) -> int:
 
 
 def at_hand(view: View) -> list[tuple[str, Values]]:
-    """Ingredients and steps that are numbers in the first wrong case and not the right output themselves."""
+    """Ingredients and steps that hold numbers in the first wrong case and are not the right output themselves."""
     first = first_wrong(view)
     known = [*ingredients(view), *view.steps]
-    known = [(name, v) for name, v in known if v[first] is not None and v[first].dtype.kind in "iufb" and v[first].size]
+    known = [(name, v) for name, v in known if v[first] is not None and v[first].dtype.kind in "iufb"]
+    known = [(name, v) for name, v in known if not np.isnan(v[first]).all()]  # an empty one is all NaN, too
     return [(name, v) for name, v in known if not view.same(v[first], view.expected[first])]
 
 

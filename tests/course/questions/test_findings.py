@@ -327,11 +327,17 @@ def source_cost_kept_whole(psi):
     return source, psi[..., 0] - psi.min(axis=2), psi.min(axis=2).sum()
 
 
+def one_nan_for_a_pose(stamps, positions, quaternions, t):
+    right = find("08_node.pose_at").reference(stamps, positions, quaternions, t)
+    return right if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
+
+
 MISLED = [  # what was said of them by accident
     ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
     ("02_crf.row_labels", walk_without_memory, "Where it is wrong: Wherever"),
     ("02_crf.terminal_capacities", source_cost_kept_whole, "times the place of"),
     ("08_node.decode_depth", three_bytes_each, "It fails only in cases where height"),
+    ("08_node.pose_at", one_nan_for_a_pose, "What you return is"),
     ("01_labels.labels_from_colours", without_blue, "where rgb is 0"),
     ("09_other_stacks.hsv_mask", every_channel_wraps, "largest value"),
     ("09_other_stacks.hsv_mask", every_channel_wraps, "upper is 255"),

@@ -142,6 +142,18 @@ def never_later(a, b, slop):
     return pairs(a, b, slop, lambda x, y: np.where(y <= x, x - y, far))
 
 
+@wrong(QUESTION, "Depth may be stamped a little earlier than colour as well as a little later.")
+def never_earlier(a, b, slop):
+    far = np.iinfo(np.int64).max
+    return pairs(a, b, slop, lambda x, y: np.where(y >= x, y - x, far))
+
+
+@wrong(QUESTION, "Where all stamps of b are too far, argmin is still a number, 0: what is asked for there?")
+def far_ones_left_in_argmin(a, b, slop):
+    far = np.iinfo(np.int64).max
+    return pairs(a, b, far, lambda x, y: np.where(np.abs(x - y) <= slop, np.abs(x - y), far))
+
+
 @wrong(QUESTION, "The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
 def signed_difference(a, b, slop):
     return pairs(a, b, slop, lambda x, y: x - y)

@@ -146,10 +146,15 @@ def turn_of_the_one_before(stamps, positions, quaternions, t):
 
 
 @wrong(QUESTION, "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?")
-def shares_exchanged(stamps, positions, quaternions, t):
-    i, _ = neighbours(stamps, t)
+def shares_exchanged(stamps, positions, quaternions, t, side="left"):
+    i = int(np.clip(np.searchsorted(stamps, t, side) - 1, 0, len(stamps) - 2))
     then = stamps[i] + stamps[i + 1] - t
     return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
+
+
+@wrong(QUESTION, QUESTION.misconceptions[-1].hint)  # at a stamp it goes on from there
+def shares_exchanged_after(stamps, positions, quaternions, t):
+    return shares_exchanged(stamps, positions, quaternions, t, side="right")
 
 
 @wrong(QUESTION, "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
@@ -159,3 +164,8 @@ def only_the_angle_made_shorter(stamps, positions, quaternions, t):
     angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
     q = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
     return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
+
+
+@wrong(QUESTION, "There are poses between the first and the last: which two stand round t?")
+def from_the_first_to_the_last(stamps, positions, quaternions, t):
+    return pose_at(stamps[[0, -1]], positions[[0, -1]], quaternions[[0, -1]], t)

@@ -116,3 +116,15 @@ def largest_of_x_y_z(R):
     q = right_quaternion(R)
     row = q * q[np.diagonal(R).argmax()]
     return row / np.linalg.norm(row)
+
+
+@wrong(QUESTION, "Half a turn has w = 0. A floor under w makes all four about 0 there: which square is the largest?")
+def floor_under_w(R):
+    w = 0.5 * np.sqrt(max(1.0 + np.trace(R), 1e-12))
+    return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w * w]) / (4.0 * w)
+
+
+@wrong(QUESTION, "Half a turn is not no turn, although R - R.T is 0 for both: what does R + R.T say of the axis?")
+def axis_of_half_turns_lost(R):
+    still = np.allclose(R, R.T)
+    return np.array([0.0, 0.0, 0.0, 1.0]) if still else right_quaternion(R)

@@ -117,3 +117,8 @@ def inverse_twice(features, mean, covariance, allowed):
 @wrong(QUESTION, "If no piece is allowed, the answer is 0, which is no piece's number.")
 def none_is_minus_one(features, mean, covariance, allowed):
     return choose_region(features, mean, covariance, allowed) or -1
+
+
+@wrong(QUESTION, "The diagonal holds variances, squares already, and two features go together: what is off it?")
+def divided_by_variances(features, mean, covariance, allowed):
+    return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)

@@ -139,3 +139,11 @@ def resize_half_to_even(labels, size):
     h, w = labels.shape
     rows, columns = ((np.arange(n) + 0.5) * old / n - 0.5 for n, old in ((H, h), (W, w)))
     return labels[np.rint(rows).astype(int)[:, None], np.rint(columns).astype(int)]
+
+
+@wrong(QUESTION, "A centre at 0.7 lies in old pixel 0, which reaches from 0 to 1: which way do you round?")
+def resize_rounded_centres(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = (np.rint((np.arange(n) + 0.5) * old / n).clip(0, old - 1) for n, old in ((H, h), (W, w)))
+    return labels[rows.astype(int)[:, None], columns.astype(int)]

@@ -115,8 +115,8 @@ def mask_without_bounds(hsv, lower, upper):
 
 @wrong(QUESTION, "Sorting the hues turns red into everything but red: which way round does the circle go?")
 def mask_with_swapped_bounds(hsv, lower, upper):
-    low, high = np.minimum(lower, upper), np.maximum(lower, upper)
-    return between(hsv, low, high).all(axis=-1)
+    h, (low, high) = hsv[..., 0], sorted((lower[0], upper[0]))
+    return (h >= low) & (h <= high) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
 @wrong(QUESTION, "Grey pixels have a hue too, any one: what excludes them?")
@@ -147,3 +147,14 @@ def mask_always_round(hsv, lower, upper):
 def all_three_go_round(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
     return np.where(lower > upper, above | below, above & below).all(axis=-1)
+
+
+@wrong(QUESTION, "When the hue goes round, saturation and value do not: `or` is for the hue alone.")
+def all_three_go_with_the_hue(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    return (above | below if lower[0] > upper[0] else above & below).all(axis=-1)
+
+
+@wrong(QUESTION, "Saturation and value have an upper bound, too.")
+def mask_without_upper_bounds(hsv, lower, upper):
+    return hsv_mask(hsv, lower, np.array([upper[0], 255, 255]))

@@ -97,7 +97,7 @@ def measured_with_open_boxes(pieces):
     return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(vu.max(axis=0)[::-1] + 1)))
 
 
-@wrong(QUESTION, "0 is no piece: with which is row 0?")
+@wrong(QUESTION, "0 is no piece: which piece is your first row of?")
 def measured_with_the_background(pieces):
     return measured(pieces, first=0)
 
