@@ -246,7 +246,10 @@ TABLE = {
         "{1} has no option {2}: look it up with `{1}?`."
     ),
     r"TypeError: (?:'\w+' object cannot be interpreted as an int|expected a sequence of int|slice indices must be)": (
-        "A length or a bound must be a whole number: / gives a float, // a whole number."
+        "A length, bound or axis must be whole: / gives a float, // a whole number; np.max(a, b) takes b for an axis."
+    ),
+    r"TypeError: return arrays must be of ArrayType": (
+        "Too many arguments: np.max and np.min take one array, as in np.max([a, b, c]), np.maximum and np.minimum two."
     ),
     r"TypeError: data type '(.*)' not understood": "There is no dtype {1}: are a field's name and its type exchanged?",
     r"TypeError: .*?expected at most (\d+) arguments?, got (\d+)": (

@@ -150,6 +150,8 @@ EXCEPTIONS = [
     (lambda: np.zeros(2)(0), "Round brackets"),
     (lambda: raised(1, 2), "y, P, R"),
     (lambda: np.zeros(2.0), "// a whole number"),
+    (lambda: np.max(1.0, 2.0), "takes b for an axis"),
+    (lambda: np.max(1.0, 2.0, 3.0), "np.max([a, b, c])"),
     (lambda: undefined_name, "No cell that counts here defines undefined_name"),
     (lambda: yy + 1, "No cell"),
     (lambda: np.argmx(1), "np.argmax"),

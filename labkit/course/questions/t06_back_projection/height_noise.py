@@ -88,6 +88,12 @@ def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth))
 
 
+@wrong(QUESTION, "x, y and z of the camera err together: turn the covariance, r3 J S J^T r3, not the three deviations.")
+def deviations_turned(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = np.stack(columns(u, v, d, K), axis=1)
+    return abs(T_base_cam[2, :3] @ np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth), axis=1))
+
+
 @wrong(QUESTION, "You count the depth alone, and along the optical axis: u and v err as well, and depth acts along q.")
 def depth_straight_ahead_alone(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return abs(T_base_cam[2, 2]) * sigma_depth
