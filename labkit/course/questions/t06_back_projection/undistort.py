@@ -38,7 +38,8 @@ QUESTION = Question(
     reference=undistort,
     inputs=_seen_pixels,
     by_hand=(
-        (np.array([[2.1, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.0])),  # 0.5 (1 + 0.4 * 0.25) = 0.55
+        # 0.5 (1 + 0.4 / 4 + 0.05 / 16) = 0.5515625; another root, a complex one, has a smaller real part
+        (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
         (np.array([[1.0, 2.02]]), K_SMALL, np.array([0.0, 0.16])),  # 0.5 (1 + 0.16 * 0.0625) = 0.505
         (np.array([[3.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
     ),
@@ -68,7 +69,7 @@ def newton(pixels, K, k):
     x = (pixels - c) / f
     seen = np.hypot(*x.T)
     r = seen.copy()
-    for _ in range(10):
+    for _ in range(20):
         r -= (r + k[0] * r**3 + k[1] * r**5 - seen) / (1 + 3 * k[0] * r**2 + 5 * k[1] * r**4)
     return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
 
