@@ -42,6 +42,7 @@ QUESTION = Question(
         (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
         (np.array([[1.0, 2.02]]), K_SMALL, np.array([0.0, 0.16])),  # 0.5 (1 + 0.16 * 0.0625) = 0.505
         (np.array([[3.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
+        (np.array([[1.95, 0.0]]), K_SMALL, np.array([-0.2, 0.0])),  # 0.5 (1 - 0.2 / 4) = 0.475; a larger root, too
     ),
     rtol=1e-5,
     points=4,
