@@ -12,16 +12,6 @@ def closing_yaw__across_the_long_axis(Sigma):
     return np.arctan2(y, x) - np.pi / 2
 
 
-def closing_yaw__loop(Sigma):
-    low, high = 0.0, np.pi
-    for _ in range(12):  # a fan of directions, ever finer round the one of least variance
-        fan = np.linspace(low, high, 61)
-        d = np.stack([np.cos(fan), np.sin(fan)])
-        best = fan[np.einsum("in,ij,jn->n", d, Sigma[:2, :2], d).argmin()]
-        low, high = best - (high - low) / 20, best + (high - low) / 20
-    return best
-
-
 def closing_yaw__svd(Sigma):
     axes, _, _ = np.linalg.svd(Sigma[:2, :2])
     return float(np.arctan2(*axes[::-1, -1]))

@@ -57,6 +57,17 @@ def formula(Sigma):
     return (long + np.pi / 2) % np.pi
 
 
+@way(QUESTION)
+def fan(Sigma):
+    low, high = 0.0, np.pi
+    for _ in range(12):  # a fan of directions, ever finer round the one of least variance
+        yaws = np.linspace(low, high, 61)
+        d = np.stack([np.cos(yaws), np.sin(yaws)])
+        best = yaws[np.einsum("in,ij,jn->n", d, Sigma[:2, :2], d).argmin()]
+        low, high = best - (high - low) / 20, best + (high - low) / 20
+    return best
+
+
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
