@@ -40,9 +40,10 @@ QUESTION = Question(
     by_hand=(
         # 0.5 (1 + 0.4 / 4 + 0.05 / 16) = 0.5515625; another root, a complex one, has a smaller real part
         (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
-        (np.array([[1.0, 2.02]]), K_SMALL, np.array([0.0, 0.16])),  # 0.5 (1 + 0.16 * 0.0625) = 0.505
+        (np.array([[1.0, 3.278828]]), K_SMALL, np.array([0.3, 0.1])),  # 0.7 (1 + 0.3 * 0.49 + 0.1 * 0.2401) = 0.819707
         (np.array([[3.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
-        (np.array([[1.95, 0.0]]), K_SMALL, np.array([-0.2, 0.0])),  # 0.5 (1 - 0.2 / 4) = 0.475; a larger root, too
+        # 0.5 (1 - 0.25 * 0.25) = 0.46875 and 0.7 (1 - 0.25 * 0.49) = 0.61425; each has a second, larger root
+        (np.array([[1.9375, 0.0], [2.2285, 0.0]]), K_SMALL, np.array([-0.25, 0.0])),
     ),
     rtol=1e-5,
     points=4,
