@@ -4,10 +4,10 @@
 
 Wrong answers are the mutants of references and alternatives (`mutants`); those of the same outputs count once.
 One is named by a sentence that is true of it and false for nine tenths of the question's others; where it is wrong does
-not count alone. "strictly" leaves out slips, which know the operators that are not held out, and properties; "at once"
-counts only the sentence that is said first. --survivors lists the mutants that are not refused, and on how many inputs
-each was compared with the reference: 10,000, random ones and such with ties and zeros on which all right answers agree,
-or fewer if time is up.
+not count alone. "strictly" leaves out slips, which know some of the operators, and properties; "at once" counts only
+the sentence that is said first. --survivors lists the mutants that are not refused, and on how many inputs each was
+compared with the reference: 10,000, random ones and such with ties and zeros on which all right answers agree, or fewer
+if time is up.
 """
 
 import argparse
@@ -58,7 +58,7 @@ class Named:
         return f"{self.wrong} wrong answers, {share}; {', '.join(f'{k} {n}' for k, n in self.kinds.most_common())}"
 
 
-def wrong_answers(question: Question, held_out: bool | None, sample: int | None) -> dict[str, list[object]]:
+def wrong_answers(question: Question, held_out: bool, sample: int | None) -> dict[str, list[object]]:
     """Mutants that are refused, by their names, with their outputs; those of the same outputs once."""
     cases, found = expected_cases(question, 0), {}
     right = [question.reference, *(a for a in alternatives(question) if "torch" not in a.__name__)]
@@ -83,7 +83,7 @@ def same(question: Question, outputs: Sequence[object], others: Sequence[object]
     return True
 
 
-def measure(question: Question, held_out: bool | None = None, sample: int | None = None) -> Named:
+def measure(question: Question, held_out: bool = False, sample: int | None = None) -> Named:
     """Diagnose the wrong answers to a question."""
     cases = expected_cases(question, 0)
     wrong = wrong_answers(question, held_out, sample)
@@ -171,7 +171,7 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("topics", nargs="*", default=TOPICS)
     parser.add_argument("--sample", type=int, help="wrong answers to each question; all if not given")
-    parser.add_argument("--held-out", action="store_true", help="only of the operators that slips do not know")
+    parser.add_argument("--held-out", action="store_true", help="of the operators that are held out")
     parser.add_argument("--unnamed", action="store_true", help="list those that are not named")
     parser.add_argument("--survivors", type=float, metavar="SECONDS", help="list those that are not refused, instead")
     given = parser.parse_args(arguments)
@@ -183,7 +183,7 @@ def main(arguments: Sequence[str]) -> None:
                 for found in survivors(question, given.survivors):
                     print(found, flush=True)
             continue
-        found = sum((measure(q, True if given.held_out else None, given.sample) for q in questions), Named())
+        found = sum((measure(q, given.held_out, given.sample) for q in questions), Named())
         print(f"{topic}: {found}", *(found.unnamed if given.unnamed else ()), sep="\n  ", flush=True)
         total += found
     if not given.survivors:
