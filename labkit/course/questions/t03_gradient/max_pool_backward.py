@@ -27,7 +27,7 @@ QUESTION = Question(
     inputs=draw,
     by_hand=(
         (np.array([[1.0, 7.0], [3.0, 2.0]]), np.array([[5.0]])),
-        (np.array([[-4.0, -2.0, 4.0, 1.0], [-3.0, -1.0, 0.0, 6.0]]), np.array([[2.0, -3.0]])),
+        (np.array([[-4.0, -2.0, 4.0, -1.0], [-3.0, -1.0, 0.0, 6.0]]), np.array([[2.0, -3.0]])),
         (np.array([[0.0, 1.0], [2.0, 3.0], [9.0, 8.0], [6.0, 7.0]]), np.array([[1.0], [-1.0]])),
     ),
     points=3,
@@ -142,3 +142,9 @@ def placed_without_the_block(x, g):
     for i, j in np.ndindex(g.shape):
         out[divmod(int(x[2 * i : 2 * i + 2, 2 * j : 2 * j + 2].argmax()), 2)] = g[i, j]
     return out
+
+
+@wrong(QUESTION, "The largest value of one block may stand in another that has a larger one: compare within the block.")
+def among_all_maxima(x, g):
+    """A pixel that equals the maximum of any block passes the gradient of its own."""
+    return np.isin(x, blocks(x).max(axis=2)) * to_all_four(x, g)

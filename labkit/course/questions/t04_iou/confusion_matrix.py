@@ -88,9 +88,7 @@ def prediction_ignored_too(y_true, y_pred, num_classes, ignore):
     return pair_count(rows[columns != ignore], columns[columns != ignore], num_classes)
 
 
-@wrong(
-    QUESTION, "A pixel whose true label is a class counts although `ignore` names that class: `ignore` need not be 255."
-)
+@wrong(QUESTION, "`ignore` need not be 255: where it is the number of a class, that class's true pixels do not count.")
 def only_what_is_no_class_ignored(y_true, y_pred, num_classes, ignore):
     return pair_count(*counted_pairs(y_true, y_pred, 255), num_classes)
 

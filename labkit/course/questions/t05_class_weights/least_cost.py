@@ -25,7 +25,7 @@ QUESTION = Question(
     inputs=_probabilities_and_costs,
     by_hand=(
         (np.array([0.8, 0.2]), np.array([[0.0, 1.0], [10.0, 0.0]])),  # 2 for saying 0, 0.8 for saying 1
-        (np.array([[0.5, 0.4, 0.1], [0.1, 0.4, 0.5]]), np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 9.0, 0.0]])),
+        (np.array([[0.5, 0.4, 0.1], [0.1, 0.4, 0.5]]), np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 9.0, 1.0]])),
         (np.array([[0.5, 0.4, 0.1]]), np.array([[0.0, 4.0, 1.0], [1.0, 0.0, 2.0], [8.0, 1.0, 0.0]])),
     ),
     rtol=0.0,
@@ -70,3 +70,8 @@ def saved_where_it_is_not_so(p, cost):
 @wrong(QUESTION, "You decide for the class that costs most.")
 def dearest(p, cost):
     return (p @ cost).argmax(axis=-1)
+
+
+@wrong(QUESTION, "To be right may cost something, too: the diagonal of cost need not be 0.")
+def right_for_nothing(p, cost):
+    return (p @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)
