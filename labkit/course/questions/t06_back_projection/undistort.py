@@ -40,10 +40,12 @@ QUESTION = Question(
     by_hand=(
         # 0.5 (1 + 0.4 / 4 + 0.05 / 16) = 0.5515625; another root, a complex one, has a smaller real part
         (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
-        (np.array([[1.0, 3.278828]]), K_SMALL, np.array([0.3, 0.1])),  # 0.7 (1 + 0.3 * 0.49 + 0.1 * 0.2401) = 0.819707
+        # 0.5 (1 - 0.6 / 4 + 0.4 / 16) = 0.4375 and 0.7 (1 - 0.6 * 0.49 + 0.4 * 0.2401) = 0.561428
+        (np.array([[1.875, 0.0], [1.0, 2.245712]]), K_SMALL, np.array([-0.6, 0.4])),
         (np.array([[3.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
-        # 0.5 (1 - 0.25 * 0.25) = 0.46875 and 0.7 (1 - 0.25 * 0.49) = 0.61425; each has a second, larger root
-        (np.array([[1.9375, 0.0], [2.2285, 0.0]]), K_SMALL, np.array([-0.25, 0.0])),
+        # 0.5 (1 + 0.7 / 4 - 0.3 / 16) = 0.578125 and 0.7 (1 + 0.7 * 0.49 - 0.3 * 0.2401) = 0.889679; beyond 53 degrees
+        # this lens folds, so each has a second, larger root
+        (np.array([[2.15625, 0.0], [2.779358, 0.0], [1.0, 2.3125]]), K_SMALL, np.array([0.7, -0.3])),
     ),
     rtol=1e-5,
     points=4,
