@@ -53,8 +53,9 @@ class DepthSensor:
 class StereoSensor:
     """Two cameras side by side, `baseline` metres apart: they measure the disparity f * baseline / d, in pixels.
 
-    Disparity errs by `noise` pixels (standard deviation), alike over patches of so many pixels, and comes in whole
-    `step`s. What the right camera cannot see behind something nearer gets no reading. No network was trained with it.
+    Disparity errs by `noise` pixels (standard deviation) at knots that are `patch` pixels apart. Between them the error
+    is interpolated, which leaves two thirds of it over an image. Disparity comes in whole `step`s. What the right
+    camera cannot see behind something nearer gets no reading. No network was trained with it.
     """
 
     baseline: float = 0.05
