@@ -263,7 +263,9 @@ def one_direction(view: View) -> str:
 def order_kept(view: View) -> str:
     """The right ones in order of size are yours in order of size, or the reverse."""
     e, g, wrong = wrong_numbers(view)
-    if e.size < 6 or np.unique(e).size < 6 or not np.isfinite(e).all() or not np.isfinite(g).all() or not wrong.any():
+    if e.size < 6 or np.unique(e).size < 6 or not np.isfinite(e).all() or not np.isfinite(g).all():
+        return ""
+    if np.count_nonzero(wrong) <= e.size / 2:  # those that are right keep the order anyway
         return ""
     sorted_by_right = g[np.argsort(e, kind="stable")]
     if (np.diff(sorted_by_right) > 0).all():

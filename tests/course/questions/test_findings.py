@@ -332,13 +332,19 @@ def one_nan_for_a_pose(stamps, positions, quaternions, t):
     return right if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
 
 
-def clipped_before_the_logarithm(z, y):
+def losses_of_clipped(z, y):
     p = find("03_gradient.softmax").reference(z[y != 255])
-    return -np.log(np.maximum(p[np.arange(len(p)), y[y != 255]], 1e-12)).sum()
+    return -np.log(np.maximum(p[np.arange(len(p)), y[y != 255]], 1e-12))
+
+
+def means_of_clipped(z, y, w):
+    loss, weights = losses_of_clipped(z, y), w[y[y != 255]]
+    return (weights * loss).mean(), np.average(loss, weights=weights)
 
 
 MISLED = [  # what was said of them by accident
-    ("03_gradient.cross_entropy", clipped_before_the_logarithm, "above 255"),
+    ("03_gradient.cross_entropy", lambda z, y: losses_of_clipped(z, y).sum(), "above 255"),
+    ("05_class_weights.two_means", means_of_clipped, "a number in the formula is another"),
     ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
     ("02_crf.row_labels", walk_without_memory, "Where it is wrong: Wherever"),
     ("02_crf.terminal_capacities", source_cost_kept_whole, "times the place of"),
