@@ -109,16 +109,23 @@ def names_in(node: ast.AST) -> set[str]:
 
 
 def made_of(definition: ast.FunctionDef) -> dict[str, set[str]]:
-    """For each name in a function, the arguments that its value is made of."""
+    """For each name in a function, and in functions defined in it, the arguments that its value is made of."""
     sources = {argument.arg: {argument.arg} for argument in definition.args.args}
+    inner = {node.name: node.args.args for node in ast.walk(definition) if isinstance(node, ast.FunctionDef)}
+    given = []  # names, and what they are given
+    for node in ast.walk(definition):
+        if isinstance(node, ast.Assign | ast.AugAssign | ast.For | ast.comprehension | ast.NamedExpr):
+            value = node.iter if isinstance(node, ast.For | ast.comprehension) else node.value
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            given.append((set().union(*map(names_in, targets)), names_in(value)))
+        elif isinstance(node, ast.Call):
+            called = inner.get(getattr(node.func, "id", ""), ())
+            given += [({to.arg}, names_in(value)) for to, value in zip(called, node.args, strict=False)]
     for _ in range(3):  # an assignment may use a name that is set further down, in a loop
-        for node in ast.walk(definition):
-            if isinstance(node, ast.Assign | ast.AugAssign | ast.For | ast.comprehension | ast.NamedExpr):
-                value = node.iter if isinstance(node, ast.For | ast.comprehension) else node.value
-                origin = set().union(*(sources.get(name, set()) for name in names_in(value)))
-                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-                for name in set().union(*map(names_in, targets)):
-                    sources[name] = sources.get(name, set()) | origin
+        for names, others in given:
+            origin = set().union(*(sources.get(name, set()) for name in others))
+            for name in names:
+                sources[name] = sources.get(name, set()) | origin
     return sources
 
 

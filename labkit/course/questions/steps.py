@@ -35,7 +35,7 @@ KINDS = {kind: f"the {name.removeprefix('a ')}" for kind, (name, _) in OPERATION
 }
 TOLD = (ast.BinOp, ast.Compare, ast.Subscript, ast.Call)  # kinds of steps whose value may be compared with outputs
 CALLED = ("min", "max", "abs", "int", "float", "len", "sum", "round")  # functions of Python that are steps
-LOOPS = (ast.For, ast.While, ast.ListComp, ast.GeneratorExp, ast.SetComp, ast.DictComp, ast.Lambda)
+LOOPS = (ast.For, ast.While, ast.ListComp, ast.GeneratorExp, ast.SetComp, ast.DictComp, ast.Lambda, ast.FunctionDef)
 STRANGE = ("were 1 over what it is", "were 1 minus what it is")  # of what is only compared, these explain by accident
 UNDONE = {  # of a function's result: that it was not taken
     "were squared": "sqrt",

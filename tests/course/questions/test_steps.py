@@ -71,6 +71,23 @@ TAKEN_OTHERWISE = [
 ]
 
 
+def distance(a, b):
+    """A function with another one in it."""
+
+    def length(row):
+        return (row**2).sum() ** 0.5
+
+    return length(a - b)
+
+
+def test_a_step_of_an_inner_function_is_named_by_what_that_is_called_with():
+    args = np.array([3.0, 0.0]), np.array([0.0, 4.0])
+    changed = dict(changed_steps(distance, args))
+    assert not [says for says in changed if "fixed numbers" in says]
+    taken = changed["Your output is right as if the result of sum, made of a and b, were taken with max."]
+    assert taken(args) == 4.0
+
+
 @pytest.mark.parametrize("number", range(len(TAKEN_OTHERWISE)))
 def test_a_step_that_is_taken_otherwise_is_named(number):
     wrong, says = TAKEN_OTHERWISE[number]
