@@ -36,7 +36,10 @@ QUESTION = Question(
     name="02_crf.icm_costs",
     reference=icm_costs,
     inputs=_pixel_of_a_model,
-    by_hand=tuple((_LABELS, *_MODEL, v, u) for v, u in _PIXELS),
+    by_hand=(
+        *((_LABELS, *_MODEL, v, u) for v, u in _PIXELS[:-1]),
+        (np.minimum(_LABELS, 1), *_MODEL, *_PIXELS[-1]),  # class 2 has a cost, though no pixel has it
+    ),
     points=3,
     forbidden=("labkit",),
 )
