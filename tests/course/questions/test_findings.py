@@ -57,7 +57,7 @@ def by_a_float_factor(labels, size):
 def with_a_finite_penalty(features, mean, covariance, allowed):
     off = features - mean
     squared = (off @ np.linalg.inv(covariance) * off).sum(axis=1)
-    return (squared + 1e3 * ~allowed).argmin() + 1 if allowed.any() else 0
+    return (squared + 1e9 * ~allowed).argmin() + 1 if allowed.any() else 0
 
 
 def blob_of_doubles(bgr, multiple):

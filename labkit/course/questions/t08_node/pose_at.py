@@ -45,6 +45,7 @@ _STAMPS = np.array([0, 40, 80, 200])
 _PLACES = np.array([[0.5, 0.0, 0.4], [0.6, 0.2, 0.4], [0.6, 0.2, 0.8], [0.2, 0.0, 0.8]])
 _TURNS = np.array([turned((0, 0, 1), a) for a in (0.0, 1.6, 1.6, 3.0)])
 _TURNS[3] = -_TURNS[3]  # the same rotation
+_TURNS[1:3] *= 1 + 4e-16  # equal, of length 1 but for rounding; the dot product is above 1
 _FURTHER = np.array([turned((0, 0, 1), np.radians(a)) for a in (0.0, 170.0, 190.0, 300.0)])
 
 
@@ -187,3 +188,10 @@ def only_the_angle_made_shorter(stamps, positions, quaternions, t):
 @wrong(QUESTION, "There are poses between the first and the last: which two stand round t?")
 def from_the_first_to_the_last(stamps, positions, quaternions, t):
     return pose_at(stamps[[0, -1]], positions[[0, -1]], quaternions[[0, -1]], t)
+
+
+@wrong(QUESTION, "Two turns are equal, yours is NaN: by 0 / 0, or as arccos of a dot b, which rounding lifts above 1?")
+def nan_between_equal_turns(stamps, positions, quaternions, t):
+    i, _ = neighbours(stamps, t)
+    p, q = pose_at(stamps, positions, quaternions, t)
+    return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)
