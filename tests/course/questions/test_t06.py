@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 
 from labkit import geometry
 from labkit.course.questions.question import of_topic
+from labkit.course.questions.run import judge
 
 QUESTIONS = of_topic("06_back_projection")
 SEEDS = pytest.mark.parametrize("seed", range(5))
@@ -25,6 +26,25 @@ def test_the_lens_is_taken_back_as_opencv_does_it(seed):
     stop = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
     expected = cv2.undistortPoints(pixels[:, None], K, np.array([*k, 0.0, 0.0]), P=K, criteria=stop)[:, 0]
     np.testing.assert_allclose(undistort(pixels, K, k), expected, atol=1e-6)
+
+
+@SEEDS
+def test_a_thousandth_of_a_pixel_passes(seed):
+    question = QUESTIONS["undistort"]
+    assert judge(question, lambda pixels, K, k: question.reference(pixels, K, k) + 9e-4, seed).passed
+    assert not judge(question, lambda pixels, K, k: question.reference(pixels, K, k) + 5e-3, seed).passed
+
+
+@SEEDS
+def test_guessing_that_stops_too_early_is_refused(seed):
+    def eight_rounds(pixels, K, k):
+        seen = ideal = (pixels - K[:2, 2]) / np.diagonal(K)[:2]
+        for _ in range(8):
+            r2 = (ideal**2).sum(axis=1, keepdims=True)
+            ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+        return K[:2, 2] + np.diagonal(K)[:2] * ideal
+
+    assert not judge(QUESTIONS["undistort"], eight_rounds, seed).passed
 
 
 @pytest.mark.parametrize("scale", [0.25, 0.5, 3.0])

@@ -112,6 +112,12 @@ def one_side_of_the_pad(P, T_base_grasp, half):
     return middle_and_width(y[(x >= 0.0) & (x <= half)])
 
 
+@wrong(QUESTION, "A single point between the pads is a slice, too: its middle is that point, and only its width is 0.")
+def one_point_is_nothing(P, T_base_grasp, half):
+    middle, width = pad_slice(P, T_base_grasp, half)
+    return (middle if width > 0.0 else 0.0), width
+
+
 @wrong(QUESTION, "Half of the width is a length, not a place: what is the mean of the outermost two?")
 def half_of_the_width(P, T_base_grasp, half):
     width = pad_slice(P, T_base_grasp, half)[1]
