@@ -24,9 +24,14 @@ def _picture(rng):
 
 
 _PALETTE = np.array([[0, 0, 0], [0, 0, 255], [255, 0, 0], [0, 255, 0]], np.uint8)
-
-# Two known colours, and three that make a known colour's number in base 255, 16 or 10, whichever channel comes first.
-_NEARLY = np.array([[[0, 0, 0], [0, 255, 0], [0, 1, 0], [0, 15, 15], [20, 53, 20]]], np.uint8)
+# Two known colours; then such as have a known one's number in a wrong base (255, 16, 10, 257, 100 ...).
+_NEARLY = np.array(
+    [
+        [[0, 0, 0], [0, 255, 0], [0, 1, 0], [0, 15, 15], [20, 53, 20]],
+        [[0, 0, 254], [254, 255, 1], [254, 255, 255], [0, 254, 128], [0, 2, 55]],
+    ],
+    np.uint8,
+)
 
 
 QUESTION = Question(

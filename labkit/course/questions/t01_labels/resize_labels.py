@@ -27,6 +27,7 @@ def _labels_and_size(rng):
 
 
 _ALL_DIFFERENT = np.random.default_rng(1).permutation(24).astype(np.uint8).reshape(4, 6)
+_LARGE = (np.add.outer(np.arange(301), 2 * np.arange(307)) % 5).astype(np.uint8)  # not every index is a uint8
 
 
 QUESTION = Question(
@@ -36,7 +37,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[1, 3]], np.uint8), 1, 4),
         (_ALL_DIFFERENT, 2, 3),  # a new centre falls between two old pixels
-        (np.array([[0, 1, 2, 3, 1], [3, 255, 1, 0, 2], [0, 0, 2, 1, 3]], np.uint8), 2, 3),
+        (_LARGE, 5, 6),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
     ),
     rtol=0.0,

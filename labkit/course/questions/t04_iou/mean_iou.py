@@ -36,7 +36,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),),  # class 1: 1/1 in one frame, 0/99 in the other
         (np.array([[[6, 2, 0], [0, 4, 0], [0, 0, 0]]]),),
-        (np.array([[[5, 0, 3], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]]]),),
+        (np.array([[[5, 0, 1], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]]]),),  # one pixel of class 2
     ),
     random_cases=6,
     points=2,
