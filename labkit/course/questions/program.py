@@ -16,7 +16,7 @@ import symtable
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 UNREADABLE = (SyntaxError, ValueError, RecursionError, MemoryError)  # what a parser raises for a stranger's text
 KEEPS_ITS_BODY = (
@@ -84,7 +84,7 @@ def program(
     (('cell 1', 'import numpy as np\\n'), ('cell 2', 'half = 0.5\\n'), ('f', 'def f(x):\\n    return half * np.abs(x)'))
     """
     try:
-        slicer = Slicer([Parsed(cell) for cell in cells], blanks, {*packages, *sys.stdlib_module_names}, forbidden)
+        slicer = Slicer([parsed(cell) for cell in cells], blanks, {*packages, *sys.stdlib_module_names}, forbidden)
         return slicer.cut(name, given or {}, latest)
     except Refused as reason:
         return Program(refused=str(reason))
@@ -189,6 +189,9 @@ class Parsed:
         """The text with only these statements, by their positions; other lines are blank."""
         lines = {n for i in chosen for n in range(self.statements[i].first, self.statements[i].last + 1)}
         return "\n".join(line if n in lines else "" for n, line in enumerate(self.text.split("\n"), start=1))
+
+
+parsed = lru_cache(maxsize=256)(Parsed)  # the programs of a notebook's answers are cut out of the same cells
 
 
 def without_magic(line: str) -> str | None:
