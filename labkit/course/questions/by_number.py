@@ -269,7 +269,7 @@ def order_kept(view: View) -> str:
         return ""
     sorted_by_right = g[np.argsort(e, kind="stable")]
     if (np.diff(sorted_by_right) > 0).all():
-        return "Yours grow where the right ones grow, in all cases together: a number in the formula is another."
+        return "Yours grow where the right ones grow, in all cases together: is a number in the formula wrong?"
     if (np.diff(sorted_by_right) < 0).all():
         return "Yours shrink where the right ones grow: is a sign or a quotient the wrong way round?"
     return ""

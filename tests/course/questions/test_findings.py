@@ -352,7 +352,7 @@ def means_of_clipped(z, y, w):
 
 MISLED = [  # what was said of them by accident
     ("03_gradient.cross_entropy", lambda z, y: losses_of_clipped(z, y).sum(), "above 255"),
-    ("05_class_weights.two_means", means_of_clipped, "a number in the formula is another"),
+    ("05_class_weights.two_means", means_of_clipped, "a number in the formula"),
     ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
     ("02_crf.row_labels", walk_without_memory, "Where it is wrong: Wherever"),
     ("02_crf.terminal_capacities", source_cost_kept_whole, "times the place of"),

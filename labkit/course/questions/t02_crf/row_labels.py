@@ -32,7 +32,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
-        (np.array([[0.0, 0.5, 3.0], [1.0, 0.9, 3.0], [3.0, 0.0, 2.5]]), np.array([0.8, 0.3])),
+        (np.array([[0.0, 3.0, 0.5], [1.0, 3.0, 0.9], [3.0, 2.5, 0.0]]), np.array([0.8, 0.3])),  # from class 0 to 2
         (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
         (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
     ),
@@ -129,6 +129,22 @@ def greedy(psi, w):
 def next_pairs_weight(psi, w):
     """The weight of the pair ahead, charged for the pair behind."""
     return row_labels(psi, np.roll(w, -1))
+
+
+@wrong(QUESTION, "Each pair has a weight of its own: is the first pair's weight paid for all pairs in yours?")
+def first_weight_for_all(psi, w):
+    return row_labels(psi, np.repeat(w[:1], len(w)))
+
+
+@wrong(QUESTION, "Classes have names, not sizes: from class 0 to class 2 costs w once, as from class 0 to class 1.")
+def class_steps(psi, w):
+    """Labels subtracted as if they were numbers."""
+    best, came, classes = psi[0], [], np.arange(psi.shape[1])
+    for costs, weight in zip(psi[1:], w, strict=True):
+        ways = best + weight * np.abs(classes[:, None] - classes)
+        came.append(ways.argmin(axis=1))
+        best = costs + ways.min(axis=1)
+    return traced(came, best.argmin())
 
 
 @wrong(QUESTION, "On the way back from pixel u: do you read the row of `came` that belongs to u, or to u - 1?")
