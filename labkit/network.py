@@ -28,7 +28,7 @@ from labkit.support.validation import require
 class SmallSegNet(nn.Module):
     """A compact encoder-decoder: two poolings, two transposed convolutions, 134,436 weights (topic 03).
 
-    A pixel's logits depend on about 20 pixels around it, so it knows colours and edges but not the shape of an object.
+    A pixel's logits depend on a window of 18 x 18 pixels, so it knows colours and edges but not the shape of an object.
     Height and width must be divisible by 4: else ValueError. `predict_probabilities` takes any size: it pads and crops.
 
     >>> SmallSegNet()(torch.zeros(1, 3, 8, 12)).shape
