@@ -82,15 +82,18 @@ def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     if all(isinstance(got, Problem) for got in outputs):
         return None
     for misconception in question.misconceptions:
-        told = False
+        told = by_output = stray = False
         for case, got in zip(cases, outputs, strict=True):
             own = output_of(misconception, case.args)
             if alike(question, own, got):
-                told = told or not alike(question, own, case.expected)
-            elif not (isinstance(got, Problem) and alike(question, own, case.expected)):
+                told_here = not alike(question, own, case.expected)
+                told, by_output = told or told_here, by_output or (told_here and not isinstance(got, Problem))
+            elif isinstance(got, Problem) and alike(question, own, case.expected):
+                stray = True
+            else:
                 break
         else:
-            if told:
+            if told and (by_output or not stray):  # exceptions here and there may be of any mistake
                 return misconception
     return None
 
@@ -121,7 +124,8 @@ def explained(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     args = tuple(case.args for case in cases)
     view = View(tuple(np.array(0.0) for _ in cases), failed, args, question.parameters, 0.0, 0.0)
     marks = ("is 255 somewhere", "is NaN somewhere")  # others are true of some cases by accident
-    where = next((where for where, _ in places(view) if where.startswith("in cases") and where.endswith(marks)), "")
+    known = ((where, masks) for where, masks in places(view) if where.startswith("in cases") and where.endswith(marks))
+    where = next((where for where, masks in known if masks == raised), "")  # there in every case
     if says and where:
         yield Sentence("exception", f"{says} It fails only {where}.")
     if says:
@@ -307,10 +311,9 @@ def broken_properties(question: Question, cases: Sequence[Case], outputs: Sequen
     """The properties of right answers that a wrong one does not have."""
     pairs = [(c, got) for c, got in with_outputs(question, cases, outputs) if finite(got) or not finite(c.expected)]
     for prop in question.properties:
-        for case, got in pairs:
-            if not fulfilled(prop, case, got):
-                yield Sentence("property", f"It should hold, but does not: {prop.says}.")
-                break
+        held = [fulfilled(prop, case, got) for case, got in pairs]
+        if not all(held):  # the first case is wrong, and mostly the one that is shown
+            yield Sentence("property", f"It should hold, but does not{' in every case' * held[0]}: {prop.says}.")
 
 
 def finite(output: object) -> bool:

@@ -115,7 +115,28 @@ def classes_of_the_labels(y, psi, weights, v, u):
     return find("02_crf.icm_costs").reference(y, psi[..., : y.max() + 1], weights, v, u)
 
 
+def twelve_links(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for link in range(-1, 12):
+        seen = segmentation >> 24 == link + 1
+        labels[seen] = class_of_body[segmentation[seen] & 0xFFFFFF]
+    return labels
+
+
+def shares_of_bytes(y, C):
+    n = np.array([(y == c).sum() for c in range(C)]).astype(np.uint8)
+    return n / n.sum()
+
+
+def close_to_the_largest(x, g):
+    largest, g = (a.repeat(2, axis=0).repeat(2, axis=1) for a in (x.reshape(len(g), 2, -1, 2).max(axis=(1, 3)), g))
+    return np.where(np.isclose(x, largest), g, 0.0)
+
+
 ACCEPTED = [
+    ("01_labels.labels_from_segmentation", twelve_links),
+    ("01_labels.class_shares", shares_of_bytes),
+    ("03_gradient.max_pool_backward", close_to_the_largest),
     *(("01_labels.labels_from_colours", by_a_number(base, order)) for base in (10, 16, 255) for order in (1, -1)),
     ("02_crf.icm_costs", classes_of_the_labels),
     ("05_class_weights.adjusted_grad", adjusted_by_one_maximum),
@@ -295,6 +316,7 @@ NAMED = [
     ("02_crf.terminal_capacities", lambda psi: (psi[..., 1], psi[..., 0], 0.0), "What you return is psi[..., 1]: what"),
     ("06_back_projection.fit_plane", plane_with_the_old_d, "n . m = d"),
     ("06_back_projection.undistort", lens_in_five_rounds, "put into the lens"),
+    ("03_gradient.softmax_backward", lambda p, g: p * g - p**2 * g.sum(axis=-1, keepdims=True), "p[c] twice"),
 ]
 
 
@@ -350,7 +372,37 @@ def means_of_clipped(z, y, w):
     return (weights * loss).mean(), np.average(loss, weights=weights)
 
 
+def one_link_taken_off(segmentation, class_of_body):
+    segmentation = np.where(segmentation < len(class_of_body), segmentation, segmentation - 2**24)
+    return np.where(segmentation >= 0, class_of_body[segmentation], 0)
+
+
+def rows_for_columns(y, C):
+    Y = np.zeros((*y.shape, C), int)
+    for v in range(len(y)):
+        for u in range(len(y)):
+            if y[v, u] < C:
+                Y[v, u, y[v, u]] = 1
+    return Y
+
+
+def channels_anywhere(rgb, palette):
+    y = np.full(rgb.shape[:2], 255)
+    for c, colour in enumerate(palette):
+        y[np.isin(rgb, colour).all(axis=2)] = c
+    return y
+
+
+def columns_of_all_pixels(z, y):
+    z, y = z[y != 255], y[y != 255]
+    return (np.logaddexp.reduce(z, axis=-1) - z[:, y].sum(axis=-1)).sum()
+
+
 MISLED = [  # what was said of them by accident
+    ("01_labels.labels_from_segmentation", one_link_taken_off, "all ones"),
+    ("01_labels.one_hot", rows_for_columns, "255"),
+    ("01_labels.labels_from_colours", channels_anywhere, "arange"),
+    ("03_gradient.cross_entropy", columns_of_all_pixels, "does not: a loss"),  # that of the case shown is positive
     ("03_gradient.cross_entropy", lambda z, y: losses_of_clipped(z, y).sum(), "above 255"),
     ("05_class_weights.two_means", means_of_clipped, "a number in the formula"),
     ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),

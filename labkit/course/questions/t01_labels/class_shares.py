@@ -16,7 +16,11 @@ QUESTION = Question(
     name="01_labels.class_shares",
     reference=class_shares,
     inputs=labels_and_classes,
-    by_hand=((np.array([[1, 1], [0, 3]], np.uint8), 5), (np.array([[1, 255, 255], [1, 1, 0]], np.uint8), 3)),
+    by_hand=(
+        (np.array([[1, 1], [0, 3]], np.uint8), 5),
+        (np.array([[1, 255, 255], [1, 1, 0]], np.uint8), 3),
+        (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (450, 50)), 4),  # more pixels than 16 bits count
+    ),
     points=1,
     properties=(Property("the shares add up to 1", lambda arguments, shares: np.isclose(np.sum(shares), 1.0)),),
 )

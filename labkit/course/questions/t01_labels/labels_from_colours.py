@@ -78,7 +78,7 @@ def as_numbers(rgb, palette):
     weights = np.array([65536, 256, 1])
     picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
     found = picture[..., None] == table
-    return (found * np.arange(len(table))).sum(axis=-1) + 255 * ~found.any(axis=-1)
+    return np.where(found.any(axis=-1), found.argmax(axis=-1), 255)
 
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

@@ -31,7 +31,7 @@ QUESTION = Question(
     inputs=_raw_mask,
     by_hand=(
         (np.array([[-1, 0, 1], [2, 1 + (1 << 24), 2 + (3 << 24)]], np.int32), np.array([1, 3, 2], np.uint8)),
-        (np.array([[65537, 65538 + (1 << 24)]], np.int32), (np.arange(5, 65545) // 7 % 4).astype(np.uint8)),  # many
+        (np.array([[65537, 65538 + (127 << 24)]], np.int32), (np.arange(5, 65545) // 7 % 4).astype(np.uint8)),  # many
         (np.array([[5 << 24, 3 + (12 << 24)]], np.int32), np.array([2, 0, 0, 255], np.uint8)),  # a body not judged
     ),
     rtol=0.0,

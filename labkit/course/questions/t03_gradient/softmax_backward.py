@@ -92,6 +92,12 @@ def others_unweighted(p, g):
     return p * (1.0 - p) * g - p * (g.sum(axis=-1, keepdims=True) - g)
 
 
+@wrong(QUESTION, "For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: yours has p[c] twice and no p[k].")
+def others_squared(p, g):
+    """The terms with k other than c have p[c] in the place of p[k]."""
+    return p * (1.0 - p) * g - p**2 * (g.sum(axis=-1, keepdims=True) - g)
+
+
 @wrong(QUESTION, "p has been through the softmax already: do not put it through another one.")
 def softmax_of_p(p, g):
     """p taken for logits."""
