@@ -269,7 +269,10 @@ def order_kept(view: View) -> str:
         return ""
     sorted_by_right = g[np.argsort(e, kind="stable")]
     if (np.diff(sorted_by_right) > 0).all():
-        return "Yours grow where the right ones grow, in all cases together: is a number in the formula wrong?"
+        return (
+            "Yours grow where the right ones grow, in all cases together: is a number in the formula wrong, or is too "
+            "much counted?"
+        )
     if (np.diff(sorted_by_right) < 0).all():
         return "Yours shrink where the right ones grow: is a sign or a quotient the wrong way round?"
     return ""

@@ -31,7 +31,7 @@ QUESTION = Question(
         (np.array([[0, 0, 1]], np.uint8), np.array([[0, 1, 1]], np.uint8), 2, 255),
         (np.array([[2, 255], [2, 1], [0, 2]], np.uint8), np.array([[1, 0], [1, 1], [0, 2]], np.uint8), 3, 255),
         (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),
-        (np.zeros((20, 30), np.uint8), np.ones((20, 30), np.uint8), 2, 255),  # more than a byte can count
+        (np.zeros((250, 280), np.uint8), np.ones((250, 280), np.uint8), 2, 255),  # more than two bytes can count
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
     ),
     random_cases=6,

@@ -127,7 +127,8 @@ def one_maximum_for_all(z, y, shares, tau):
 
 @wrong(QUESTION, "tau multiplies the logarithm: log(tau * shares) adds the same to all classes, and so nothing.")
 def tau_inside_the_logarithm(z, y, shares, tau):
-    return adjusted_grad(z, y, shares, 1.0)
+    p, Y, counted = parts(z + np.log(tau * shares), y)
+    return (p - Y) * counted
 
 
 @wrong(QUESTION, "A share stands in front of your gradient, as a weight would: here it only moves the logits.")

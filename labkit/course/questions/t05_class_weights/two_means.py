@@ -21,7 +21,7 @@ QUESTION = Question(
     inputs=draw_pixels,
     by_hand=(
         (TOY, np.array([1], np.uint8), np.array([1.0, 10.0, 3.0])),
-        (SURE, np.array([0, 255], np.uint8), np.array([2.0, 5.0, 0.5])),
+        (np.concatenate([SURE, TOY]), np.array([0, 255, 1], np.uint8), np.array([2.0, 5.0, 0.5])),  # not one maximum
     ),
     forbidden=("scipy", "torch"),
 )
@@ -80,3 +80,11 @@ def first_mean_not_weighted(z, y, w):
 def logits_weighted(z, y, w):
     loss, weight = losses_and_weights(z * w, y, w)
     return float(loss.mean()), float(loss.sum() / weight.sum())
+
+
+@wrong(QUESTION, "Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has log 0.")
+def one_maximum_for_all(z, y, w):
+    z, y = z[y != 255], y[y != 255]
+    z = z - z.max()
+    loss, weight = np.log(np.exp(z).sum(axis=-1)) - z[np.arange(len(y)), y], w[y]
+    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())

@@ -31,6 +31,8 @@ QUESTION = Question(
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
         # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
+        # Four of five, weight 1. In floats 5 * (1 - 0.8) < 1: that none may be missed is wrong.
+        (np.array([0.9, 0.8, 0.6, 0.5, 0.2]), np.ones(5, bool), 0.8),
     ),
     points=3,
 )
@@ -108,3 +110,9 @@ def at_least_one(p1, y, recall):
 def tried_without_room(p1, y, recall):
     odds = np.unique((1.0 - p1) / p1)
     return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)
+
+
+@wrong(QUESTION, "In floats 5 * (1 - 0.8) is a hair less than 1: leave a hair of room, or count what must be found.")
+def missed_without_room(p1, y, recall):
+    last = np.sort(p1[y])[int(np.count_nonzero(y) * (1.0 - recall))]
+    return float((1.0 - last) / last)
