@@ -122,13 +122,13 @@ def remembering() -> Iterator[None]:
         yield
 
 
-def survivors(question: Question, seconds: float) -> Iterator[str]:
+def survivors(question: Question, seconds: float, held_out: bool = False) -> Iterator[str]:
     """Each mutant that is not refused, and where it differs from the reference, or that it does not."""
     cases = [case for seed in SEEDS for case in expected_cases(question, seed)]
     right = [question.reference, *(a for a in alternatives(question) if "torch" not in a.__name__)]
     alive = {}
     for function in right:
-        for mutant in mutants(function):
+        for mutant in mutants(function, held_out):
             outputs, _ = run(mutant.function, [case.args for case in cases], 1.0)
             if not any(compare(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)):
                 alive[f"{question.name}: {function.__name__}, {mutant.name}"] = mutant.function
@@ -180,7 +180,7 @@ def main(arguments: Sequence[str]) -> None:
         questions = of_topic(topic).values()
         if given.survivors:
             for question in questions:
-                for found in survivors(question, given.survivors):
+                for found in survivors(question, given.survivors, given.held_out):
                     print(found, flush=True)
             continue
         found = sum((measure(q, given.held_out, given.sample) for q in questions), Named())

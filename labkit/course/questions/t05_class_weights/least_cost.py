@@ -37,7 +37,7 @@ QUESTION = Question(
 
 @way(QUESTION)
 def loops(p, cost):
-    said = np.empty(p.shape[:-1], int)
+    said = np.zeros(p.shape[:-1], int)
     for place in np.ndindex(said.shape):
         prices = [sum(p[place][i] * cost[i, j] for i in range(len(cost))) for j in range(len(cost))]
         said[place] = prices.index(min(prices))
