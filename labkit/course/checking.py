@@ -65,14 +65,16 @@ def check(name: str, answer: object) -> Callable:
     printed = Printed()
     verdict = judged(question, answer, printed)
     shown = describe(question, verdict, printed)
+    if jupyter() is not None and not is_of_the_notebook(question, answer):
+        shown.lines += (f"This is another function than {question.function} of your notebook, which will be graded.",)
     if verdict.problem is not None and verdict.problem.kind == "unanswered":
         shown.lines += ("The kit's function takes its place below.",)
     return conclude(shown, answer if verdict.passed else question.reference, verdict.passed)
 
 
 def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:
-    """The verdict on an answer: in Jupyter on its program, anywhere else on the function itself."""
-    cut = program_here(question)
+    """The verdict on an answer: on its program if the notebook has it under its name, else on the function itself."""
+    cut = program_here(question) if is_of_the_notebook(question, answer) else None
     if cut is not None and cut.refused:
         return Verdict(Problem("refused", cut.refused), None, "")
     if cut is not None:
@@ -84,15 +86,19 @@ def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:
     return judge(question, answer, PUBLIC_SEED, LIMIT_S, printed)
 
 
+def is_of_the_notebook(question: Question, answer: Callable) -> bool:
+    """Whether an answer is the function that the notebook has under the question's name: the grader takes no other."""
+    shell = jupyter()
+    return shell is not None and shell.user_ns.get(question.function) is answer
+
+
 def program_here(question: Question) -> Program | None:
     """The program of an answer among the cells that were run in this notebook.
 
-    None outside of a notebook, and where the kernel's history does not have the answer: nbval keeps none. Other blanks
-    that it calls are the student's, or the kit's where a check has put that in their place.
+    None where the kernel's history does not have the answer: nbval keeps none. Other blanks that it calls are the
+    student's, or the kit's where a check has put that in their place.
     """
     shell = jupyter()
-    if shell is None:
-        return None
     cells = [Cell(source) for source in shell.history_manager.input_hist_raw]
     blanks = of_topic(question.topic)
     given = {name: other.source for name, other in blanks.items() if shell.user_ns.get(name) is other.reference}

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 
 from labkit.course.questions.t08_node.pose_at import neighbours, outside
-from labkit.course.questions.t08_node.quaternion import from_trace, right_quaternion
+from labkit.course.questions.t08_node.quaternion import right_quaternion
 
 
 def decode_depth__struct(data, height, width, step, is_bigendian):
@@ -66,19 +66,7 @@ def quaternion__scipy(R):
     return -right_quaternion(R)  # the same rotation
 
 
-def quaternion__cases(R):
-    i = int(np.argmax([*np.diag(R), np.trace(R)]))
-    if i == 3:
-        return from_trace(R)
-    j, k = (i + 1) % 3, (i + 2) % 3
-    q = np.zeros(4)
-    q[i] = 0.5 * np.sqrt(1.0 + R[i, i] - R[j, j] - R[k, k])
-    q[j], q[k] = (R[i, j] + R[j, i]) / (4 * q[i]), (R[i, k] + R[k, i]) / (4 * q[i])
-    q[3] = (R[k, j] - R[j, k]) / (4 * q[i])
-    return q
-
-
 def quaternion__torch(R):
     import torch
 
-    return torch.tensor(quaternion__cases(R), dtype=torch.float32)
+    return torch.tensor(right_quaternion(R), dtype=torch.float32)

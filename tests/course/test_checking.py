@@ -197,6 +197,7 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
         "def iou(n):\n    i = np.diag(n)\n    with np.errstate(invalid='ignore'):\n"
         "        return i / (n.sum(0) + n.sum(1) - i)",
         "mine = iou\niou = check('04_iou.iou', iou)\nprint(iou is mine)",
+        "other = check('04_iou.iou', lambda n: np.diag(n) / n.sum(0))\nprint(other is iou)",
     ]
     notebook = new_notebook(cells=[new_code_cell(cell) for cell in cells])
     NotebookClient(
@@ -204,12 +205,14 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
     ).execute()
     outputs = [cell.outputs for cell in notebook.cells]
     shown = [[o.data["text/plain"] for o in cell if o.output_type == "display_data"] for cell in outputs]
-    assert [len(texts) for texts in shown] == [0, 0, 1, 0, 0, 1, 0, 1, 0, 1]
+    assert [len(texts) for texts in shown] == [0, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1]
     assert shown[2][0].startswith("○ iou: not answered yet")
     assert "[1. 1.]" in outputs[2][-1].text
     assert "IndexError" in shown[5][0] and "line 2:  return n[99]" in shown[5][0]
     assert "did not return in time" in shown[7][0]
     assert shown[9][0].startswith("✔ iou is right") and outputs[9][-1].text == "True\n"
+    assert shown[10][0].startswith("✘ iou: ") and "another function than iou of your notebook" in shown[10][0]
+    assert outputs[10][-1].text == "False\n"  # not the notebook's, which is right: it was not asked about
     assert "text/html" in outputs[9][0].data
     assert not [o for cell in outputs for o in cell if o.output_type == "stream" and o.name == "stderr"]
     nbformat.validate(notebook)

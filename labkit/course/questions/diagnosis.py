@@ -25,7 +25,7 @@ from labkit.course.questions.relations import ARRANGED, COMBINED, LOOSE, Relatio
 from labkit.course.questions.slips import Slip, slips
 from labkit.course.questions.steps import changed_steps, steps
 
-MOST_TRIES = 4000  # functions that are tried for one answer: a number, so that all machines say the same
+MOST_TRIES = 8000  # functions that are tried for one answer: a number, so that all machines say the same
 ENDLESS = "A loop does not end, or has far too many turns: what changes in each turn, and when does `while` stop?"
 
 
