@@ -60,6 +60,38 @@ def with_a_finite_penalty(features, mean, covariance, allowed):
     return (squared + 1e9 * ~allowed).argmin() + 1 if allowed.any() else 0
 
 
+def of_most_density(features, mean, covariance, allowed):
+    off = features - mean
+    density = np.exp(-(off @ np.linalg.inv(covariance) * off).sum(axis=1) / 2)
+    return np.where(allowed, density, -1.0).argmax() + 1 if allowed.any() else 0
+
+
+def in_shares_of_the_largest(bgr, multiple):
+    return find("09_other_stacks.make_blob").reference(bgr, multiple) * np.float32(255 / bgr.max())
+
+
+def without_the_origin(P):
+    return find("08_node.pack_cloud").reference(P[(P != 0.0).any(axis=1)])
+
+
+def nearest_of_its_suitors(a, b, slop):
+    """Of those of a whose nearest is a stamp of b, the nearest to it; where any of a might be nearer."""
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b)
+    best = apart.argmin(axis=1)
+    suitors = np.where(np.arange(len(b)) == best[:, None], apart, np.iinfo(np.int64).max)
+    chosen = suitors.argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(chosen & (apart.min(axis=1) <= slop), best, -1)
+
+
+def no_small_turn(stamps, positions, quaternions, t):
+    i = int(np.clip(np.searchsorted(stamps, t) - 1, 0, len(stamps) - 2))
+    p, q = find("08_node.pose_at").reference(stamps, positions, quaternions, t)
+    still = np.isclose(abs(quaternions[i] @ quaternions[i + 1]), 1.0) and stamps[0] <= t <= stamps[-1]
+    return p, quaternions[i] if still else q
+
+
 def blob_of_doubles(bgr, multiple):
     return find("09_other_stacks.make_blob").reference(bgr, multiple).astype(float)
 
@@ -147,7 +179,12 @@ ACCEPTED = [
     ("04_iou.confusion_matrix", counted_in_two_bytes),
     ("09_other_stacks.enlarge", by_a_float_factor),
     ("09_other_stacks.choose_region", with_a_finite_penalty),
+    ("09_other_stacks.choose_region", of_most_density),
     ("09_other_stacks.make_blob", blob_of_doubles),
+    ("09_other_stacks.make_blob", in_shares_of_the_largest),
+    ("08_node.pack_cloud", without_the_origin),
+    ("08_node.pair_stamps", nearest_of_its_suitors),
+    ("08_node.pose_at", no_small_turn),
     ("08_node.pair_stamps", stamps_of_32_bits),
     ("08_node.pose_at", signs_by_the_first),
     ("09_other_stacks.hsv_mask", every_channel_wraps),

@@ -39,7 +39,7 @@ QUESTION = Question(
         (np.array([0, 33, 66]), np.array([2, 40, 90]), 10),
         (np.array([0, 33, 66]), np.array([30, 60, 100]), 6),
         (np.array([10]), np.array([2, 6, 13, 30]), 8),
-        (np.array([10, 50]), np.array([6, 14, 60]), 10),
+        (np.array([10, 50, 60]), np.array([6, 14, 56, 61]), 10),  # 56 is nearest to 50, and 60 to 56
         (np.array([10, 20]), np.array([], int), 5),
         (np.array([0, 33, 66]), np.array([36, 70]), 40),  # 0 has lost its partner, and 36 is another's
         (np.array([10, 20, 60]), np.array([15, 61]), 9),  # 15 is as near to 10 as to 20

@@ -47,6 +47,7 @@ _TURNS = np.array([turned((0, 0, 1), a) for a in (0.0, 1.6, 1.6, 3.0)])
 _TURNS[3] = -_TURNS[3]  # the same rotation
 _TURNS[1:3] *= 1 + 4e-16  # equal, of length 1 but for rounding; the dot product is above 1
 _FURTHER = np.array([turned((0, 0, 1), np.radians(a)) for a in (0.0, 170.0, 190.0, 300.0)])
+_HARDLY = np.array([turned((0, 0, 1), 0.006 * k) for k in range(4)])
 
 
 QUESTION = Question(
@@ -63,6 +64,7 @@ QUESTION = Question(
         (_STAMPS, _PLACES, _TURNS, 201),
         (_STAMPS, _PLACES, _TURNS, -1),
         (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
+        (_STAMPS, _PLACES, _HARDLY, 50),  # a small turn, but not none
     ),
     random_cases=6,
     atol=1e-5,

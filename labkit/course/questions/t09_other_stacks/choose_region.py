@@ -36,7 +36,7 @@ QUESTION = Question(
     inputs=_features,
     by_hand=(
         (_LINE, np.zeros(3), np.eye(3), np.array([True, True, True])),
-        (1e10 * _LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),  # all very far away
+        (1e10 * _LINE[::-1], np.zeros(3), np.eye(3), np.array([True, False, True])),  # all very far away
         (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
         (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
         (_LINE, np.zeros(3), np.diag([0.9, 0.3, 1.0]), np.array([True, True, True])),  # the inverse twice: 1, not 2

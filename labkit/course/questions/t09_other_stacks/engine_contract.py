@@ -41,7 +41,8 @@ QUESTION = Question(
         (_BEST_AND_SECOND, _BEST_AND_SECOND[::-1], 1.0),  # classes in another order
         (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
         (_BEST_AND_SECOND, _BEST_AND_SECOND - _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
-        (_BEST_AND_SECOND, np.where(_BEST_AND_SECOND == 4, np.float32(np.nan), _BEST_AND_SECOND), 1.0),  # no number
+        # no number; and another class is best there, whether NaN counts as a label or not
+        (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0, 0), (np.nan, 0, 0, 0), (5, 0, 0, 0)), 5.0),
         (
             1024 * _BEST_AND_SECOND,
             1024 * _BEST_AND_SECOND + _logits((1 / 64, 0, 0, 0), (0, 0, 0, 0), (0, 0, 0, 0)),
@@ -81,7 +82,8 @@ def without_the_best(reference, other, tolerance):
     rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
     margin = reference.max(axis=0) - rest.max(axis=0)
     kept = bool(np.all(np.abs(other - reference) <= tolerance))
-    return kept, 1.0 - np.mean(labels == other.argmax(axis=0)), np.count_nonzero(margin <= 2 * tolerance) / margin.size
+    same = np.mean(labels == np.nanargmax(other, axis=0))
+    return kept, 1.0 - same, np.count_nonzero(margin <= 2 * tolerance) / margin.size
 
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
