@@ -19,7 +19,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[1, 1], [0, 3]], np.uint8), 5),
         (np.array([[1, 255, 255], [1, 1, 0]], np.uint8), 3),
-        (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (450, 50)), 4),  # more pixels than 16 bits count
+        (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (25, 4)), 4),  # more pixels of a class than a byte counts
     ),
     points=1,
     properties=(Property("the shares add up to 1", lambda arguments, shares: np.isclose(np.sum(shares), 1.0)),),
