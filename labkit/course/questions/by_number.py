@@ -111,7 +111,7 @@ def factor(view: View) -> str:
     told = [k for k in factors if k is not None and np.isfinite(k)]
     if not told or any(k is not None and not np.isfinite(k) for k in factors) or max(map(abs, told)) == 0.0:
         return ""
-    if all(np.isclose(k, 1.0, rtol=view.rtol, atol=0) for k in told) or not enough(view, told):
+    if all(np.isclose(k, 1.0, rtol=max(5e-4, view.rtol), atol=0) for k in told) or not enough(view, told):  # "times 1"
         return ""
     if np.allclose(told, told[0], rtol=max(1e-4, view.rtol), atol=0.0):
         k = told[0]
@@ -219,7 +219,7 @@ def straight_line(view: View) -> str:
     if np.unique(e[use]).size < 4 or any(a.dtype.kind == "b" for a in (*view.expected, *view.got)):
         return ""
     k, c = np.polyfit(e[use], g[use], 1)
-    if abs(k) < 1e-9 or abs(k - 1) < 1e-9 or not view.gives(lambda e: k * e + c):
+    if abs(k) < 1e-9 or abs(k - 1) < 5e-4 or not view.gives(lambda e: k * e + c):
         return ""
     return f"Each of yours is {k:.4g} times the right value {'plus' if c > 0 else 'minus'} {abs(c):.4g}."
 

@@ -135,6 +135,8 @@ def operation(node: ast.BinOp) -> Changes:
     yield "had its two sides exchanged", lambda compute, a, b: compute(b, a)
     for kind in sorted(OPERATIONS, key=lambda kind: issubclass(kind, BITS) != isinstance(node.op, BITS)):
         name, other = OPERATIONS[kind]
+        if isinstance(node.op, ast.MatMult) and kind is ast.Mult:
+            name = "taken number by number"
         if kind is not type(node.op):
             yield f"were {name}", lambda compute, a, b, other=other: other(a, b)
 

@@ -165,12 +165,18 @@ def close_to_the_largest(x, g):
     return np.where(np.isclose(x, largest), g, 0.0)
 
 
+def as_tall_as_seen(P, table_z, palm, tips, clearance):
+    """The top is taken for the table plus how tall the object looks, though its foot may be hidden."""
+    return max(table_z + np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
 ACCEPTED = [
     ("01_labels.labels_from_segmentation", twelve_links),
     ("01_labels.class_shares", shares_of_bytes),
     ("03_gradient.max_pool_backward", close_to_the_largest),
     *(("01_labels.labels_from_colours", by_a_number(base, order)) for base in (10, 16, 255) for order in (1, -1)),
     ("02_crf.icm_costs", classes_of_the_labels),
+    ("07_grasp.grasp_height", as_tall_as_seen),
     ("05_class_weights.adjusted_grad", adjusted_by_one_maximum),
     ("03_gradient.cross_entropy_grad", gradient_by_one_maximum),
     ("01_labels.labels_from_segmentation", mask_of_16_bits),
@@ -328,7 +334,28 @@ def ignored_as_the_last_class(z, y, w):
     return find("05_class_weights.two_means").reference(z, np.minimum(y, len(w) - 1), w)
 
 
+def without_border(side):
+    """One of the four sides of the fingers' boxes is left out: x, the pad, the outer side or the tips."""
+
+    def count(P, T_base_grasp, width, half, thickness, tips):
+        x, y, z = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+        room = np.array([half - np.abs(x), np.abs(y) - width / 2, width / 2 + thickness - np.abs(y), tips - z])
+        return int(((room >= 0).all(axis=0) & (room[side] != 0)).sum())
+
+    return count
+
+
+def length_of_the_ray_times_r33(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = np.linalg.inv(K) @ np.array([[d, 0, u], [0, d, v], [0, 0, 1]])
+    return np.linalg.norm(J * T_base_cam[2, :3] * [sigma_pixel, sigma_pixel, sigma_depth])
+
+
 NAMED = [
+    ("07_grasp.points_in_fingers", without_border(0), "made of P, T_base_grasp and half were made with <"),
+    ("07_grasp.points_in_fingers", without_border(1), "made of P, T_base_grasp and width were made with >"),
+    ("07_grasp.points_in_fingers", without_border(2), "made of P, T_base_grasp, thickness and width were made with <"),
+    ("07_grasp.points_in_fingers", without_border(3), "made of P, T_base_grasp and tips were made with <"),
+    ("06_back_projection.height_noise", length_of_the_ray_times_r33, "were taken number by number"),
     ("08_node.decode_depth", pixels_in_a_row, "slides sideways"),
     ("08_node.pair_stamps", stamps_instead_of_numbers, "not a stamp"),
     ("08_node.pose_at", nobody_knows_at_the_ends, "in more cases than are asked for"),
@@ -440,7 +467,13 @@ def columns_of_all_pixels(z, y):
     return (np.logaddexp.reduce(z, axis=-1) - z[:, y].sum(axis=-1)).sum()
 
 
+def nearly_right(depth, K):
+    return 1.0003 * find("06_back_projection.back_project").reference(depth, K)
+
+
 MISLED = [  # what was said of them by accident
+    ("06_back_projection.back_project", nearly_right, "times 1,"),
+    ("06_back_projection.back_project", nearly_right, "is 1 times"),
     ("01_labels.labels_from_segmentation", one_link_taken_off, "all ones"),
     ("01_labels.one_hot", rows_for_columns, "255"),
     ("01_labels.labels_from_colours", channels_anywhere, "arange"),

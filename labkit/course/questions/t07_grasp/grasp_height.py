@@ -22,7 +22,7 @@ def _heights(rng):
 
 
 def _upright(low, high):
-    return np.array([[0.5, 0.1, low], [0.5, 0.1, high], [0.52, 0.1, 0.5 * (low + high)]])
+    return np.array([[0.5, 0.1, low], [0.5, 0.1, high], [0.52, 0.1, 0.75 * low + 0.25 * high]])
 
 
 QUESTION = Question(
@@ -30,7 +30,7 @@ QUESTION = Question(
     reference=grasp_height,
     inputs=_heights,
     by_hand=(
-        (_upright(0.125, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # a tall thing: the palm stops at its top
+        (_upright(0.1875, 0.75), 0.125, 0.25, 0.0625, 0.03125),  # tall, its foot hidden: the palm stops at its top
         (_upright(0.125, 0.1875), 0.125, 0.25, 0.0625, 0.03125),  # a flat one: the tips stay off the table
         (_upright(0.375, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # only its upper part was seen
         (_upright(-0.5, -0.25), -0.5, 0.5, 0.0625, 0.03125),  # a table below the robot's base

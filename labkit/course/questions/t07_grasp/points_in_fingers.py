@@ -23,21 +23,12 @@ def _scene_round_a_grasp(rng):
     return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
 
 
-# Beside the jaws along the base's x: at the pad and a finger's thickness outside it (both count), just inside the pad,
-# beyond the finger, beside it, below the tips, at the tips (counts), high above (counts), and in the other finger.
-_ROUND_IT = np.array(
-    [
-        [2.5, 1.0, 0.5],
-        [2.75, 1.0, 0.5],
-        [2.25, 1.0, 0.5],
-        [3.0, 1.0, 0.5],
-        [2.625, 1.5, 0.5],
-        [2.625, 1.0, 0.125],
-        [2.625, 1.0, 0.25],
-        [2.625, 1.25, 1.5],
-        [1.375, 0.75, 0.5],
-    ]
-)
+# Beside the jaws along the base's x. Those that count: at the pad, a finger's thickness outside it, three at the tips,
+# high above, and in the other finger. How many lie on a border tells the borders apart.
+_AT_TIPS = [[2.625, 1.0, 0.25], [2.625, 0.875, 0.25], [2.5625, 1.0, 0.25]]
+_IN = [[2.5, 1.0, 0.5], [2.75, 1.0, 0.5], *_AT_TIPS, [2.625, 1.25, 1.5], [1.375, 0.75, 0.5]]
+# Those that do not: just inside the pad, beyond the finger, beside it, and below the tips.
+_OUT = [[2.25, 1.0, 0.5], [3.0, 1.0, 0.5], [2.625, 1.5, 0.5], [2.625, 1.0, 0.125]]
 
 
 QUESTION = Question(
@@ -45,9 +36,9 @@ QUESTION = Question(
     reference=points_in_fingers,
     inputs=_scene_round_a_grasp,
     by_hand=(
-        (_ROUND_IT, FACING_X, 1.0, 0.25, 0.25, 0.25),
-        (_ROUND_IT[:1], FACING_X, 1.0, 0.25, 0.25, 0.25),
-        (_ROUND_IT[2:6], FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.array([_OUT[0], *_IN, *_OUT[1:]]), FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.array(_IN[:1]), FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
     ),
     random_cases=5,
