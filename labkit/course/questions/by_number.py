@@ -111,9 +111,10 @@ def factor(view: View) -> str:
     told = [k for k in factors if k is not None and np.isfinite(k)]
     if not told or any(k is not None and not np.isfinite(k) for k in factors) or max(map(abs, told)) == 0.0:
         return ""
-    if all(np.isclose(k, 1.0, rtol=max(5e-4, view.rtol), atol=0) for k in told) or not enough(view, told):  # "times 1"
+    right = np.isclose(told, 1.0, rtol=view.rtol, atol=0)
+    if right.all() or not enough(view, told):
         return ""
-    if np.allclose(told, told[0], rtol=max(1e-4, view.rtol), atol=0.0):
+    if np.allclose(told, told[0], rtol=max(1e-4, view.rtol), atol=0.0) and not right.any():
         k = told[0]
         if np.isclose(k, -1.0):
             return "The sign is the other one."
@@ -122,7 +123,7 @@ def factor(view: View) -> str:
             for size, words in ((value, "large"), (1.0 / value, "small")):
                 if np.isclose(abs(k), size, rtol=1e-3, atol=0.0):
                     return f"Yours are too {words} by a factor of {name}{sign}."
-        return f"Yours are the right values times {k:.4g}, in every case."
+        return f"Yours are the right values times {k:.{4 if abs(k - 1.0) > 1e-3 else 8}g}, in every case."
     for name, values in quantities(view):
         pairs = [(k, q) for k, q in zip(factors, values, strict=True) if k is not None]
         for power, words in ((1, "large"), (-1, "small"), (2, "large"), (-2, "small"), (0.5, "large"), (-0.5, "small")):
@@ -219,7 +220,7 @@ def straight_line(view: View) -> str:
     if np.unique(e[use]).size < 4 or any(a.dtype.kind == "b" for a in (*view.expected, *view.got)):
         return ""
     k, c = np.polyfit(e[use], g[use], 1)
-    if abs(k) < 1e-9 or abs(k - 1) < 5e-4 or not view.gives(lambda e: k * e + c):
+    if abs(k) < 1e-9 or abs(k - 1) < 1e-9 or not view.gives(lambda e: k * e + c):
         return ""
     return f"Each of yours is {k:.4g} times the right value {'plus' if c > 0 else 'minus'} {abs(c):.4g}."
 
