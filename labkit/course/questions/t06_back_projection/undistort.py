@@ -49,6 +49,8 @@ QUESTION = Question(
         # 0.5 (1 + 0.7 / 4 - 0.3 / 16) = 0.578125 and 0.7 (1 + 0.7 * 0.49 - 0.3 * 0.2401) = 0.889679; beyond 53 degrees
         # this lens folds, so each has a second, larger root
         (np.array([[215.625, 0.0], [277.9358, 0.0], [100.0, 231.25]]), K_LARGE, np.array([0.7, -0.3])),
+        # 0.9 (1 - 0.25 * 0.81) = 0.71775 and 0.5 (1 - 0.25 / 4) = 0.46875; k2 is 0, and Newton's way needs care
+        (np.array([[243.55, 0.0], [100.0, 187.5]]), K_LARGE, np.array([-0.25, 0.0])),
     ),
     rtol=1e-6,
     atol=1e-3,  # a thousandth of a pixel, as the lab promises
