@@ -21,7 +21,7 @@ class MaskNode(Node):
         super().__init__("mask_node")
         self.model = load_model(weights_path(self.declare_parameter("model", "unet").value))
         self.publisher = self.create_publisher(Image, "mask", 10)  # reliable: what is lost is sent again
-        self.create_subscription(Image, "image", self.answer, qos_profile_sensor_data)  # best effort: the newest
+        self.create_subscription(Image, "image", self.answer, qos_profile_sensor_data)  # best effort: lost is lost
 
     def answer(self, image: Image) -> None:
         whole = len(image.data) == image.height * image.step and image.step >= 3 * image.width
