@@ -76,7 +76,8 @@ def region_labels(rgb: UInt8[np.ndarray, "H W 3"], typical: regions.Typical) -> 
 def methods(frames: Sequence[RGBDFrame], unet) -> dict[str, Method]:
     """Make every method by its name: frame -> labels. `frames` are what the classical ones are fitted to.
 
-    Only "HSV, this table" reads the true labels of the frame that it is to label: the best that a threshold could do.
+    Only "HSV, this table" reads the true labels of the frame that it is to label: nearly the best that a range of
+    colours could do.
     """
     from labkit.stacks.small_fcn import train_small_fcn
 

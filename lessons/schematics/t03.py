@@ -60,5 +60,5 @@ def unet(axes) -> None:
     arrow(axes, (right[2] + 0.3, 6.65), (right[2] + 1.2, 7.1))
     word(axes, (right[2] + 1.4, 7.2), "logits", ha="left")
     word(axes, (9.2, 1.75), "channels, at a share of the image's sides", ha="left", colour=SOFT)
-    word(axes, (9.2, 1.2), "down: stride 2, then residual blocks", ha="left", colour=COLD)
-    word(axes, (9.2, 0.65), "up: enlarged, one convolution", ha="left", colour=HOT)
+    word(axes, (9.2, 1.2), "down: stride 2; residuals from 1/4 on", ha="left", colour=COLD)
+    word(axes, (9.2, 0.65), "up: 1x1, enlarged, skip added, 3x3", ha="left", colour=HOT)
