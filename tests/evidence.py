@@ -116,6 +116,8 @@ def when(result: str) -> str:
     if text:
         number = (ROOT / file).read_text().split(text)[0].count("\n") + 1
         commit, end = git("blame", "--porcelain", f"-L{number},{number}", "--", file).split()[0], []
+        if not commit.strip("0"):
+            raise SystemExit(f"{file}, line {number}: this result is not committed yet; commit it, then `make evidence`")
     return git("log", "-1", "--date=short", "--format=%ad, %h", commit, *end)
 
 
