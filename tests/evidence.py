@@ -117,7 +117,7 @@ def when(result: str) -> str:
         number = (ROOT / file).read_text().split(text)[0].count("\n") + 1
         commit, end = git("blame", "--porcelain", f"-L{number},{number}", "--", file).split()[0], []
         if not commit.strip("0"):
-            raise SystemExit(f"{file}, line {number}: this result is not committed yet; commit it, then `make evidence`")
+            raise SystemExit(f"{file}, line {number}: commit this result first, then `make evidence`")
     return git("log", "-1", "--date=short", "--format=%ad, %h", commit, *end)
 
 
