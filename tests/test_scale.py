@@ -114,3 +114,25 @@ def test_no_scheduler_is_said():
     refused = pytest.raises(ValueError, match=r"dask: found no scheduler at tcp://127\.0\.0\.1:9")
     with refused, executor_for(dask="tcp://127.0.0.1:9"):
         pass
+
+
+PROGRAM = """
+import os
+import numpy, threadpoolctl
+from labkit.support.executors import executor_for
+if __name__ == "__main__":
+    before = dict(os.environ)
+    with executor_for(2) as executor:
+        libraries = executor.submit(threadpoolctl.threadpool_info).result()
+    print([library["num_threads"] for library in libraries if library["user_api"] == "blas"], os.environ == before)
+"""
+
+
+def test_processes_compute_in_one_thread_each_whatever_their_program_has_loaded(tmp_path):
+    (tmp_path / "program.py").write_text(PROGRAM)
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    words = [sys.executable, str(tmp_path / "program.py")]
+    done = subprocess.run(
+        words, env=environment | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["[1]", "True"]

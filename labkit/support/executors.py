@@ -13,6 +13,10 @@ from pathlib import Path
 
 import labkit
 
+# Workers share the cores among themselves: NumPy and PyTorch read these when they are loaded. A second thread of
+# OpenBLAS gains nothing with small matrices, but keeps a core busy while it waits for more.
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
 
 @contextmanager
 def executor_for(workers: int = 1, dask: str | None = None) -> Iterator[Executor | None]:
@@ -37,7 +41,7 @@ def executor_for(workers: int = 1, dask: str | None = None) -> Iterator[Executor
         # Fresh processes: PyBullet and OpenCV must not be forked while they run. Each is replaced after some hundred
         # jobs, which bounds what PyBullet's caches hold.
         spawn = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, spawn, initializer=one_thread, max_tasks_per_child=400) as executor:
+        with inherited(ONE_THREAD), ProcessPoolExecutor(workers, spawn, max_tasks_per_child=400) as executor:
             yield executor
 
 
@@ -68,9 +72,21 @@ def as_they_come(
             future.cancel()
 
 
+@contextmanager
+def inherited(variables: dict[str, str]) -> Iterator[None]:
+    """Processes that are started meanwhile have these environment variables; this one has its own again afterwards."""
+    before = dict(os.environ)
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
 def one_thread() -> None:
-    """Workers share the cores among themselves, not each with all threads of PyTorch; most jobs never load it."""
-    os.environ["OMP_NUM_THREADS"] = "1"  # what a PyTorch that is loaded later reads
+    """Make a worker of a cluster, whose libraries may be loaded, compute in one thread."""
+    os.environ.update(ONE_THREAD)
     if torch := sys.modules.get("torch"):
         torch.set_num_threads(1)
 

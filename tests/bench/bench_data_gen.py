@@ -1,11 +1,9 @@
 """Scenes per second, the share of it spent inside PyBullet, two workers against one, and memory."""
 
-import multiprocessing
 import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ import numpy as np
 import data_gen
 from data_gen.dataset import write_frame
 from labkit.sim.client import Client
+from labkit.support.executors import as_they_come, executor_for
 from tests.bench.measure import table
 
 SCENES = 40
@@ -70,9 +69,9 @@ def one_worker_against_two(folder: str) -> float:
     """How many times as fast two processes write the same scenes as one, the start of processes left out."""
     rates = {}
     for workers in (1, 2):
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
-            warm = [executor.submit(data_gen.render, data_gen.sample_scene(s, "test"), (320, 240)) for s in range(6)]
-            [future.result() for future in warm]
+        with executor_for(workers) as executor:
+            first = [(data_gen.sample_scene(seed, "test"), (320, 240)) for seed in range(6)]
+            list(as_they_come(data_gen.render, first, executor))  # each process has read the models
             start = time.perf_counter()
             out = Path(folder) / f"workers{workers}"
             data_gen.generate(out, range(SCENES), "test", (320, 240), executor, progress=False)
