@@ -136,19 +136,19 @@ def survivors(question: Question, seconds: float, held_out: bool = False) -> Ite
     while alive and tried < INPUTS and time.process_time() < end:
         args, spoil = question.inputs(rng), rng.random() < 0.5
         args = tuple(spoilt(value, rng) for value in args) if spoil else args
-        expected = given(question.reference, args)
-        if spoil and any(compare(question, expected, given(function, args)) for function in right):
+        expected = output_of(question.reference, args)
+        if spoil and any(compare(question, expected, output_of(function, args)) for function in right):
             continue  # right answers fail or disagree: the task does not allow such arguments
         if spoil and any(np.isinf(part).any() for part in parts(expected)):
             continue  # no task asks for infinities
         tried += 1
-        for name in [n for n, function in alive.items() if compare(question, expected, given(function, args))]:
+        for name in [n for n, function in alive.items() if compare(question, expected, output_of(function, args))]:
             yield f"{name}: differs on input {tried}{' (with ties and zeros)' * spoil}"
             del alive[name]
     yield from (f"{name}: equal on {tried} inputs" for name in alive)
 
 
-def given(function: Callable, args: tuple) -> object:
+def output_of(function: Callable, args: tuple) -> object:
     """What a function gives; it has ten seconds, since a busy machine may take its time."""
     return run(function, [args], 10.0)[0][0]
 

@@ -159,7 +159,8 @@ class View:
             else:
                 faces = P[:, BOX].reshape(-1, 3, 3)
                 axes.add_collection3d(Poly3DCollection(faces, facecolors=colour, edgecolors="none", label=name))
-        low, high = self.everything().min(axis=0), self.everything().max(axis=0)
+        everything = self.everything()
+        low, high = everything.min(axis=0), everything.max(axis=0)
         room = np.maximum(high - low, 1e-3)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         axes.set_box_aspect(room, zoom=0.9)

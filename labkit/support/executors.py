@@ -75,12 +75,13 @@ def as_they_come(
 @contextmanager
 def inherited(variables: dict[str, str]) -> Iterator[None]:
     """Processes that are started meanwhile have these environment variables; this one has its own again afterwards."""
-    before = dict(os.environ)
+    before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
         yield
     finally:
-        os.environ.clear()
+        for name in variables:
+            os.environ.pop(name, None)
         os.environ.update(before)
 
 

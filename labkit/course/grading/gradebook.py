@@ -24,6 +24,7 @@ from labkit.course.grading.markdown import harmless_markdown
 from labkit.course.grading.outputs import lines_of
 from labkit.course.grading.reading import Lab, Submission, grade_id, source_of
 from labkit.course.grading.sandbox import NO_SANDBOX
+from labkit.support.executors import inherited
 from labkit.support.files import write_atomically
 
 
@@ -57,15 +58,11 @@ def write_gradebook(
 @contextmanager
 def opened(course: Path) -> Iterator:
     """Open course/gradebook.db, or make it, for which nbgrader runs `alembic` from the environment's folder."""
-    path = os.environ.get("PATH", os.defpath)
-    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # SQLAlchemy's, about nbgrader's way with sessions
-            with Gradebook(url_of(course)) as gradebook:
-                yield gradebook
-    finally:
-        os.environ["PATH"] = path
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"
+    with inherited({"PATH": path}), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # SQLAlchemy's, about nbgrader's way with sessions
+        with Gradebook(url_of(course)) as gradebook:
+            yield gradebook
 
 
 def url_of(course: Path) -> str:

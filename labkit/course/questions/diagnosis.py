@@ -82,18 +82,18 @@ def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     if all(isinstance(got, Problem) for got in outputs):
         return None
     for misconception in question.misconceptions:
-        told = by_output = stray = False
+        told, stray = [], False  # told: of each case that tells it from a right answer, whether there is an output
         for case, got in zip(cases, outputs, strict=True):
             own = output_of(misconception, case.args)
             if alike(question, own, got):
-                told_here = not alike(question, own, case.expected)
-                told, by_output = told or told_here, by_output or (told_here and not isinstance(got, Problem))
+                if not alike(question, own, case.expected):
+                    told.append(not isinstance(got, Problem))
             elif isinstance(got, Problem) and alike(question, own, case.expected):
                 stray = True
             else:
                 break
         else:
-            if told and (by_output or not stray):  # exceptions here and there may be of any mistake
+            if any(told) or (told and not stray):  # exceptions here and there may be of any mistake
                 return misconception
     return None
 

@@ -84,6 +84,13 @@ def up(n, centre):
     return n, float(n @ centre)
 
 
+def centre_and_axes(P, sigma):
+    """The weighted centre, and the axes of the weighted scatter round it as columns, the shortest first."""
+    w = 1.0 / sigma**2
+    centre = w @ P / w.sum()
+    return centre, np.linalg.eigh((P - centre).T * w @ (P - centre))[1]
+
+
 @wrong(QUESTION, "You measure errors along z. Tilt the plane: the distance of a point is measured along the normal.")
 def along_z(P, sigma):
     A = np.column_stack([P[:, :2], np.ones(len(P))]) / sigma[:, None]
@@ -94,17 +101,14 @@ def along_z(P, sigma):
 
 @wrong(QUESTION, "In which direction do points of a plane scatter least, and in which most?")
 def largest_spread(P, sigma):
-    w = 1.0 / sigma**2
-    centre = w @ P / w.sum()
-    return up(np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 2], centre)
+    centre, axes = centre_and_axes(P, sigma)
+    return up(axes[:, 2], centre)
 
 
 @wrong(QUESTION, "An eigenvector's sign is arbitrary: where n points down, turn n up, and d with it.")
 def not_turned_up(P, sigma):
-    w = 1.0 / sigma**2
-    centre = w @ P / w.sum()
-    n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
-    return n, float(n @ centre)
+    centre, axes = centre_and_axes(P, sigma)
+    return axes[:, 0], float(axes[:, 0] @ centre)
 
 
 @wrong(QUESTION, "A plane need not contain the origin: from which point are the directions measured?")

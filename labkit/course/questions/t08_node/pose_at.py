@@ -117,9 +117,9 @@ def by_an_angle(stamps, positions, quaternions, t):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def neighbours(stamps, t):
-    """The number of the pose before a time, and the share of the way to the next."""
-    i = int(np.clip(np.searchsorted(stamps, t) - 1, 0, len(stamps) - 2))
+def neighbours(stamps, t, side="left"):
+    """The number of the pose before a time, and the share of the way to the next; "right": at a stamp, that one's."""
+    i = int(np.clip(np.searchsorted(stamps, t, side) - 1, 0, len(stamps) - 2))
     return i, (t - stamps[i]) / (stamps[i + 1] - stamps[i])
 
 
@@ -166,14 +166,17 @@ def turn_of_the_one_before(stamps, positions, quaternions, t):
     return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
 
 
-@wrong(QUESTION, "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?")
+EXCHANGED = "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?"
+
+
+@wrong(QUESTION, EXCHANGED)
 def shares_exchanged(stamps, positions, quaternions, t, side="left"):
-    i = int(np.clip(np.searchsorted(stamps, t, side) - 1, 0, len(stamps) - 2))
+    i, _ = neighbours(stamps, t, side)
     then = stamps[i] + stamps[i + 1] - t
     return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
 
 
-@wrong(QUESTION, QUESTION.misconceptions[-1].hint)  # at a stamp it goes on from there
+@wrong(QUESTION, EXCHANGED)  # at a stamp it goes on from there
 def shares_exchanged_after(stamps, positions, quaternions, t):
     return shares_exchanged(stamps, positions, quaternions, t, side="right")
 

@@ -88,9 +88,9 @@ def cases(R):
 
 
 @wrong(QUESTION, "Where the trace is -1, w is 0, and you divide by it. A hand that points down is half a turn.")
-def from_trace(R):
-    """The formula that divides by w: fine only for turns well below half a turn."""
-    w = 0.5 * np.sqrt(1.0 + np.trace(R))
+def from_trace(R, least=-np.inf):
+    """The formula that divides by w: fine only for turns well below half a turn. least: what 4 w^2 is at least."""
+    w = 0.5 * np.sqrt(max(1.0 + np.trace(R), least))
     return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w * w]) / (4.0 * w)
 
 
@@ -134,8 +134,7 @@ def largest_of_x_y_z(R):
 
 @wrong(QUESTION, "Half a turn has w = 0. A floor under w makes all four about 0 there: which square is the largest?")
 def floor_under_w(R):
-    w = 0.5 * np.sqrt(max(1.0 + np.trace(R), 1e-12))
-    return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w * w]) / (4.0 * w)
+    return from_trace(R, least=1e-12)
 
 
 @wrong(QUESTION, "Half a turn is not no turn, although R - R.T is 0 for both: what does R + R.T say of the axis?")

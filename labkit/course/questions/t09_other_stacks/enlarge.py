@@ -3,6 +3,7 @@
 import numpy as np
 
 from labkit.course.questions.question import Property, Question, way, wrong
+from labkit.course.questions.t01_labels.resize_labels import copied
 
 
 def enlarge(labels, size):
@@ -77,9 +78,7 @@ def resize_swapped(labels, size):
     QUESTION, "From 4 pixels to 2: the first new one covers old 0 and 1, and where is its centre? Not at its corner."
 )
 def resize_by_corners(labels, size):
-    W, H = size
-    h, w = labels.shape
-    return labels[np.arange(H)[:, None] * h // H, np.arange(W) * w // W]
+    return copied(labels, size[::-1], lambda i, n, old: i * old // n)
 
 
 @wrong(QUESTION, "np.unique before and after: is the mean of class 0 and 2 a class 1?")
@@ -93,27 +92,17 @@ def resize_bilinear(labels, size):
 
 @wrong(QUESTION, "From 2 to 4 pixels, each old one should appear twice: which ones do yours show?")
 def resize_rounded(labels, size):
-    W, H = size
-    h, w = labels.shape
-    rows = np.minimum(np.round(np.arange(H) * h / H).astype(int), h - 1)
-    columns = np.minimum(np.round(np.arange(W) * w / W).astype(int), w - 1)
-    return labels[rows[:, None], columns]
+    return copied(labels, size[::-1], lambda i, n, old: np.minimum(np.round(i * old / n), old - 1))
 
 
 @wrong(QUESTION, "You stretch between the outermost centres: does every old pixel get the same share of new ones?")
 def resize_corner_to_corner(labels, size):
-    W, H = size
-    h, w = labels.shape
-    rows, columns = np.linspace(0, h - 1, H).round().astype(int), np.linspace(0, w - 1, W).round().astype(int)
-    return labels[rows[:, None], columns]
+    return copied(labels, size[::-1], lambda i, n, old: np.linspace(0, old - 1, n).round())
 
 
 @wrong(QUESTION, "24.5 * (2 / 49) is not 1 in floating point: which whole numbers give the same quotient?")
 def resize_by_floats(labels, size):
-    W, H = size
-    h, w = labels.shape
-    rows, columns = (np.arange(H) + 0.5) * (h / H), (np.arange(W) + 0.5) * (w / W)
-    return labels[rows.astype(int)[:, None], columns.astype(int)]
+    return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) * (old / n))
 
 
 @wrong(QUESTION, "np.resize repeats the data in reading order: look at it.")
@@ -135,15 +124,9 @@ def resize_one_factor(labels, size):
     QUESTION, "A centre exactly between two old pixels belongs to the second; np.round and np.rint take the even one."
 )
 def resize_half_to_even(labels, size):
-    W, H = size
-    h, w = labels.shape
-    rows, columns = ((np.arange(n) + 0.5) * old / n - 0.5 for n, old in ((H, h), (W, w)))
-    return labels[np.rint(rows).astype(int)[:, None], np.rint(columns).astype(int)]
+    return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n - 0.5))
 
 
 @wrong(QUESTION, "A centre at 0.7 lies in old pixel 0, which reaches from 0 to 1: which way do you round?")
 def resize_rounded_centres(labels, size):
-    W, H = size
-    h, w = labels.shape
-    rows, columns = (np.rint((np.arange(n) + 0.5) * old / n).clip(0, old - 1) for n, old in ((H, h), (W, w)))
-    return labels[rows.astype(int)[:, None], columns.astype(int)]
+    return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n).clip(0, old - 1))
