@@ -14,9 +14,9 @@ from jaxtyping import Float, Integer, UInt8
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, cluster_indices, inliers
 from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
-from labkit.inference import Engine
 from labkit.labels import IGNORE, TARGET
-from labkit.stacks.engines import open_engine
+from labkit.learning.engines import open_engine
+from labkit.learning.inference import Engine
 from labkit.support.validation import (
     check_finite,
     check_height,
@@ -66,7 +66,7 @@ class Pipeline:
     only `locate` is used. table_z: height of the table in the base
     frame, metres; None takes the frame's own, or else 0. target_class: what to grasp.
     mirror: let a network look at the image and at its mirror image, and average: a little better, at twice the time.
-    engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.stacks.engines): equal numbers, other
+    engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.learning.engines): equal numbers, other
     speeds; the model may then be an ONNX file of `labkit export`.
     crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
     refines those of a network, and leaves those of a plain function, which decides for itself.
@@ -222,11 +222,11 @@ def timed(seconds: dict[str, float], stage: str):
 
 
 def as_engine(model):
-    """Make a PyTorch network an engine (`labkit.network.TorchEngine`); give anything else back as it is."""
+    """Make a PyTorch network an engine (`labkit.learning.network.TorchEngine`); give anything else back as it is."""
     torch = sys.modules.get("torch")  # heavy: a pipeline around a plain function does without it
     if torch is None or not isinstance(model, torch.nn.Module):
         return model
-    from labkit.network import TorchEngine
+    from labkit.learning.network import TorchEngine
 
     return TorchEngine(model)
 
@@ -236,7 +236,7 @@ def class_probabilities(
 ) -> Float[np.ndarray, "H W C"]:
     """Class probabilities of a frame or an RGB image from a network, an engine or a function of the RGB image.
 
-    mirror: as in `labkit.inference.Engine`; a function decides for itself. Raises ValueError if what comes is not
+    mirror: as in `Engine`; a function decides for itself. Raises ValueError if what comes is not
     finite (a network with NaN weights, say), or a function's result is no probabilities.
     """
     model = as_engine(model)

@@ -73,7 +73,7 @@ def one_thread():
 NOT_EVERYWHERE = {
     "tests/course/grading/": ("linux", "`labkit grade` needs Linux"),
     "tests/test_repository.py": ("linux", "needs GNU make 4 and bash"),
-    "tests/course/questions/test_judge.py": ("linux darwin", "Windows has no alarm that stops an endless answer"),
+    "tests/course/checker/test_judge.py": ("linux darwin", "Windows has no alarm that stops an endless answer"),
     "tests/data_gen/test_data_gen.py::test_the_command_says_a_full_disk": ("linux darwin", "needs a limit on files"),
     "tests/test_scale.py": ("linux darwin", "Windows has no signal that kills"),
     "tests/apps/test_cli.py::test_ctrl_c": ("linux darwin", "Windows sends no Ctrl-C to one process"),

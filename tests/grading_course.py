@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 from alternatives import alternatives
 
+from labkit.course.checker.question import Question
 from labkit.course.grading.gradebook import opened
-from labkit.course.questions.question import Question, of_topic
+from labkit.course.topics import of_topic
 
 
 def code_cell(source: str, grade_id: str | None = None, **mark) -> dict:

@@ -25,11 +25,12 @@ import numpy as np
 from alternatives import alternatives
 from mutants import mutants
 
-from labkit.course.questions import diagnosis
-from labkit.course.questions.comparison import Problem, alike, compare, expected_cases, parts
-from labkit.course.questions.diagnosis import Sentence, sentences
-from labkit.course.questions.question import TOPICS, Question, of_topic
-from labkit.course.questions.run import run
+from labkit.course.checker import diagnosis
+from labkit.course.checker.comparison import Problem, alike, compare, expected_cases, parts
+from labkit.course.checker.diagnosis import Sentence, sentences
+from labkit.course.checker.question import Question
+from labkit.course.checker.run import run
+from labkit.course.topics import TOPICS, of_topic
 
 SEEDS = (0, 1, 20_260_101)  # an answer that passes these is not refused
 INPUTS = 10_000

@@ -1,8 +1,8 @@
 """Wrong answers by the thousand: copies of a function with one small thing changed, as a slip of the hand would.
 
-OPERATORS are those of `labkit.course.questions.slips`, by which a check recognises slips. MORE are others: branches,
+OPERATORS are those of `labkit.course.checker.slips`, by which a check recognises slips. MORE are others: branches,
 neighbouring functions, arguments, keywords, casts and turns of loops, many of which a check knows as steps of a right
-answer that are taken otherwise (`labkit.course.questions.otherwise`). HELD_OUT, a third of all, are those of MutPy,
+answer that are taken otherwise (`labkit.course.checker.otherwise`). HELD_OUT, a third of all, are those of MutPy,
 mutmut and PIT that are not among the others; no check was written with a view to them, and none should be.
 """
 
@@ -10,7 +10,7 @@ import ast
 import builtins
 from collections.abc import Callable, Iterator
 
-from labkit.course.questions.slips import OPERATORS, Operators, Slip, but, on, slips
+from labkit.course.checker.slips import OPERATORS, Operators, Slip, but, on, slips
 
 MORE: Operators = {}
 HELD_OUT: Operators = {}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import nbformat
 
-from labkit.course.questions.question import TOPICS
+from labkit.course.topics import TOPICS
 
 ROOT = Path(__file__).parents[1]
 LESSONS = [path for topic in TOPICS for path in sorted(ROOT.glob(f"lessons/{topic}*.ipynb"))]  # some topics have two

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from labkit.frame import RGBDFrame
-from labkit.network import load_model, weights_path
+from labkit.learning.network import load_model, weights_path
 from labkit.node import convert
 from labkit.node.actors import Camera
 from labkit.node.messages import (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.question import find
+from labkit.course.topics import find
 
 
 def drawn(name: str, seed: int):

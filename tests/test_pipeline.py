@@ -11,7 +11,7 @@ from torch import nn
 from labkit.frame import RGBDFrame
 from labkit.grasp import GraspPlan, Gripper
 from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
-from labkit.network import SmallSegNet
+from labkit.learning.network import SmallSegNet
 from labkit.pipeline import (
     WORKSPACE,
     Pipeline,

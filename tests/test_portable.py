@@ -28,9 +28,9 @@ PLACES = re.compile(r"/(bin|dev|etc|lib|proc|run|tmp|usr|var)\b")
 # Files that may, and why; of the tests, those that are skipped elsewhere may, too.
 ALLOWED = {
     "labkit/course/grading/": "`labkit grade` needs Linux, and says so",
-    "labkit/course/questions/run.py": "asks first for an alarm; without one, an endless answer is ended by hand",
+    "labkit/course/checker/run.py": "asks first for an alarm; without one, an endless answer is ended by hand",
     "labkit/apps/doctor.py": "asks first whether the system can tell a process's cores",
-    "labkit/geometry/images.py": "asks first whether the system tells how much memory there is",
+    "labkit/learning/images.py": "asks first whether the system tells how much memory there is",
     "labkit/node/ros1.py": "ROS 1 exists as Debian's packages only",
     "tests/grading_course.py": "only the tests of grading use it",
     "tests/course/conftest.py": "the browser's tests need Debian's Chromium",

@@ -26,9 +26,11 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 PINS = read_pins(ROOT / "constraints.txt")
 # The rooms of labkit from the bottom up: each may import what stands left of it, itself, and `labkit`.
-ROOMS = "support > labels > frame > geometry losses metrics crf > grasp inference > network > training > stacks > "
-ROOMS += "pipeline sim > node > course > apps"
+ROOMS = "support > labels > frame > geometry losses metrics crf > grasp learning > network stacks > pipeline sim > "
+ROOMS += "views > node > course > apps"
 BELOW = {room: set(re.split(r"\W+", ROOMS.split(layer)[0])) for layer in ROOMS.split(" > ") for room in layer.split()}
+# Rooms of the course that judge answers: beside labkit.support each enters only these.
+COURSE = {"checker": {"checker"}, "topics": {"topics", "checker"}}
 
 
 def tracked(*patterns: str) -> list[Path]:
@@ -78,6 +80,11 @@ def test_arrows_between_rooms_point_one_way_and_in_no_circle():
             own = name.split(".")[1]
             entered = {other.split(".")[1] for other in found if other.startswith("labkit.")}
             assert not entered - {own, *BELOW[own]}, f"{name} imports {sorted(entered - {own, *BELOW[own]})}"
+            parts = name.split(".")
+            if "course" in parts and (own_room := "".join(parts[2:3])) in COURSE:
+                allowed = {"support", *COURSE[own_room]}
+                strange = {o for o in found if o.startswith("labkit.") and not allowed & set(o.split(".")[1:3])}
+                assert not strange, f"{name} imports {sorted(strange)}"
             loaded = roots if own != "apps" else {other.split(".")[0] for other in eager[name]}
             assert "data_gen" not in loaded, name
 

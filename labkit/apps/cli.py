@@ -78,10 +78,9 @@ def train(
     from dataclasses import replace
 
     import data_gen
-    from labkit import training
     from labkit.apps.own_data import PictureFolder
-    from labkit.network import architecture_of, load_model, weights_path
-    from labkit.support import ranks
+    from labkit.learning import ranks, training
+    from labkit.learning.network import architecture_of, load_model, weights_path
 
     network = None if init is None else load_model(weights_path(init))
     model = model or ("unet" if network is None else architecture_of(network))
@@ -131,7 +130,7 @@ def evaluate(
     """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
     from data_gen import sample_scene
     from labkit.apps.evaluation import as_json, run_trials, summarise, table
-    from labkit.network import load_model, weights_path
+    from labkit.learning.network import load_model, weights_path
     from labkit.support.files import write_atomically
 
     weights = None if masks == "truth" else weights_path(model)
@@ -150,8 +149,8 @@ def export(
     model: Model = "unet",
 ) -> None:
     """Write a network as one ONNX file, which OpenCV, onnxruntime and other stacks read."""
-    from labkit.network import load_model, weights_path
-    from labkit.stacks import engines
+    from labkit.learning import engines
+    from labkit.learning.network import load_model, weights_path
 
     engines.export(load_model(weights_path(model)), onnx)
     typer.echo(f"wrote {onnx}")
@@ -196,7 +195,7 @@ def demo(
 
     from data_gen import sample_scene
     from labkit.apps import demo as show
-    from labkit.network import load_model, weights_path
+    from labkit.learning.network import load_model, weights_path
 
     seed = secrets.randbelow(1_000_000) if seed is None else seed
     typer.echo(f"labkit demo --seed {seed}")
@@ -232,7 +231,7 @@ def perceive(
     """Find targets and grasps in a picture of your own camera; no target is an answer, too."""
     from labkit.apps import perceive as own
     from labkit.apps.node_command import Settings
-    from labkit.network import load_model, weights_path
+    from labkit.learning.network import load_model, weights_path
 
     if plane is not None and camera_pose is not None:
         raise ValueError("plane: expected either --plane auto or --camera-pose, got both")

@@ -11,7 +11,6 @@ from PIL import Image
 
 from labkit.apps import perceive
 from labkit.apps.evaluation import lift
-from labkit.course.views import fingers
 from labkit.frame import RGBDFrame
 from labkit.geometry import centroid_and_covariance
 from labkit.grasp import Gripper
@@ -21,6 +20,7 @@ from labkit.pipeline import Perception, Pipeline, timed
 from labkit.sim.panda import LiftResult
 from labkit.sim.spec import Camera, SceneSpec
 from labkit.sim.world import TIME_STEP, World
+from labkit.views import fingers
 
 FILM_SIZE = (480, 360)
 FILM_RATE = 12  # pictures a second, of simulated time

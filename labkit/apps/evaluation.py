@@ -92,7 +92,7 @@ def run_trial(
 @lru_cache(maxsize=1)
 def _loaded(path: str, changed: int):
     """Load weights once in each process; `changed`, when the file was written, makes retrained weights others."""
-    from labkit.network import load_model
+    from labkit.learning.network import load_model
 
     return load_model(path)
 

@@ -42,7 +42,7 @@ class Settings:
 
     def pipeline(self, table_z: float | None = None) -> Pipeline:
         """The pipeline that is asked for; table_z: the height of the table, if none is asked for."""
-        from labkit.network import load_model, weights_path
+        from labkit.learning.network import load_model, weights_path
 
         path = weights_path(self.model)
         model = path if path.suffix == ".onnx" else load_model(path)

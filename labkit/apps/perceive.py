@@ -17,7 +17,6 @@ from jaxtyping import Float, UInt8
 from matplotlib.colors import to_hex
 
 from labkit.apps.node_command import numbers_of
-from labkit.course.views import View
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import Plane, back_project, fit_plane, invert_transform
 from labkit.grasp import Gripper
@@ -25,6 +24,7 @@ from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
+from labkit.views import View
 
 MOST_POINTS = 9000  # of the report's view: more make the page heavy, and the eye sees no difference
 TABLE_MARGIN = 0.02  # metres under the table that noise may reach

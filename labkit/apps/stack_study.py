@@ -15,10 +15,10 @@ from labkit.apps import trials
 from labkit.apps.evaluation import lift
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, SURFACE, TARGET
+from labkit.learning.engines import open_engine, segment_like_cpp
 from labkit.metrics import confusion_matrix, wilson_interval
 from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.stacks import regions
-from labkit.stacks.engines import open_engine, segment_like_cpp
 from labkit.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
 
 FIRST_SEED, SCENES, SIZE = 600_000, 40, (320, 240)
@@ -154,7 +154,7 @@ def trials_of_scene(seed: int, ways: dict[str, Method]) -> list[Row]:
 def run(out, first_seed: int = FIRST_SEED, scenes: int = SCENES, progress: bool = True) -> list[Row]:
     """Run every method on so many scenes and write their rows to `out`, as `trials.make_table` does."""
     from data_gen import render, sample_scene
-    from labkit.network import load_model, weights_path
+    from labkit.learning.network import load_model, weights_path
 
     training = [render(sample_scene(seed, "train"), SIZE) for seed in TRAINING_SEEDS]
     ways = methods(training, load_model(weights_path("unet")))

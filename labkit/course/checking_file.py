@@ -1,6 +1,6 @@
 """`labkit check LAB.ipynb`: a saved lab checked as the grader will check it, but on the public cases.
 
-The answers are cut out of the file (`labkit.course.questions.program`), each runs in a fresh process that has the
+The answers are cut out of the file (`labkit.course.checker.program`), each runs in a fresh process that has the
 packages of the grader and nothing of the kit, and other answers that one calls are the kit's where they are wrong. No
 sandbox is needed, since it is one's own notebook. What is ticked here is right with the grader.
 """
@@ -12,14 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from labkit.course.checker.comparison import Problem
+from labkit.course.checker.judge import Verdict
+from labkit.course.checker.program import Cell, Parsed, cells_of, program
+from labkit.course.checker.question import PACKAGES, Question
+from labkit.course.checker.run import Printed
 from labkit.course.checking import describe, jupyter
 from labkit.course.grading.grade import Run, cases_of
 from labkit.course.grading.sandbox import Limits
-from labkit.course.questions.comparison import Problem
-from labkit.course.questions.judge import Verdict
-from labkit.course.questions.program import Cell, Parsed, cells_of, program
-from labkit.course.questions.question import PACKAGES, TOPICS, Question, of_topic
-from labkit.course.questions.run import Printed
+from labkit.course.topics import TOPICS, of_topic
 
 
 def check_file(path: Path | str) -> bool:

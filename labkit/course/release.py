@@ -22,7 +22,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from labkit import __version__
-from labkit.course.questions.question import TOPICS, of_topic
+from labkit.course.topics import TOPICS, of_topic
 from labkit.support.files import write_atomically
 
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}

@@ -6,7 +6,6 @@ it, and `augment` what training makes of both. Metres throughout. Every function
 names the argument, what was expected and what came.
 """
 
-from labkit.geometry.channels import CHANNELS, geometry_channels, mirrored
 from labkit.geometry.clouds import (
     Plane,
     PrincipalAxes,

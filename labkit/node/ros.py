@@ -80,7 +80,7 @@ def run_ros_node(
     T_base_cam and topics among them. Raises FileNotFoundError or ValueError for weights that cannot be used,
     ModuleNotFoundError without ROS.
     """
-    from labkit.network import load_model  # torch takes its time to import
+    from labkit.learning.network import load_model  # torch takes its time to import
 
     require(version)
     pipeline = Pipeline(load_model(weights_path, num_classes), table_z, target_class, crf=crf)

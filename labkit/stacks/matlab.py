@@ -13,7 +13,7 @@ def semanticseg(
 ) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
     """Label an image and say how sure the network is: the best class of each pixel, and its probability.
 
-    net: an engine of labkit.stacks.engines, or any function from an RGB image to class probabilities (H, W, C).
+    net: an engine of labkit.learning.engines, or any function from an RGB image to class probabilities (H, W, C).
 
     >>> labels, scores = semanticseg(np.zeros((1, 1, 3), np.uint8), lambda rgb: np.array([[[0.1, 0.7, 0.2]]]))
     >>> int(labels[0, 0]), float(scores[0, 0])

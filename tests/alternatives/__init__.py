@@ -6,7 +6,7 @@ In `t04_iou`, those of topic 04_iou, `iou__loops` answers the question `iou`. Ch
 import importlib
 from collections.abc import Callable
 
-from labkit.course.questions.question import Question
+from labkit.course.checker.question import Question
 
 
 def alternatives(question: Question) -> tuple[Callable, ...]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from labkit.course.questions.t03_gradient.cross_entropy import one_hot
-from labkit.course.questions.t03_gradient.cross_entropy_grad import in_place
+from labkit.course.topics.t03_gradient.cross_entropy import one_hot
+from labkit.course.topics.t03_gradient.cross_entropy_grad import in_place
 
 
 def softmax__einsum(z):

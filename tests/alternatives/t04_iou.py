@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from labkit.course.questions.t04_iou import iou_of
-from labkit.course.questions.t04_iou.confusion_matrix import counted_pairs
+from labkit.course.topics.t04_iou import iou_of
+from labkit.course.topics.t04_iou.confusion_matrix import counted_pairs
 
 
 def confusion_matrix__one_hot(y_true, y_pred, num_classes, ignore):

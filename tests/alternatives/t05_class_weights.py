@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from labkit.course.questions.t05_class_weights.adjusted_grad import parts
-from labkit.course.questions.t05_class_weights.two_means import losses_and_weights
+from labkit.course.topics.t05_class_weights.adjusted_grad import parts
+from labkit.course.topics.t05_class_weights.two_means import losses_and_weights
 
 
 def class_weights__einsum(counts, power):

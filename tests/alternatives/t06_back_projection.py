@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.questions.t06_back_projection import columns
+from labkit.course.topics.t06_back_projection import columns
 
 
 def cropped_intrinsics__torch(K, left, top, scale):

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from labkit.course.questions.t07_grasp.grasp_pose import pose, unit
-from labkit.course.questions.t07_grasp.pad_slice import in_grasp, middle_and_width
-from labkit.course.questions.t07_grasp.points_in_fingers import in_boxes
+from labkit.course.topics.t07_grasp.grasp_pose import pose, unit
+from labkit.course.topics.t07_grasp.pad_slice import in_grasp, middle_and_width
+from labkit.course.topics.t07_grasp.points_in_fingers import in_boxes
 
 
 def closing_yaw__across_the_long_axis(Sigma):

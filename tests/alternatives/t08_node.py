@@ -4,8 +4,8 @@ import struct
 
 import numpy as np
 
-from labkit.course.questions.t08_node.pose_at import neighbours, outside
-from labkit.course.questions.t08_node.quaternion import right_quaternion
+from labkit.course.topics.t08_node.pose_at import neighbours, outside
+from labkit.course.topics.t08_node.quaternion import right_quaternion
 
 
 def decode_depth__struct(data, height, width, step, is_bigendian):

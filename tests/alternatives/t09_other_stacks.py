@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
-from labkit.course.questions.t09_other_stacks.choose_region import chosen
-from labkit.course.questions.t09_other_stacks.make_blob import padded
+from labkit.course.topics.t09_other_stacks.choose_region import chosen
+from labkit.course.topics.t09_other_stacks.make_blob import padded
 
 
 def make_blob__torch(bgr, multiple):

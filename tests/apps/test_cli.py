@@ -11,7 +11,7 @@ import torch
 
 import data_gen
 from labkit.apps import cli, doctor
-from labkit.network import UNetRGBD, load_model, save_model
+from labkit.learning.network import UNetRGBD, load_model, save_model
 
 HEAVY = ("torch", "numpy", "cv2", "pybullet", "numba", "matplotlib")
 

@@ -12,11 +12,11 @@ from scenes import box, scene
 
 from data_gen import sample_scene
 from labkit.apps.evaluation import Trial, lift, run_trial, summarise
-from labkit.geometry import CHANNELS
-from labkit.inference import NetworkInput
 from labkit.labels import CLASSES, OBSTACLE, SURFACE, TARGET
+from labkit.learning.channels import CHANNELS
+from labkit.learning.inference import NetworkInput
+from labkit.learning.network import SmallSegNet, save_model
 from labkit.metrics import confusion_matrix, iou
-from labkit.network import SmallSegNet, save_model
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 

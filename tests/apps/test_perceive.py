@@ -18,7 +18,7 @@ from labkit.apps.cli import app
 from labkit.apps.own_data import PictureFolder
 from labkit.geometry import Plane, back_project_to_base, transform_points
 from labkit.labels import SURFACE, TARGET
-from labkit.network import load_model, predict_probabilities, weights_path
+from labkit.learning.network import load_model, predict_probabilities, weights_path
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 

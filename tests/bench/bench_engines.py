@@ -11,8 +11,8 @@ import numpy as np
 import torch
 
 from data_gen import render, sample_scene
-from labkit.network import load_model, weights_path
-from labkit.stacks.engines import ENGINES, open_engine
+from labkit.learning.engines import ENGINES, open_engine
+from labkit.learning.network import load_model, weights_path
 from tests.bench.measure import in_turns, table
 
 FRAMES, ROUNDS = 4, 10

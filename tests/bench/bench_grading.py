@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from labkit.course.checker.program import Cell
 from labkit.course.grading import grade, reading, sandbox
 from labkit.course.grading.gradebook import opened
 from labkit.course.grading.run import grade_course
-from labkit.course.questions.program import Cell
-from labkit.course.questions.question import TOPICS
+from labkit.course.topics import TOPICS
 from tests.bench.measure import in_turns, resident_mb, table
 
 ROOT = Path(__file__).parents[2]

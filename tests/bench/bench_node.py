@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from data_gen import render, sample_scene
-from labkit.network import load_model, weights_path
+from labkit.learning.network import load_model, weights_path
 from labkit.node.actors import Camera
 from labkit.node.bus import Bus
 from labkit.node.messages import DEFAULT_TOPICS, Diagnostics, Image

@@ -4,7 +4,7 @@ import numpy as np
 
 from data_gen import render, sample_scene
 from labkit.labels import TARGET
-from labkit.network import load_model, weights_path
+from labkit.learning.network import load_model, weights_path
 from labkit.pipeline import Pipeline
 from tests.bench.measure import table
 

@@ -24,8 +24,8 @@ from labkit.crf.cuts import Moves
 from labkit.crf.integers import quantise
 from labkit.crf.persistency import fix_certain
 from labkit.labels import CLASSES, TARGET
+from labkit.learning.network import load_model, predict_probabilities, weights_path
 from labkit.metrics import boundary_counts, confusion_matrix, iou, mean_iou
-from labkit.network import load_model, predict_probabilities, weights_path
 from labkit.pipeline import most_probable
 from tests.bench.measure import in_turns, table
 

@@ -17,8 +17,8 @@ import torch
 from torch import nn
 
 from labkit.frame import RGBDFrame
-from labkit.network import SmallSegNet, UNet, predict_probabilities
-from labkit.training import RECIPES, ImagesInMemory, TrainConfig, Trainer, bf16_is_native
+from labkit.learning.network import SmallSegNet, UNet, predict_probabilities
+from labkit.learning.training import RECIPES, ImagesInMemory, TrainConfig, Trainer, bf16_is_native
 from tests.bench.measure import in_turns, table
 
 SIZE = (240, 320)

@@ -12,8 +12,8 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from labkit import check
 from labkit.course import checking
+from labkit.course.checker.question import Misconception, Property, Question
 from labkit.course.checking import CheckFailed, Shown
-from labkit.course.questions.question import Misconception, Property, Question
 
 SECRET = 0.7312684519  # a number that only the reference knows
 

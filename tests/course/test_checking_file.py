@@ -7,9 +7,9 @@ import pytest
 from grading_course import lab_notebook, right_answers
 from submissions import honest
 
+from labkit.course.checker.program import Cell
 from labkit.course.checking_file import check_file, topic_of
-from labkit.course.questions.program import Cell
-from labkit.course.questions.question import TOPICS
+from labkit.course.topics import TOPICS
 
 TOPIC = "04_iou"
 ROOT = Path(__file__).parents[2]

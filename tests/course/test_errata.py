@@ -15,9 +15,9 @@ import torch
 from labkit.crf import PottsCRF, solve
 from labkit.geometry import back_projection_jacobian, backproject_to_base
 from labkit.labels import TARGET
+from labkit.learning.network import SmallSegNet, load_model
 from labkit.losses import segmentation_loss, softmax, weighted_optimum
 from labkit.metrics import confusion_matrix, iou, mean_iou
-from labkit.network import SmallSegNet, load_model
 from labkit.pipeline import segment_rgb_image
 from labkit.stacks.small_fcn import SmallFCN
 

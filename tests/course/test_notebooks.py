@@ -17,10 +17,10 @@ import nbformat
 import pytest
 from notebooks import LABS, LESSONS, ROOT, SOLUTIONS, code, notebook, prose
 
+from labkit.course.checker.run import Printed, judge
 from labkit.course.checking import describe
-from labkit.course.questions.question import TOPICS, of_topic
-from labkit.course.questions.run import Printed, judge
 from labkit.course.release import mistakes, release
+from labkit.course.topics import TOPICS, of_topic
 
 MAX_LINES, MAX_PNG = 25, 150_000
 # Names that are undefined or unused, statements that do nothing or not what they seem, old NumPy, errors of syntax.
@@ -184,7 +184,7 @@ def test_pictures_are_there_and_small(path):
 def test_a_lesson_has_an_explorer(path):
     texts = [output.get("data", {}).get("text/plain", "") for cell in code(path) for output in cell.outputs]
     assert any(text.startswith("an explorer: ") for text in texts)
-    assert "labkit.course.widgets" in "".join(cell.source for cell in code(path))
+    assert "labkit.course.explorers" in "".join(cell.source for cell in code(path))
 
 
 def is_compared(cell) -> bool:

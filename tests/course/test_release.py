@@ -11,8 +11,8 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from labkit.course import release as module
-from labkit.course.questions.question import of_topic
 from labkit.course.release import bundle, mistakes, read, release, tidy, to_bytes
+from labkit.course.topics import of_topic
 
 ROOT = Path(__file__).parents[2]
 SOLUTION = '''def double(x):

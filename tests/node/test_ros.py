@@ -2,7 +2,7 @@
 
 import pytest
 
-from labkit.network import ARCHITECTURES, save_model, weights_path
+from labkit.learning.network import ARCHITECTURES, save_model, weights_path
 from labkit.node import ros
 from labkit.node.bus import Bus
 from labkit.node.messages import ROS_TOPICS

@@ -197,7 +197,7 @@ def test_from_camera_topic_to_lift_over_ros(tester, new_master):
     """Topic 08's diagram over a real master: camera and arm here, the text's run_ros_node in another process."""
     spec = data_gen.sample_scene(0, "test")
     code = (
-        "from labkit.network import weights_path; from labkit.node.ros import run_ros_node\n"
+        "from labkit.learning.network import weights_path; from labkit.node.ros import run_ros_node\n"
         f"run_ros_node(weights_path('unet'), 4, 2, table_z={spec.table.z}, version=1)"
     )
     with World(spec) as world:

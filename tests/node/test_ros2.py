@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 
 import data_gen
 from labkit.labels import CLASSES, SURFACE, one_hot
-from labkit.network import load_model, weights_path
+from labkit.learning.network import load_model, weights_path
 from labkit.node import ros2, ros2_types
 from labkit.node.actors import Arm
 from labkit.node.convert import decode_image, encode_pose
@@ -360,7 +360,7 @@ def test_from_camera_topic_to_lift_over_ros(peer):
     """Topic 08's diagram: camera, node (the text's run_ros_node) and this listener and arm, three processes."""
     spec = data_gen.sample_scene(0, "test")
     node = (
-        "from labkit.network import weights_path; from labkit.node.ros import run_ros_node\n"
+        "from labkit.learning.network import weights_path; from labkit.node.ros import run_ros_node\n"
         f"run_ros_node(weights_path('unet'), 4, 2, table_z={spec.table.z})"
     )
     camera = (

@@ -9,10 +9,10 @@ from sklearn.cluster import KMeans
 
 import data_gen
 from labkit.labels import OBSTACLE, SURFACE, TARGET
+from labkit.learning.engines import open_engine
 from labkit.pipeline import Pipeline
 from labkit.stacks import regions
 from labkit.stacks.blocks import Block, Diagram, perception_diagram
-from labkit.stacks.engines import open_engine
 from labkit.stacks.matlab import montage, semanticseg
 from labkit.stacks.small_fcn import SmallFCN, train_small_fcn
 from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, things_on_table

@@ -11,8 +11,8 @@ from data_gen import render, sample_scene
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import backproject_to_base
 from labkit.labels import SURFACE, TARGET
-from labkit.network import load_model, weights_path
-from labkit.stacks.engines import export, open_engine, segment_like_cpp
+from labkit.learning.engines import export, open_engine, segment_like_cpp
+from labkit.learning.network import load_model, weights_path
 from labkit.stacks.matlab import montage, semanticseg
 from labkit.stacks.threshold import fit_hsv, hsv_mask
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tqdm.auto import tqdm
 
-from labkit.course import questions
+from labkit.course import checker, grading, topics
 from labkit.course.grading import sandbox
 from labkit.course.grading.grade import Result, grade_submission
 from labkit.course.grading.reading import Lab, Submission
@@ -111,7 +111,7 @@ def key_of(batch: Batch, submission: Submission, code: str) -> str:
 
 def code_digest() -> str:
     """Name the questions and the grader by the bytes of their files."""
-    folders = (Path(questions.__file__).parent, Path(__file__).parent)
+    folders = [Path(module.__file__).parent for module in (checker, topics, grading)]
     files = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 

@@ -18,9 +18,9 @@ from typing import BinaryIO
 
 import numpy as np
 
+from labkit.course.checker.judge import Problem
+from labkit.course.checker.program import Program
 from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_MESSAGE, MOST_PARTS, ONE
-from labkit.course.questions.judge import Problem
-from labkit.course.questions.program import Program
 
 KINDS = {"c": "complex numbers", "O": "objects", "U": "text", "S": "bytes", "M": "dates", "m": "spans of time"}
 

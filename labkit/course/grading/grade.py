@@ -15,14 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from labkit.course.checker.judge import Case, Problem, Verdict, expected_cases, parts, verdict
+from labkit.course.checker.program import Program
+from labkit.course.checker.question import Question
 from labkit.course.checking import PUBLIC_SEED
 from labkit.course.grading import copies, sandbox
 from labkit.course.grading.channel import Changed, Worker, WorkerLost
 from labkit.course.grading.reading import Lab, Submission
 from labkit.course.grading.sandbox import Limits
-from labkit.course.questions.judge import Case, Problem, Verdict, expected_cases, parts, verdict
-from labkit.course.questions.program import Program
-from labkit.course.questions.question import Question, of_topic
+from labkit.course.topics import of_topic
 
 PACKAGES = ("numpy", "scipy", "torch")  # beside the standard library; a process gets those that its program names
 LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at

@@ -13,8 +13,8 @@ import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labkit.course.questions.program import Cell, cells_of
-from labkit.course.questions.question import of_topic
+from labkit.course.checker.program import Cell, cells_of
+from labkit.course.topics import of_topic
 
 MOST_BYTES = 20 << 20
 MOST_VALUES = 1_000_000  # of JSON: a second of parsing and 100 MB of memory

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from labkit.course.checker import program
 from labkit.course.grading import bwrap, seccomp, shapes, worker
 from labkit.course.grading.channel import Worker, WorkerLost
-from labkit.course.questions import program
 from labkit.support.packages import requirements
 
 PACKAGES = "/packages"

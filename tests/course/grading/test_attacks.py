@@ -22,7 +22,7 @@ from labkit.course.grading.reading import name_of
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
 from labkit.course.grading.shapes import shapes_in
-from labkit.course.questions.question import of_topic
+from labkit.course.topics import of_topic
 
 TOPIC = "04_iou"
 SECRET_VARIABLE = "LABKIT_TEST_SECRET"

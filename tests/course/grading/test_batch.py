@@ -18,14 +18,14 @@ import pytest
 from typer.testing import CliRunner
 
 from labkit.apps.cli import app
+from labkit.course.checker.program import Program
 from labkit.course.grading import bwrap, gradebook, reading, run
 from labkit.course.grading import grade as grading
 from labkit.course.grading.batch import read_record, record_path, secret_for
 from labkit.course.grading.grade import Run, cases_of
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
-from labkit.course.questions.program import Program
-from labkit.course.questions.question import find, of_topic
+from labkit.course.topics import find, of_topic
 
 TOPIC = "04_iou"
 SECRET = "2718281828459045"

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from labkit.course.checker.diagnosis import diagnose
+from labkit.course.checker.judge import Problem, expected_cases
 from labkit.course.grading import worker
 from labkit.course.grading.channel import Changed, Text, decode
-from labkit.course.questions.diagnosis import diagnose
-from labkit.course.questions.judge import Problem, expected_cases
-from labkit.course.questions.question import find
+from labkit.course.topics import find
 
 NUMBERS = [dtype for code in "bhilqBHILQ" for dtype in (np.dtype(code),)] + [
     np.dtype(t) for t in ("?", "f2", "f4", "f8")

@@ -5,7 +5,7 @@ import pytest
 
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
-from labkit.course.questions.question import TOPICS
+from labkit.course.topics import TOPICS
 
 SEED = "a hidden seed"
 totals = {"students": 0, "wrong": 0, "accepted": 0, "right": 0, "rejected": 0}

@@ -12,7 +12,7 @@ import grading_course as kit
 import pytest
 
 from labkit.course.grading.run import grade_course
-from labkit.course.questions.question import of_topic
+from labkit.course.topics import of_topic
 
 ROOT = Path(__file__).parents[3]
 TOPIC = "04_iou"

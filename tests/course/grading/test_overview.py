@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from labkit.apps.cli import app
 from labkit.course.grading import gradebook
 from labkit.course.grading.run import grade_course
-from labkit.course.questions.question import of_topic
+from labkit.course.topics import of_topic
 
 TOPIC = "04_iou"
 IOU = of_topic(TOPIC)["iou"]

@@ -75,7 +75,7 @@ def test_it_sees_python_and_two_packages_and_no_more(worker):
 
 
 @pytest.mark.parametrize(
-    "module", ["labkit", "labkit.course.questions", "data_gen", "sklearn", "torchmetrics", "cv2", "torch"]
+    "module", ["labkit", "labkit.course.topics", "data_gen", "sklearn", "torchmetrics", "cv2", "torch"]
 )
 def test_modules_that_would_do_the_work_are_absent(worker, module):
     problem = told(worker, f"import {module}")

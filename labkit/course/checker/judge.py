@@ -1,0 +1,92 @@
+"""The verdict on an answer: from the outputs of all cases, however they were computed, to words for its student.
+
+    cases = expected_cases(question, seed)     keep them where no answer can see them
+    verdict(question, cases, outputs)          outputs by any way: a value that `plain` takes, or a Problem in its place
+
+`labkit.course.checker.run.judge` does all of it in one process, for the student's check; the grader runs the answer
+elsewhere, and puts `Problem("exception" | "time" | ..., text)` where no value came back.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from labkit.course.checker.comparison import Case, Problem, compare, expected_cases, parts, plain, trusted
+from labkit.course.checker.diagnosis import Sentence, diagnose
+from labkit.course.checker.question import Question
+from labkit.course.checker.showing import shown_case
+
+__all__ = ["Case", "Problem", "Verdict", "compare", "expected_cases", "parts", "plain", "trusted", "verdict"]
+
+# What is told first: that it does not run, then its type, its shape, its values, and what it does to its arguments.
+STAGES = ("unanswered", "exception", "time", "kind", "length", "dtype", "shape", "finite", "values", "altered")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The result of all cases of a question.
+
+    problem: None if the answer passes; case: the number of the case that has it, from 0, and `where` says it in words.
+    question, notes: what is no reason to fail, but should be said. cases, outputs: what it was made of.
+    """
+
+    problem: Problem | None
+    case: int | None
+    where: str
+    question: Question | None = None
+    notes: tuple[str, ...] = ()
+    cases: Sequence[Case] = ()
+    outputs: Sequence[object] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every case is right."""
+        return self.problem is None
+
+    @cached_property
+    def sentence(self) -> Sentence | None:
+        """The most specific thing that is true of a wrong answer; looked for when it is asked for."""
+        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "altered"):
+            return None
+        return diagnose(self.question, self.cases, self.outputs)
+
+    @property
+    def hint(self) -> str | None:
+        """The same in words."""
+        return self.sentence.says if self.sentence else None
+
+    @cached_property
+    def shown(self) -> tuple[str, ...]:
+        """Lines that show the call of the case, and what came and what was expected where they first differ."""
+        if self.problem is None or self.question is None or self.case is None:
+            return ()
+        return shown_case(self.question, self.cases[self.case], self.outputs[self.case])
+
+
+def verdict(
+    question: Question, cases: Sequence[Case], outputs: Sequence[object], altered: frozenset[int] = frozenset()
+) -> Verdict:
+    """Compare the outputs of all cases, and find what should be told first.
+
+    altered: positions of the arguments that the answer altered: then it is not right, since its caller needs them.
+    """
+    problems = [
+        got if isinstance(got, Problem) else compare(question, case.expected, got)
+        for case, got in zip(cases, outputs, strict=True)
+    ]
+    changed = tuple(f"it changes its argument {question.parameters[i]}: work on a copy" for i in sorted(altered))
+    told = [(stage(problem), i) for i, problem in enumerate(problems) if problem]
+    if not told:
+        problem = Problem("altered", f"{changed[0]}; what calls it still needs the old values") if changed else None
+        return Verdict(problem, None, "all cases" if changed else "", question, (), cases, outputs)
+    _, first = min(told)
+    by_hand = sum(case.by_hand for case in cases)
+    here, number, of = ("case by hand", first + 1, by_hand)
+    if first >= by_hand:
+        here, number, of = ("random case", first + 1 - by_hand, len(cases) - by_hand)
+    return Verdict(problems[first], first, f"{here} {number} of {of}", question, changed, cases, outputs)
+
+
+def stage(problem: Problem) -> int:
+    """How early a problem is told; what only a grader meets comes with the exceptions."""
+    return STAGES.index(problem.kind if problem.kind in STAGES else "exception")

@@ -1,0 +1,94 @@
+"""A case in a few short lines: the call, what came, what was expected, and where the two first differ."""
+
+import numpy as np
+
+from labkit.course.checker.comparison import Case, Problem, canonical, differences, parts
+from labkit.course.checker.question import Question
+
+LONGEST = 100  # characters of a line
+MOST_NUMBERS = 24  # of an array that is shown whole
+
+
+def shown_case(question: Question, case: Case, got: object) -> tuple[str, ...]:
+    """Lines that show a case whose output is wrong, or a Problem."""
+    lines = [call(question, case.args)]
+    if isinstance(got, Problem):
+        return tuple(lines)
+    returned, expected = written(got), written(case.expected)
+    if len(returned) <= LONGEST and len(expected) <= LONGEST and "..." not in returned + expected:
+        return (*lines, f"returns   {returned}", f"expected  {expected}")
+    return (*lines, *first_difference(question, case.expected, got))
+
+
+def call(question: Question, args: tuple) -> str:
+    """The call of a case: small arguments written out, large ones by shape and type.
+
+    >>> question = Question(name="0.mean", reference=lambda n, k: n, inputs=lambda rng: ())
+    >>> call(question, (np.zeros((90, 120), np.uint8), 0.5))
+    'mean(n = (90, 120) uint8 from 0 to 0, 0.5)'
+    """
+    whole = [written(value) for value in args]
+    if sum(map(len, whole)) <= LONGEST and not any("..." in text for text in whole):
+        return f"{question.function}({', '.join(whole)})"
+    names = question.parameters
+    short = [
+        text if len(text) <= 30 and "..." not in text else f"{n} = {size(v)}"
+        for n, v, text in zip(names, args, whole, strict=True)
+    ]
+    return f"{question.function}({', '.join(short)})"
+
+
+def size(value: object) -> str:
+    """Shape, type and range of an array; how many, of anything else."""
+    if not isinstance(value, np.ndarray):
+        return f"{type(value).__name__} of {len(value)}" if isinstance(value, tuple | list) else type(value).__name__
+    if not value.size or value.dtype.kind not in "iuf":
+        return f"{value.shape} {value.dtype}"
+    with np.errstate(all="ignore"):
+        return f"{value.shape} {value.dtype} from {number(np.nanmin(value))} to {number(np.nanmax(value))}"
+
+
+def written(value: object) -> str:
+    """A number, array or tuple in one line; "..." for what is too large.
+
+    >>> written((np.array([[1.0, 0.5], [-0.0, np.nan]]), True))
+    '([[1, 0.5], [0, nan]], True)'
+    """
+    if isinstance(value, tuple | list):
+        return "(" + ", ".join(written(part) for part in value) + ")"
+    if isinstance(value, np.ndarray) and value.ndim:
+        return "[" + ", ".join(written(part) for part in value) + "]" if value.size <= MOST_NUMBERS else "..."
+    return number(value)
+
+
+def number(value: object) -> str:
+    """A number in five digits."""
+    if isinstance(value, float | np.floating) or (isinstance(value, np.ndarray) and value.dtype.kind == "f"):
+        return f"{float(value) + 0.0:.5g}"  # + 0.0: -0 is 0
+    return str(value)
+
+
+def first_difference(question: Question, expected: object, got: object) -> list[str]:
+    """Where two large outputs first differ, and in how many numbers."""
+    for k, (e, g) in enumerate(zip(parts(expected), parts(got), strict=False)):
+        name = f"output {k + 1}" if isinstance(expected, tuple) else "the output"
+        e, g = np.asarray(e), np.asarray(g)
+        if e.shape != g.shape:
+            return [f"{name} has shape {g.shape}, expected {e.shape}"]
+        (wrong,) = differences(question, *((e, g) if isinstance(expected, tuple) else canonical(question, e, g)))[:1]
+        if wrong.shape != np.atleast_1d(e).shape:
+            wrong = ~np.isclose(
+                np.atleast_1d(g).astype(float),
+                np.atleast_1d(e).astype(float),
+                question.rtol,
+                question.atol,
+                equal_nan=True,
+            )
+        if wrong.any():
+            at = tuple(int(i) for i in np.argwhere(wrong)[0])
+            came, right = number(np.atleast_1d(g)[at]), number(np.atleast_1d(e)[at])
+            place = f"at {list(at)} " if e.ndim else ""
+            return [
+                f"{name} is {came} {place}where {right} is expected; {np.count_nonzero(wrong)} of {wrong.size} differ"
+            ]
+    return []

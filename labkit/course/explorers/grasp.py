@@ -1,0 +1,165 @@
+"""Explorers of topic 07: the jaws at any yaw, and the visible centroid from any height of the camera.
+
+Besides the explorers: jaws seen from above, and a lift as a row of pictures.
+"""
+
+from functools import lru_cache
+
+import ipywidgets
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+
+from labkit.course.explorers.explorer import Explorer
+from labkit.geometry import backproject_to_base
+from labkit.grasp import Gripper
+from labkit.labels import PALETTE, TARGET
+from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
+from labkit.views import fingers
+
+ORANGE = tuple((PALETTE[TARGET] / 255).tolist())
+AIR = 0.02  # metres between the pads beyond what stands there, both sides together
+ELEVATIONS = tuple(range(10, 90, 5))  # degrees over the table
+RADIUS = 0.03  # of the ball, metres
+THINGS = {
+    "ball": ((Part("sphere", (RADIUS,)),), RADIUS),
+    "block": ((Part("box", (0.03, 0.07, 0.04)),), 0.02),
+    "can": ((Part("cylinder", (0.025, 0.09)),), 0.045),
+}
+
+
+def draw_jaws(axes: Axes, T_base_grasp: Float[np.ndarray, "4 4"], width: float, **style) -> None:
+    """Draw the two fingertips of a grasp from above, in the base frame's x and y; `style` goes to the patches."""
+    for corners in fingers(T_base_grasp, width, Gripper()):
+        axes.add_patch(Polygon(corners[[0, 1, 3, 2], :2], **({"facecolor": "tab:blue", "alpha": 0.85} | style)))
+
+
+def film(world, camera: Camera, seconds: float = 0.4, size: tuple[int, int] = (240, 180)) -> list[np.ndarray]:
+    """Take a picture of a World every so many simulated seconds from now on; the list that they go to, RGB.
+
+    >>> from labkit.sim.world import World
+    >>> camera = Camera.looking_at((0.5, 0.0, 0.0), 1.0, 0.3, 0.8)
+    >>> with World(SceneSpec((), camera, robot=False)) as world:
+    ...     pictures = film(world, camera, seconds=0.1, size=(8, 6))
+    ...     world.step(50)
+    >>> len(pictures), pictures[0].shape
+    (2, (6, 8, 3))
+    """
+    pictures, due = [], [round(240 * seconds)]
+
+    def look(world) -> None:
+        due[0] -= 1
+        if due[0] == 0:
+            pictures.append(world.render(size, camera).rgb)
+            due[0] = round(240 * seconds)
+
+    world.observers.append(look)
+    return pictures
+
+
+def widths(P: Float[np.ndarray, "N 3"], yaws: Float[np.ndarray, "Y"]) -> Float[np.ndarray, "Y"]:
+    """How wide a cloud is, seen from above, in each of the directions at angles `yaws` from x; metres, radians.
+
+    >>> widths(np.array([[0.0, 0.0, 0.0], [0.4, 0.3, 0.0]]), np.array([0.0, np.pi / 2])).round(6).tolist()
+    [0.4, 0.3]
+    """
+    return np.ptp(P[:, :2] @ np.stack([np.cos(yaws), np.sin(yaws)]), axis=0)
+
+
+def jaws_at_a_yaw(P: Float[np.ndarray, "N 3"]) -> Explorer:
+    """Turn the jaws over a cloud (base frame) and see how far they must open. Control: yaw, degrees from the base's x.
+
+    The jaws are drawn red where the gripper cannot open that far.
+    """
+    limit = Gripper().max_opening
+    degrees = np.arange(0, 181)
+    curve = widths(P, np.radians(degrees.astype(float)))
+
+    def draw(figure: Figure, yaw: int) -> None:
+        above, opening = figure.subplots(1, 2, width_ratios=[1, 1.4])
+        width, fits = curve[yaw] + AIR, curve[yaw] + AIR <= limit
+        colour = "tab:blue" if fits else "tab:red"
+        above.scatter(P[:, 0], P[:, 1], s=3, color=ORANGE, linewidths=0)
+        draw_jaws(above, _frame_over(P, np.radians(yaw)), width, facecolor=colour)
+        middle = (P[:, :2].min(axis=0) + P[:, :2].max(axis=0)) / 2
+        above.set(xlim=middle[0] + np.array([-0.1, 0.1]), ylim=middle[1] + np.array([-0.1, 0.1]), aspect="equal")
+        above.set(xlabel="x (m)", ylabel="y (m)", title="from above")
+        above.locator_params(nbins=4)
+        opening.plot(degrees, 1000 * (curve + AIR), color="0.4")
+        opening.axhline(1000 * limit, color="tab:red", linestyle="--", linewidth=1, label="the gripper's limit")
+        opening.plot(yaw, 1000 * width, "o", color=colour)
+        opening.set(
+            xlabel="yaw of the closing direction (degrees)", ylabel="opening (mm)", xlim=(0, 180), ylim=(0, None)
+        )
+        opening.set_title(f"yaw {yaw}: open {1000 * width:.0f} mm" + ("" if fits else ", more than it can"))
+        opening.legend(loc="lower right", fontsize=8)
+
+    slider = ipywidgets.IntSlider(20, min=0, max=180, step=2, description="yaw")
+    return Explorer(draw, {"yaw": slider}, size=(8.0, 3.2))
+
+
+def _frame_over(P, yaw: float) -> Float[np.ndarray, "4 4"]:
+    """A grasp frame that closes at a yaw, its origin half way between the outermost points."""
+    y = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    z = np.array([0.0, 0.0, -1.0])
+    x = np.cross(y, z)
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([x, y, z])
+    along, across = P @ y, P @ x
+    T[:3, 3] = (along.min() + along.max()) / 2 * y + (across.min() + across.max()) / 2 * x
+    return T
+
+
+@lru_cache(maxsize=4)
+def views(thing: str) -> tuple[list[np.ndarray], np.ndarray]:
+    """What one camera sees of a thing from each of ELEVATIONS: clouds (N, 3), and the thing's true centre (3,).
+
+    thing: a name in THINGS; it stands alone on the table, the camera 0.6 m away on the side of the base's x axis.
+    Base frame, metres.
+    """
+    from labkit.sim.world import World  # PyBullet stays out of this module's import
+
+    parts, height = THINGS[thing]
+    spec = ObjectSpec(thing, thing, TARGET, (0.5, 0.0, height), parts=parts)
+    cameras = [Camera.looking_at((0.5, 0.0, height), 0.6, 0.0, np.radians(e), fov_y=0.35) for e in ELEVATIONS]
+    with World(SceneSpec((spec,), cameras[0], robot=False)) as world:
+        frames = [world.render((120, 90), camera) for camera in cameras]
+        centre = world.centre(thing)
+    return [backproject_to_base(f.labels, f.depth, f.K, f.T_base_cam, TARGET) for f in frames], centre
+
+
+def visible_centroid() -> Explorer:
+    """Raise the camera and watch the centroid of what it sees leave the thing's middle. Controls: elevation, thing."""
+
+    def draw(figure: Figure, elevation: int, thing: str) -> None:
+        clouds, centre = views(thing)
+        offsets = 1000 * np.array([cloud.mean(axis=0) - centre for cloud in clouds])
+        now = ELEVATIONS.index(elevation)
+        side, curve = figure.subplots(1, 2, width_ratios=[1, 1.3])
+        x, _, z = (1000 * (clouds[now] - centre)).T
+        side.scatter(x, z, s=3, color=ORANGE, linewidths=0, label="seen")
+        side.plot(0, 0, "kx", ms=9, mew=2, label="middle of the thing")
+        side.plot(offsets[now, 0], offsets[now, 2], "k+", ms=11, mew=2, label="visible centroid")
+        ray = np.array([np.cos(np.radians(elevation)), np.sin(np.radians(elevation))])
+        side.annotate("", 45 * ray, 75 * ray, arrowprops={"arrowstyle": "->", "color": "tab:blue"})
+        side.text(*(78 * ray), "camera", color="tab:blue", ha="center", fontsize=8)
+        side.axhline(-1000 * (centre[2]), color="0.6", linewidth=1)
+        side.set(
+            xlim=(-60, 95), ylim=(-55, 95), aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="from the side"
+        )
+        side.legend(fontsize=7, loc="upper left")
+        lines = ((0, "sideways, to the camera", "tab:blue", "-"), (2, "upwards", "tab:green", "--"))
+        for axis, name, colour, line in lines:
+            curve.plot(ELEVATIONS, offsets[:, axis], line, color=colour, label=name)
+            curve.plot(elevation, offsets[now, axis], "o", color=colour)
+        curve.set(xlabel="elevation of the camera (degrees)", ylabel="visible centroid is off by (mm)", ylim=(-5, None))
+        curve.set_title(f"{np.hypot(offsets[now, 0], offsets[now, 2]):.0f} mm off in all")
+        curve.legend(fontsize=8)
+
+    controls = {
+        "elevation": ipywidgets.SelectionSlider(options=ELEVATIONS, value=30, description="elevation"),
+        "thing": ipywidgets.Dropdown(options=list(THINGS), value="ball", description="thing"),
+    }
+    return Explorer(draw, controls, size=(8.5, 3.3))

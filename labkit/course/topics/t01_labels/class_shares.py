@@ -1,0 +1,84 @@
+"""01_labels.class_shares: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t01_labels import labels_and_classes
+
+
+def class_shares(y, C):
+    """Give the share of each class among the pixels that are not ignored (255)."""
+    judged = y[y != 255]
+    return np.bincount(judged, minlength=C) / judged.size
+
+
+QUESTION = Question(
+    name="01_labels.class_shares",
+    reference=class_shares,
+    inputs=labels_and_classes,
+    by_hand=(
+        (np.array([[1, 1], [0, 3]], np.uint8), 5),
+        (np.array([[1, 255, 255], [1, 1, 0]], np.uint8), 3),
+        (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (25, 4)), 4),  # more pixels of a class than a byte counts
+    ),
+    points=1,
+    properties=(Property("the shares add up to 1", lambda arguments, shares: np.isclose(np.sum(shares), 1.0)),),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(y, C):
+    n = [0] * C
+    for c in y.ravel().tolist():
+        if c != 255:
+            n[c] += 1
+    return np.array([count / sum(n) for count in n])
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def counts(y, C):
+    return np.bincount(y[y != 255], minlength=C)
+
+
+@wrong(QUESTION, "Your shares do not add up to 1: which pixels did nobody judge?")
+def of_all_pixels(y, C):
+    return counts(y, C) / y.size
+
+
+@wrong(QUESTION, "Background (class 0) is a class like the others here.")
+def without_background(y, C):
+    n = counts(y, C)
+    return np.append(0.0, n[1:] / max(n[1:].sum(), 1))
+
+
+@wrong(QUESTION, "Some rows have fewer judged pixels than others: count over the whole image, divide once.")
+def mean_of_rows(y, C):
+    """Average the shares of the image's rows, though some rows count fewer pixels."""
+    return np.mean([counts(row, C) / np.count_nonzero(row != 255) for row in y if (row != 255).any()], axis=0)
+
+
+@wrong(QUESTION, "A class without pixels has a share as well, 0: the result has always C entries.")
+def only_what_occurs(y, C):
+    n = counts(y, C)
+    return n[n > 0] / n.sum()
+
+
+@wrong(QUESTION, "That is one over the share (a weight, topic 05): rare is small here.")
+def inverse_shares(y, C):
+    n = counts(y, C)
+    return n.sum() / np.maximum(n, 1)
+
+
+@wrong(QUESTION, "np.bincount ends at the largest label that occurs: what makes it as long as C?")
+def up_to_the_largest_label(y, C):
+    n = np.bincount(y[y != 255])
+    return n / n.sum()
+
+
+@wrong(QUESTION, "np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")
+def unjudged_as_a_class(y, C):
+    return np.bincount(y.ravel(), minlength=C) / y.size

@@ -1,0 +1,156 @@
+"""01_labels.labels_from_colours: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def labels_from_colours(rgb, palette):
+    """Turn a coloured label picture back into labels; a colour that no class has becomes 255."""
+    same = (rgb[:, :, None, :] == palette).all(axis=-1)
+    return np.where(same.any(axis=-1), same.argmax(axis=-1), 255)
+
+
+def _picture(rng):
+    """Draw a palette whose colours share channels and brightness, and a picture with pixels between two colours."""
+    a, b, c = (int(value) for value in rng.choice(np.arange(20, 240, 10), 3, replace=False))
+    palette = np.array([[a, b, c], [c, a, b], [b, c, a], [a, c, b], [c, b, a]], np.uint8)
+    y = rng.integers(0, 5, (int(rng.integers(4, 7)), int(rng.integers(8, 11))))
+    rgb = palette[y].astype(int)
+    between = rng.random(y.shape) < 0.25
+    between[0, 0] = True
+    rgb[between] = (3 * rgb[between] + palette[(y[between] + 1) % 5]) // 4
+    return rgb.astype(np.uint8), palette
+
+
+_PALETTE = np.array([[0, 0, 0], [0, 0, 255], [255, 0, 0], [0, 255, 0]], np.uint8)
+# Two known colours; then such as have a known one's number in a wrong base (255, 16, 10, 257, 100 ...).
+_NEARLY = np.array(
+    [
+        [[0, 0, 0], [0, 255, 0], [0, 1, 0], [0, 15, 15], [20, 53, 20]],
+        [[0, 0, 254], [254, 255, 1], [254, 255, 255], [0, 254, 128], [0, 2, 55]],
+    ],
+    np.uint8,
+)
+
+
+QUESTION = Question(
+    name="01_labels.labels_from_colours",
+    reference=labels_from_colours,
+    inputs=_picture,
+    by_hand=(
+        (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
+        (_NEARLY, _PALETTE),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property(
+            "a pixel is 255 where no class has exactly its colour",
+            lambda arguments, y: bool(np.all(y[~(arguments[0][:, :, None] == arguments[1]).all(-1).any(-1)] == 255)),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(rgb, palette):
+    """Pixel by pixel, in a dictionary of colours."""
+    names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
+    return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
+
+
+@way(QUESTION)
+def class_by_class(rgb, palette):
+    y = np.full(rgb.shape[:2], 255, np.uint8)
+    for c, colour in enumerate(palette):
+        y[(rgb == colour).all(axis=2)] = c
+    return y
+
+
+@way(QUESTION)
+def as_numbers(rgb, palette):
+    """Each colour as one number of 24 bits."""
+    weights = np.array([65536, 256, 1])
+    picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
+    found = picture[..., None] == table
+    return np.where(found.any(axis=-1), found.argmax(axis=-1), 255)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def matches(rgb, palette):
+    """Which channels of which class's colour each pixel has, (H, W, C, 3)."""
+    return rgb[:, :, None, :] == palette
+
+
+def first_of(same, otherwise=255):
+    """The first class that holds, (H, W, C) -> (H, W)."""
+    return np.where(same.any(axis=-1), same.argmax(axis=-1), otherwise)
+
+
+@wrong(QUESTION, "A mixed colour has no class: the nearest one may belong to a class that was never there.")
+def nearest_colour(rgb, palette):
+    """Whatever colour lies nearest."""
+    distance = ((rgb[:, :, None, :].astype(float) - palette) ** 2).sum(axis=-1)
+    return distance.argmin(axis=-1)
+
+
+def last_of(same):
+    """The last class that holds, as a loop over the classes leaves it."""
+    return np.where(same.any(axis=-1), same.shape[-1] - 1 - same[..., ::-1].argmax(axis=-1), 255)
+
+
+ALL_THREE = "Two colours are the same if all three channels are: is one of them enough in yours?"
+NOT_THE_SUM = "Different colours can be equally bright: compare the channels, not their sum."
+
+
+@wrong(QUESTION, ALL_THREE)
+def any_channel(rgb, palette):
+    """One channel that fits is taken for all; the first such class counts."""
+    return first_of(matches(rgb, palette).any(axis=-1))
+
+
+@wrong(QUESTION, ALL_THREE)
+def any_channel_of_the_last(rgb, palette):
+    """The same, and the last such class counts."""
+    return last_of(matches(rgb, palette).any(axis=-1))
+
+
+@wrong(QUESTION, NOT_THE_SUM)
+def by_brightness(rgb, palette):
+    """The sum of the channels compared; the first such class counts."""
+    return first_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
+
+
+@wrong(QUESTION, NOT_THE_SUM)
+def by_brightness_of_the_last(rgb, palette):
+    """The same, and the last such class counts."""
+    return last_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
+
+
+@wrong(QUESTION, "An unknown colour is 255, not 0: what does yours start from, and what is argmax of a row of False?")
+def unknown_becomes_0(rgb, palette):
+    """Unknown colours become class 0."""
+    return first_of(matches(rgb, palette).all(axis=-1), 0)
+
+
+@wrong(QUESTION, "Bytes wrap round: 16 * 16 is 256, and a byte holds 0 for it. Compare the channels themselves.")
+def squares_of_bytes(rgb, palette):
+    return last_of((((rgb[:, :, None].astype(int) - palette) ** 2) % 256 == 0).all(axis=-1))
+
+
+@wrong(QUESTION, "Each turn of your loop undoes the one before: a pixel without this class's colour keeps what it has.")
+def last_class_alone(rgb, palette):
+    return np.where((rgb == palette[-1]).all(axis=-1), len(palette) - 1, 255)
+
+
+@wrong(QUESTION, "Which channel comes first in an RGB image?")
+def blue_first(rgb, palette):
+    """The picture read as BGR."""
+    return first_of(matches(rgb[..., ::-1], palette).all(axis=-1))

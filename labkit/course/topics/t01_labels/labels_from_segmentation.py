@@ -1,0 +1,125 @@
+"""01_labels.labels_from_segmentation: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def labels_from_segmentation(segmentation, class_of_body):
+    """Turn PyBullet's raw mask, body + ((link + 1) << 24) or -1 for nothing, into labels; nothing is class 0."""
+    labels = np.zeros(segmentation.shape, np.uint8)
+    seen = segmentation >= 0
+    labels[seen] = class_of_body[segmentation[seen] & 0xFFFFFF]
+    return labels
+
+
+def _raw_mask(rng):
+    """Draw bodies with links -1 to 11, and nothing in a fifth of the pixels; the first and last body have a class."""
+    bodies = int(rng.integers(5, 9))
+    class_of_body = rng.permutation(np.arange(bodies) % 4).astype(np.uint8)
+    class_of_body[[0, -1]] = rng.integers(1, 4, 2)
+    shape = (int(rng.integers(6, 9)), int(rng.integers(10, 14)))
+    body, link = rng.integers(0, bodies, shape), rng.integers(-1, 12, shape)
+    raw = body + ((link + 1) << 24)
+    raw[rng.random(shape) < 0.2] = -1
+    return raw.astype(np.int32), class_of_body
+
+
+QUESTION = Question(
+    name="01_labels.labels_from_segmentation",
+    reference=labels_from_segmentation,
+    inputs=_raw_mask,
+    by_hand=(
+        (np.array([[-1, 0, 1], [2, 1 + (1 << 24), 2 + (3 << 24)]], np.int32), np.array([1, 3, 2], np.uint8)),
+        (np.array([[65537, 65538 + (127 << 24)]], np.int32), (np.arange(5, 65545) // 7 % 4).astype(np.uint8)),  # many
+        (np.array([[5 << 24, 3 + (12 << 24)]], np.int32), np.array([2, 0, 0, 255], np.uint8)),  # a body not judged
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=2,
+    properties=(
+        Property(
+            "where nothing is seen (-1), the label is 0",
+            lambda arguments, labels: not np.any(labels[arguments[0] == -1]),
+        ),
+    ),
+    forbidden=("pybullet",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for place, value in np.ndenumerate(segmentation):
+        if value != -1:
+            labels[place] = class_of_body[int(value) - ((int(value) >> 24) << 24)]
+    return labels
+
+
+@way(QUESTION)
+def by_body(segmentation, class_of_body):
+    body, seen = numbers_and_seen(segmentation)
+    return sum((seen & (body == number)) * int(c) for number, c in enumerate(class_of_body))
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def numbers_and_seen(segmentation):
+    return segmentation & 0xFFFFFF, segmentation >= 0
+
+
+@wrong(
+    QUESTION, "The robot has holes: values in the millions are body + ((link + 1) << 24). How do you get the body back?"
+)
+def base_links_only(segmentation, class_of_body):
+    """Compare the raw values with body numbers: whatever has link bits matches none."""
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for body, c in enumerate(class_of_body):
+        labels[segmentation == body] = c
+    return labels
+
+
+@wrong(QUESTION, "Where nothing is seen stands -1, and in NumPy the index -1 means the last entry.")
+def nothing_is_the_last_body(segmentation, class_of_body):
+    body, seen = numbers_and_seen(segmentation)
+    return class_of_body[np.where(seen, body, -1)]
+
+
+@wrong(QUESTION, "You keep the upper bits, which are the link: which bits hold the body?")
+def link_for_body(segmentation, class_of_body):
+    link = np.minimum(segmentation >> 24, len(class_of_body) - 1)
+    return np.where(segmentation >= 0, class_of_body[link], 0)
+
+
+@wrong(QUESTION, "These are body numbers: one more step leads to the class, and class_of_body knows it.")
+def body_for_class(segmentation, class_of_body):
+    body, seen = numbers_and_seen(segmentation)
+    return np.where(seen, body, 0)
+
+
+@wrong(QUESTION, "The lower 24 bits of -1 are all ones, 16777215: look up only the pixels where something is seen.")
+def nothing_looked_up(segmentation, class_of_body):
+    """IndexError, wherever nothing is seen."""
+    return class_of_body[segmentation & 0xFFFFFF]
+
+
+@wrong(QUESTION, "The body has 24 bits, six hexadecimal digits: how many does your mask keep?")
+def sixteen_bits(segmentation, class_of_body):
+    return np.where(segmentation >= 0, class_of_body[np.where(segmentation >= 0, segmentation & 0xFFFF, 0)], 0)
+
+
+@wrong(QUESTION, "The upper bits are the link plus one, not the body: which bits hold the body?")
+def link_looked_up(segmentation, class_of_body):
+    """IndexError, where a link's number is no body's."""
+    return np.where(segmentation >= 0, class_of_body[np.maximum(segmentation >> 24, 0)], 0)
+
+
+@wrong(QUESTION, "You find the base and link 0 alone, and a body may have many links. What holds for all of them?")
+def first_link_alone(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for body, c in enumerate(class_of_body):
+        labels[(segmentation == body) | (segmentation == body + (1 << 24))] = c
+    return labels

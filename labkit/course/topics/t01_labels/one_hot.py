@@ -1,0 +1,53 @@
+"""01_labels.one_hot: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t01_labels import labels_and_classes
+
+
+def one_hot(y, C):
+    """Turn labels into a one-hot tensor, one more axis of length C; a pixel that is ignored (255) is all zeros."""
+    return (y[..., None] == np.arange(C)).astype(np.uint8)
+
+
+QUESTION = Question(
+    name="01_labels.one_hot",
+    reference=one_hot,
+    inputs=labels_and_classes,
+    by_hand=((np.array([[0, 2]], np.uint8), 3), (np.array([[1, 255], [0, 3], [2, 2]], np.uint8), 5)),
+    rtol=0.0,
+    atol=0.0,
+    points=1,
+    properties=(
+        Property(
+            "over the last axis it sums to 1, and to 0 where the pixel is ignored",
+            lambda arguments, Y: np.array_equal(np.sum(Y, axis=-1), arguments[0] != 255),
+        ),
+    ),
+    forbidden=("sklearn",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(y, C):
+    Y = np.zeros((*y.shape, C), np.uint8)
+    for place, c in np.ndenumerate(y):
+        if c != 255:
+            Y[(*place, c)] = 1
+    return Y
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "255 was pressed into the range of classes: what should the C entries of such a pixel be?")
+def ignored_as_last_class(y, C):
+    return np.eye(C, dtype=np.uint8)[np.minimum(y, C - 1)]
+
+
+@wrong(QUESTION, "A class that is not in this image has a plane too, of zeros: there are always C of them.")
+def classes_that_occur(y, C):
+    return (y[..., None] == np.unique(y[y != 255])).astype(np.uint8)

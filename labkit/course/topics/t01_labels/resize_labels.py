@@ -1,0 +1,147 @@
+"""01_labels.resize_labels: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t01_labels import labels
+
+
+def resize_labels(y, height, width):
+    """Resize a label image without inventing labels: each new pixel copies the old one in which its centre falls."""
+    H, W = y.shape
+    rows = ((np.arange(height) + 0.5) * H / height).astype(int)
+    columns = ((np.arange(width) + 0.5) * W / width).astype(int)
+    return y[rows[:, None], columns]
+
+
+def _labels_and_size(rng):
+    """Draw labels, and a size that is larger in one direction and smaller in the other, or larger in both.
+
+    The old sides are odd: then no new centre falls between two old pixels, where rounding would decide.
+    """
+    y = labels(rng, 4)
+    y = y[: y.shape[0] // 2 * 2 - 1, : y.shape[1] // 2 * 2 - 1]
+    H, W = y.shape
+    height, width = (int(rng.integers(3, H)), int(rng.integers(W + 3, 2 * W)))
+    return (y, height, width) if rng.random() < 0.5 else (y, int(rng.integers(H + 2, 3 * H)), width)
+
+
+_ALL_DIFFERENT = np.random.default_rng(1).permutation(24).astype(np.uint8).reshape(4, 6)
+_LARGE = (np.add.outer(np.arange(301), 2 * np.arange(307)) % 5).astype(np.uint8)  # not every index is a uint8
+
+
+QUESTION = Question(
+    name="01_labels.resize_labels",
+    reference=resize_labels,
+    inputs=_labels_and_size,
+    by_hand=(
+        (np.array([[1, 3]], np.uint8), 1, 4),
+        (_ALL_DIFFERENT, 2, 3),  # a new centre falls between two old pixels
+        (_LARGE, 5, 6),
+        (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=4,
+    properties=(
+        Property(
+            "no label is there that was not there before",
+            lambda arguments, y: set(np.unique(y).tolist()) <= set(np.unique(arguments[0]).tolist()),
+        ),
+    ),
+    forbidden=("cv2", "PIL", "skimage"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def integers(y, height, width):
+    H, W = y.shape
+    rows = (2 * np.arange(height) + 1) * H // (2 * height)
+    columns = (2 * np.arange(width) + 1) * W // (2 * width)
+    return y[np.ix_(rows, columns)]
+
+
+@way(QUESTION)
+def loops(y, height, width):
+    (H, W), out = y.shape, np.zeros((height, width), y.dtype)
+    for i in range(height):
+        for j in range(width):
+            out[i, j] = y[int((i + 0.5) * H / height), int((j + 0.5) * W / width)]
+    return out
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def copied(y, size, index):
+    """Copy labels by a rule (new index, new length, old length) -> old index, which rows and columns share."""
+    rows, columns = (np.asarray(index(np.arange(n), n, old), int) for n, old in zip(size, y.shape, strict=True))
+    return y[rows[:, None], columns]
+
+
+@wrong(QUESTION, "np.unique before and after? The mean of classes 1 and 3 is not class 2: labels cannot be averaged.")
+def bilinear(y, height, width):
+    import cv2
+
+    return np.round(cv2.resize(y.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)).astype(np.uint8)
+
+
+@wrong(
+    QUESTION, "All is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner."
+)
+def from_the_corner(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: i * old // n)
+
+
+@wrong(QUESTION, "You lay the first and last centres on each other; here the images' edges lie on each other.")
+def corner_to_corner(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.round(np.linspace(0, old - 1, n)))
+
+
+@wrong(QUESTION, "The half belongs to the new pixel: it is added before you scale, (i + 0.5) * H / h, not afterwards.")
+def half_added_afterwards(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.minimum(i * old / n + 0.5, old - 1))
+
+
+@wrong(QUESTION, "Subtract no 0.5 before floor: here old pixel u reaches from u to u + 1, and its centre is u + 0.5.")
+def half_subtracted(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * old / n - 0.5)
+
+
+@wrong(QUESTION, "Rows are multiplied by H / height, old by new: is yours height / H?")
+def scaled_by_new_over_old(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * n / old)
+
+
+@wrong(QUESTION, "np.resize repeats the numbers row after row: is your image still the same scene?")
+def refilled(y, height, width):
+    return np.resize(y, (height, width))
+
+
+@wrong(QUESTION, "The whole scene should be in the new image, in another size.")
+def padded_or_cropped(y, height, width):
+    H, W = y.shape
+    return np.pad(y, ((0, max(height - H, 0)), (0, max(width - W, 0))), mode="edge")[:height, :width]
+
+
+@wrong(QUESTION, "On the border of two old pixels, floor takes the later one: which one does np.round take?")
+def rounded(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n - 0.5))
+
+
+@wrong(QUESTION, "The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+def rounded_up(y, height, width):
+    """IndexError, where the last centre is rounded to the number of pixels."""
+    return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n))
+
+
+@wrong(QUESTION, "Columns are counted along W and rows along H: you take H for both.")
+def height_for_both(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * len(y) / n)
+
+
+@wrong(QUESTION, "Columns have a factor of their own, W / width: yours are scaled by H / height, as rows are.")
+def columns_scaled_as_rows(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))

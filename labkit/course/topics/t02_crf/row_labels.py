@@ -1,0 +1,177 @@
+"""02_crf.row_labels: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def row_labels(psi, w):
+    """Find the cheapest labels of one row: walk along it, remember where each minimum came from, and walk back."""
+    n, C = psi.shape
+    best, origins = psi[0], []
+    for u in range(1, n):
+        switch = best.min() + w[u - 1]
+        origins.append(np.where(best <= switch, np.arange(C), best.argmin()))
+        best = psi[u] + np.minimum(best, switch)
+    labels = [best.argmin()]
+    for origin in reversed(origins):
+        labels.append(origin[labels[-1]])
+    return np.array(labels[::-1], dtype=np.uint8)
+
+
+def cost(psi, w, labels):
+    """What a row's labels cost."""
+    labels = np.asarray(labels).astype(int)
+    return psi[np.arange(len(psi)), labels].sum() + w[labels[1:] != labels[:-1]].sum()
+
+
+QUESTION = Question(
+    name="02_crf.row_labels",
+    reference=row_labels,
+    inputs=lambda rng: (rng.normal(1.0, 1.0, (9, 3)), rng.uniform(0.1, 1.6, 8)),
+    by_hand=(
+        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
+        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
+        (np.array([[0.0, 3.0, 0.5], [1.0, 3.0, 0.9], [3.0, 2.5, 0.0]]), np.array([0.8, 0.3])),  # from class 0 to 2
+        (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
+        (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the labels cost no more than each pixel's own cheapest class does",
+            lambda given, labels: bool(cost(*given, labels) <= cost(*given, given[0].argmin(axis=1)) + 1e-9),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_min_marginals(psi, w):
+    """Both walks, from the left and from the right: what each class at each pixel costs at least."""
+
+    def forward(psi, w):
+        best = [psi[0]]
+        for u in range(1, len(psi)):
+            best.append(psi[u] + np.minimum(best[-1], best[-1].min() + w[u - 1]))
+        return np.array(best)
+
+    return (forward(psi, w) + forward(psi[::-1], w[::-1])[::-1] - psi).argmin(axis=1)
+
+
+@way(QUESTION)
+def carried_along(psi, w):
+    """The cheapest labels up to each pixel, one list per class."""
+    ways = [(cost, [c]) for c, cost in enumerate(psi[0])]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        ways = [
+            min((cost + weight * (way[-1] != c) + costs[c], [*way, c]) for cost, way in ways) for c in range(len(costs))
+        ]
+    return np.array(min(ways)[1])
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def walk(psi, w):
+    """The least cost of the row up to each pixel, by its class, (n, C)."""
+    best = [psi[0]]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        best.append(costs + np.minimum(best[-1], best[-1].min() + weight))
+    return np.array(best)
+
+
+def walk_with_origins(psi, w, late=0):
+    """The walk, and the class that each came from, (n, C); late: 1 if the cheapest class is asked for a pixel late."""
+    best, came = walk(psi, w), np.zeros(psi.shape, int)
+    for u in range(1, len(psi)):
+        stays = best[u - 1] <= best[u - 1].min() + w[u - 1]
+        came[u] = np.where(stays, np.arange(psi.shape[1]), best[u - 1 + late].argmin())
+    return best, came
+
+
+def traced(came, last):
+    """The way back from the last label, through one row of `came` after the other."""
+    labels = [last]
+    for origin in came[::-1]:
+        labels.append(origin[labels[-1]])
+    return np.array(labels[::-1])
+
+
+@wrong(QUESTION, "That is each pixel's own choice: does changing the class cost w in yours, and keeping it nothing?")
+def pixel_by_pixel(psi, w):
+    """The weights forgotten, or paid by all classes alike."""
+    return psi.argmin(axis=1)
+
+
+@wrong(
+    QUESTION,
+    "The cheapest class so far need not lie on the cheapest way: walk back, and let a pixel keep its class for free.",
+)
+def never_walked_back(psi, w):
+    """The minimum at each pixel of the forward walk."""
+    return walk(psi, w).argmin(axis=1)
+
+
+@wrong(QUESTION, "Choosing pixel by pixel from the left cannot know what comes: keep a cost for every class.")
+def greedy(psi, w):
+    """From the left, each pixel the class that is cheapest given the label before it."""
+    labels = [psi[0].argmin()]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        labels.append((costs + weight * (np.arange(len(costs)) != labels[-1])).argmin())
+    return np.array(labels)
+
+
+@wrong(QUESTION, "Going from pixel u - 1 to pixel u, the pair stands at w[u - 1].")
+def next_pairs_weight(psi, w):
+    """The weight of the pair ahead, charged for the pair behind."""
+    return row_labels(psi, np.roll(w, -1))
+
+
+@wrong(QUESTION, "Each pair has a weight of its own: is the first pair's weight paid for all pairs in yours?")
+def first_weight_for_all(psi, w):
+    return row_labels(psi, np.repeat(w[:1], len(w)))
+
+
+@wrong(QUESTION, "Classes have names, not sizes: from class 0 to class 2 costs w once, as from class 0 to class 1.")
+def class_steps(psi, w):
+    """Labels subtracted as if they were numbers."""
+    best, came, classes = psi[0], [], np.arange(psi.shape[1])
+    for costs, weight in zip(psi[1:], w, strict=True):
+        ways = best + weight * np.abs(classes[:, None] - classes)
+        came.append(ways.argmin(axis=1))
+        best = costs + ways.min(axis=1)
+    return traced(came, best.argmin())
+
+
+@wrong(QUESTION, "On the way back from pixel u: do you read the row of `came` that belongs to u, or to u - 1?")
+def traced_one_pixel_off(psi, w):
+    """The way back read one pixel too early."""
+    best, came = walk_with_origins(psi, w)
+    return traced(came[:-1], best[-1].argmin())
+
+
+@wrong(QUESTION, "A pixel comes from the cheapest class of `best` before psi[u] is added: does yours ask too late?")
+def asked_too_late(psi, w):
+    best, came = walk_with_origins(psi, w, late=1)
+    return traced(came[1:], best[-1].argmin())
+
+
+@wrong(QUESTION, "The last label is the cheapest by `best`, which holds the whole row, not by the last pixel's psi.")
+def last_pixel_on_its_own(psi, w):
+    return traced(walk_with_origins(psi, w)[1][1:], psi[-1].argmin())
+
+
+@wrong(QUESTION, "Your way back ends one step too early: what came[1] says of the first pixel is not used.")
+def first_pixel_not_reached(psi, w):
+    labels = row_labels(psi, w).copy()
+    labels[0] *= len(labels) == 1
+    return labels
+
+
+@wrong(QUESTION, "The first pixel's own cheapest class need not lie on the best way: its label is traced back as well.")
+def first_pixel_on_its_own(psi, w):
+    return np.array([psi[0].argmin(), *row_labels(psi, w)[1:]])

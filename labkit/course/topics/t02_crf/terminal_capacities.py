@@ -1,0 +1,91 @@
+"""02_crf.terminal_capacities: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t02_crf import model
+
+
+def terminal_capacities(psi):
+    """Give the arcs source -> pixel and pixel -> sink for two classes, the source's side being 0, and the constant."""
+    lowest = psi.min(axis=2)
+    source = psi[..., 1] - lowest
+    sink = psi[..., 0] - lowest
+    return source, sink, float(lowest.sum())
+
+
+QUESTION = Question(
+    name="02_crf.terminal_capacities",
+    reference=terminal_capacities,
+    inputs=lambda rng: (model(rng, 3, 5, 2)[0],),
+    by_hand=(
+        (np.array([[[2.0, 5.0]]]),),
+        (np.array([[[4.0, 1.0], [-1.0, -3.0]]]),),
+        (np.array([[[0.5, 0.5]], [[0.0, 2.0]], [[3.0, 1.0]]]),),
+    ),
+    points=2,
+    properties=(
+        Property("no capacity is negative", lambda given, out: bool(np.min(out[0]) >= 0.0 and np.min(out[1]) >= 0.0)),
+        Property(
+            "one of the two arcs of each pixel has capacity 0",
+            lambda given, out: bool(np.minimum(out[0], out[1]).max() <= 1e-9),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_difference(psi):
+    """Only the difference of a pixel's two costs matters to a cut."""
+    difference = psi[..., 1] - psi[..., 0]
+    return np.maximum(difference, 0), np.maximum(-difference, 0), np.minimum(psi[..., 0], psi[..., 1]).sum()
+
+
+@way(QUESTION)
+def loops(psi):
+    """Pixel by pixel, in single precision."""
+    H, W, _ = psi.shape
+    source, sink, constant = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32), 0.0
+    for v in range(H):
+        for u in range(W):
+            low = min(psi[v, u])
+            source[v, u], sink[v, u] = psi[v, u, 1] - low, psi[v, u, 0] - low
+            constant += low
+    return source, sink, constant
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def terminals(source, sink, constant):
+    """Two (H, W) capacities and a number, as the question asks for them."""
+    return source, sink, float(constant)
+
+
+@wrong(QUESTION, "Try one pixel: on the source's side it has label 0, and which of its two arcs is cut then?")
+def source_and_sink_exchanged(psi):
+    """A pixel that wants label 0 is bound to the sink."""
+    lowest = psi.min(axis=2)
+    return terminals(psi[..., 0] - lowest, psi[..., 1] - lowest, lowest.sum())
+
+
+@wrong(QUESTION, "Subtract the minimum pixel by pixel, so that one of each pixel's two arcs vanishes.")
+def one_minimum_for_all(psi):
+    """Right as a cut, but both arcs of a pixel stay."""
+    return terminals(psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size)
+
+
+@wrong(QUESTION, "A negative cost needs no clipping: less the pixel's smaller cost, both of its arcs are 0 or more.")
+def negative_costs_clipped(psi):
+    clipped = np.maximum(psi, 0.0)
+    lowest = clipped.min(axis=2)
+    return terminals(clipped[..., 1] - lowest, clipped[..., 0] - lowest, lowest.sum())
+
+
+@wrong(QUESTION, "What goes into the constant leaves both arcs: the one that stays carries the costs' difference.")
+def whole_costs_kept(psi):
+    dearer = np.where(psi > psi.min(axis=2, keepdims=True), psi, 0.0)
+    return terminals(dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum())

@@ -1,0 +1,87 @@
+"""02_crf.unary_from_probabilities: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def unary_from_probabilities(p, floor):
+    """Turn class probabilities into costs; those below `floor` count as `floor`."""
+    return -np.log(np.maximum(p, floor))
+
+
+def _probabilities(rng):
+    """Draw probabilities some of which lie below the floor."""
+    return rng.dirichlet((0.3, 0.4, 0.5), (4, 5)), float(rng.uniform(0.01, 0.05))
+
+
+QUESTION = Question(
+    name="02_crf.unary_from_probabilities",
+    reference=unary_from_probabilities,
+    inputs=_probabilities,
+    by_hand=(
+        (np.array([[[0.5, 0.25, 0.25], [1.0, 0.0, 0.0]]]), 0.01),
+        (np.array([[[0.7, 0.3]], [[0.05, 0.95]], [[0.1, 0.9]]]), 0.1),
+    ),
+    points=1,
+    properties=(
+        Property("every cost is 0 or more", lambda given, psi: bool(np.min(psi) >= -1e-9)),
+        Property(
+            "the likeliest class of a pixel is its cheapest",
+            lambda given, psi: bool((np.take_along_axis(psi, given[0].argmax(2)[..., None], 2) <= psi + 1e-9).all()),
+        ),
+    ),
+    forbidden=("labkit",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(p, floor):
+    """Probability by probability."""
+    psi = np.zeros(p.shape)
+    for index in np.ndindex(*p.shape):
+        psi[index] = -np.log(p[index] if p[index] > floor else floor)
+    return psi
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "The softmax has been applied already: these numbers sum to one at each pixel.")
+def softmaxed_again(p, floor):
+    """Take the probabilities for logits."""
+    e = np.exp(p)
+    return -np.log(np.maximum(e / e.sum(axis=-1, keepdims=True), floor))
+
+
+@wrong(QUESTION, "Only probabilities below the floor are to change: look at a pixel where one class has probability 1.")
+def the_floor_added(p, floor):
+    return -np.log(p + floor)
+
+
+@wrong(QUESTION, "What does a class of probability 0 cost, and can neighbours ever overrule that?")
+def no_floor(p, floor):
+    return -np.log(np.maximum(p, 1e-300))
+
+
+@wrong(QUESTION, "Only small probabilities are lifted: what must a class of probability 1 cost, and what does yours?")
+def clipped_at_both_ends(p, floor):
+    return -np.log(np.clip(p, floor, 1.0 - floor))
+
+
+@wrong(QUESTION, "Must yours sum to 1 after the floor? What is not below it stays as it is, and 1 still costs 0.")
+def made_to_sum_to_1_again(p, floor):
+    lifted = np.maximum(p, floor)
+    return -np.log(lifted / lifted.sum(axis=-1, keepdims=True))
+
+
+@wrong(QUESTION, "Not 0 alone counts as the floor: every probability below the floor does.")
+def zeros_lifted(p, floor):
+    return -np.log(np.where(p == 0.0, floor, p))
+
+
+@wrong(QUESTION, "The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
+def costs_lifted(p, floor):
+    return np.maximum(-np.log(p), floor)

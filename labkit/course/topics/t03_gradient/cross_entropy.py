@@ -1,0 +1,118 @@
+"""03_gradient.cross_entropy: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t03_gradient import SURE, TOY, TRUE_CLASSES, random_pixels
+from labkit.course.topics.t03_gradient.softmax import softmax
+
+
+def cross_entropy(z, y):
+    """Sum -log p(y) over the pixels; those labelled 255 add nothing."""
+    counted = y != 255
+    z, y = z[counted].T, y[counted]  # (C, N): a row a class
+    log_p = z - np.logaddexp.reduce(z)
+    return -float(log_p[y, np.arange(len(y))].sum())
+
+
+QUESTION = Question(
+    name="03_gradient.cross_entropy",
+    reference=cross_entropy,
+    inputs=random_pixels,
+    by_hand=(
+        (TOY[None], np.array([1], np.uint8)),
+        (SURE, np.array([0, 2], np.uint8)),
+        (SURE, TRUE_CLASSES),
+        (SURE, np.array([255, 255], np.uint8)),
+    ),
+    properties=(Property("a loss is never negative", lambda arguments, out: bool(out >= -1e-6)),),
+    forbidden=("scipy", "torch"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(z, y):
+    total = 0.0
+    for place in np.ndindex(y.shape):
+        if y[place] != 255:
+            top = z[place].max()
+            total += top + np.log(sum(np.exp(value - top) for value in z[place])) - z[place][y[place]]
+    return total
+
+
+@way(QUESTION)
+def one_hot(z, y):
+    Y = (y[..., None] == np.arange(z.shape[-1])).astype(float)
+    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
+    return -(Y * log_p).sum()
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def true_log_probabilities(z, y):
+    """Log-probabilities of the true classes of the counted pixels, a list."""
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
+    return log_p[np.arange(len(y)), y]
+
+
+@wrong(QUESTION, "log(p + epsilon) can never exceed 16 or so, however wrong the pixel: write log p without p.")
+def cross_entropy_epsilon(z, y):
+    p = np.exp(true_log_probabilities(z, y))
+    return float(-np.log(p + 1e-7).sum())
+
+
+@wrong(QUESTION, "What range enters the loss? Logits are normalised once, inside it.")
+def cross_entropy_softmax_twice(z, y):
+    return cross_entropy(softmax(z), y)
+
+
+@wrong(QUESTION, "The other classes' logits have to count as well.")
+def cross_entropy_without_softmax(z, y):
+    counted = y != 255
+    return -float(np.take_along_axis(z[counted], y[counted][:, None], -1).sum())
+
+
+@wrong(QUESTION, "The loss is minus the logarithm, not one minus p.")
+def cross_entropy_of_probabilities(z, y):
+    return float((1.0 - np.exp(true_log_probabilities(z, y))).sum())
+
+
+@wrong(QUESTION, "Only the true class's log-probability is summed.")
+def cross_entropy_of_all_classes(z, y):
+    counted = y != 255
+    log_p = z[counted] - np.logaddexp.reduce(z[counted], axis=-1, keepdims=True)
+    return -float(log_p.sum())
+
+
+@wrong(QUESTION, "The loss is a sum over the pixels. Yours is divided by how many are counted, and fails if none is.")
+def cross_entropy_mean_of_counted(z, y):
+    return -float(np.mean(true_log_probabilities(z, y)))
+
+
+@wrong(QUESTION, "A pixel labelled 255 adds nothing at all. Yours leaves out its true logit and still adds its lse.")
+def cross_entropy_with_ignored_lse(z, y):
+    true = np.where(y[..., None] == np.arange(z.shape[-1]), z, 0.0)
+    return float(np.logaddexp.reduce(z, axis=-1).sum() - true.sum())
+
+
+@wrong(QUESTION, "A probability that rounds to 0 has no logarithm: log p is z - lse(z), without p.")
+def cross_entropy_of_rounded_probabilities(z, y):
+    return -float(np.log(np.exp(true_log_probabilities(z, y))).sum())
+
+
+@wrong(QUESTION, "The maximum that you take out of the exponents comes back: lse is m plus the logarithm.")
+def cross_entropy_without_the_maximum(z, y):
+    counted = y != 255
+    return cross_entropy(z, y) - float(z[counted].max(axis=-1, initial=-np.inf).sum())
+
+
+@wrong(QUESTION, "z[:, y] takes the columns of all pixels' classes for each pixel: one entry per row is asked for.")
+def cross_entropy_of_all_pixels_classes(z, y):
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    return float((np.logaddexp.reduce(z, axis=-1) - z[:, y]).sum())

@@ -1,0 +1,103 @@
+"""03_gradient.cross_entropy_grad: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t03_gradient import SURE, TOY, random_pixels, softmax_over_pixels
+from labkit.course.topics.t03_gradient.softmax import softmax
+
+
+def cross_entropy_grad(z, y):
+    """Differentiate the summed cross-entropy by each logit; 0 where the label is 255."""
+    e = np.exp(z - z.max(axis=-1, keepdims=True))
+    p = e / e.sum(axis=-1, keepdims=True)
+    Y = y[..., None] == np.arange(z.shape[-1])
+    return np.where(y[..., None] == 255, 0.0, p - Y)
+
+
+QUESTION = Question(
+    name="03_gradient.cross_entropy_grad",
+    reference=cross_entropy_grad,
+    inputs=random_pixels,
+    by_hand=(
+        (TOY[None], np.array([1], np.uint8)),
+        (TOY[None], np.array([0], np.uint8)),
+        (SURE, np.array([0, 2], np.uint8)),  # the darker pixel counts: one maximum for both is not enough
+    ),
+    points=2,
+    properties=(
+        Property(
+            "the gradient of each pixel sums to 0",
+            lambda arguments, grad: bool(np.allclose(grad.sum(axis=-1), 0.0, atol=1e-4)),
+        ),
+    ),
+    forbidden=("scipy", "torch"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(z, y):
+    out = np.zeros(z.shape)
+    for place in np.ndindex(y.shape):
+        if y[place] != 255:
+            e = np.exp(z[place] - z[place].max())
+            for c in range(z.shape[-1]):
+                out[place][c] = e[c] / e.sum() - (1.0 if c == y[place] else 0.0)
+    return out
+
+
+@way(QUESTION)
+def in_place(z, y):
+    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
+    counted = y != 255
+    rows = np.nonzero(counted)
+    p[(*rows, y[rows])] -= 1.0
+    return np.einsum("...c,...->...c", p, counted)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def one_hot(z, y):
+    """The labels as ones and zeros in the logits' shape."""
+    return (y[..., None] == np.arange(z.shape[-1])).astype(float)
+
+
+@wrong(QUESTION, "A pixel that adds no loss has no gradient: look at 255.")
+def grad_counts_ignored(z, y):
+    return softmax(z) - one_hot(z, y)
+
+
+@wrong(QUESTION, "Normalise over the classes, the last axis.")
+def grad_over_pixels(z, y):
+    return (softmax_over_pixels(z) - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "Compare probabilities with the one-hot, not logits.")
+def grad_of_logits(z, y):
+    return (z - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "That is the slope of half the squared error; with the logarithm, the p in front cancels.")
+def grad_of_squared_error(z, y):
+    p = softmax(z)
+    error = p - one_hot(z, y)
+    return p * (error - (p * error).sum(axis=-1, keepdims=True)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "That is the slope of -p[y]. What does the logarithm's derivative, 1 / p[y], make of it?")
+def grad_without_the_logarithm(z, y):
+    Y = one_hot(z, y)
+    return (softmax(z) * Y).sum(axis=-1, keepdims=True) * cross_entropy_grad(z, y)
+
+
+@wrong(QUESTION, "Your gradient sums to 1 over a pixel's classes: the one-hot has not been taken off.")
+def grad_without_the_one_hot(z, y):
+    return softmax(z) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "The other classes move, too: where c is not the true class the slope is p[c], not 0.")
+def grad_of_the_true_class_alone(z, y):
+    return (softmax(z) - 1.0) * one_hot(z, y)

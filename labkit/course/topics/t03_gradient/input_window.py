@@ -1,0 +1,130 @@
+"""03_gradient.input_window: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def input_window(kernels, strides, paddings, u):
+    """Say which input pixels an output pixel depends on along one axis: from the output's layer back to the image."""
+    first = last = int(u)
+    for kernel, stride, padding in np.transpose([kernels, strides, paddings])[::-1].tolist():
+        first = first * stride - padding
+        last = last * stride - padding + kernel - 1
+    return first, last
+
+
+def draw_layers(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Draw kernels, strides and paddings of four to six layers, and an output pixel."""
+    n = int(rng.integers(4, 7))
+    kernels, strides, paddings = rng.integers(2, 8, n), rng.integers(1, 4, n), rng.integers(0, 4, n)
+    strides[:2], paddings[:2] = (3, 2), (1, 3)
+    return kernels, strides, paddings, int(rng.integers(3, 30))
+
+
+QUESTION = Question(
+    name="03_gradient.input_window",
+    reference=input_window,
+    inputs=draw_layers,
+    by_hand=(
+        (np.array([3]), np.array([1]), np.array([1]), 10),
+        (np.array([2]), np.array([2]), np.array([0]), 10),
+        (np.array([3, 2, 3, 2, 3]), np.array([1, 2, 1, 2, 1]), np.array([1, 0, 1, 0, 1]), 8),
+        (np.array([7, 1, 5]), np.array([2, 3, 1]), np.array([3, 0, 0]), 4),
+        (np.array([3, 5]), np.array([1, 2]), np.array([1, 2]), 0),  # it begins outside the image
+    ),
+    points=3,
+    properties=(Property("the first pixel is not behind the last", lambda given, out: bool(out[0] <= out[1])),),
+    forbidden=("scipy", "torch"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_counting(kernels, strides, paddings, u):
+    """The set of all pixels that are read, layer by layer."""
+    seen = {int(u)}
+    for k, s, p in list(zip(kernels, strides, paddings, strict=True))[::-1]:
+        seen = {int(place * s - p + i) for place in seen for i in range(k)}
+    return min(seen), max(seen)
+
+
+@way(QUESTION)
+def by_products(kernels, strides, paddings, u):
+    """Forward: how far a step of each layer's input is in the image."""
+    jumps = np.concatenate([[1], np.cumprod(strides)])
+    first = int(u * jumps[-1] - (paddings * jumps[:-1]).sum())
+    return first, first + int(((kernels - 1) * jumps[:-1]).sum())
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def back(kernels, strides, paddings, u, reverse=True):
+    """Walk back through layers given from the image on."""
+    layers = np.transpose([kernels, strides, paddings]).tolist()
+    first = last = int(u)
+    for kernel, stride, padding in layers[::-1] if reverse else layers:
+        first, last = first * stride - padding, last * stride - padding + kernel - 1
+    return first, last
+
+
+@wrong(QUESTION, "You stand at the output: which layer do you pass first on the way back to the image?")
+def from_the_image_on(kernels, strides, paddings, u):
+    """The layers in the order in which the image passes them."""
+    return back(kernels, strides, paddings, u, reverse=False)
+
+
+@wrong(QUESTION, "A layer with padding starts to read outside the image: by how much does that move its window?")
+def without_padding(kernels, strides, paddings, u):
+    """Padding forgotten."""
+    return back(kernels, strides, np.zeros_like(paddings), u)
+
+
+@wrong(QUESTION, "Output u of a layer with stride s starts to read at s u: what does a stride do to a position?")
+def without_strides(kernels, strides, paddings, u):
+    """Strides forgotten."""
+    return back(kernels, np.ones_like(strides), paddings, u)
+
+
+@wrong(QUESTION, "A kernel of width 3 that starts at pixel 4 reads 4, 5 and 6: which is the last?")
+def one_too_far(kernels, strides, paddings, u):
+    """The window ends behind its last pixel."""
+    return back(np.asarray(kernels) + 1, strides, paddings, u)
+
+
+@wrong(
+    QUESTION, "Padding adds pixels in front of the first one: is the window of output 0 moved to the left or the right?"
+)
+def padding_added(kernels, strides, paddings, u):
+    """Padding moves the window to the wrong side."""
+    return back(kernels, strides, -np.asarray(paddings), u)
+
+
+@wrong(QUESTION, "s u - p: the padding is counted in pixels of the layer's input, so the stride does not multiply it.")
+def padding_before_the_stride(kernels, strides, paddings, u):
+    """s (u - p) in the place of s u - p."""
+    return back(kernels, strides, strides * paddings, u)
+
+
+@wrong(QUESTION, "Each layer makes the window wider: walk the last pixel back on its own.")
+def window_of_the_first_layer(kernels, strides, paddings, u):
+    """Only the first pixel is walked back; the first layer's width is added."""
+    first = back(kernels, strides, paddings, u)[0]
+    return first, first + int(kernels[0]) - 1
+
+
+@wrong(QUESTION, "A window may begin outside the image, at a negative pixel. Leave it so.")
+def kept_inside_the_image(kernels, strides, paddings, u):
+    """No pixel before 0."""
+    first, last = back(kernels, strides, paddings, u)
+    return max(first, 0), last
+
+
+@wrong(QUESTION, "That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+def centred(kernels, strides, paddings, u):
+    """A window of the right width around the output's place in the image."""
+    first, last = back(kernels, strides, paddings, u)
+    middle = u * int(np.prod(strides))
+    return middle - (last - first + 1) // 2, middle + (last - first + 1) // 2

@@ -1,0 +1,93 @@
+"""03_gradient.softmax: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t03_gradient import SURE, TOY, random_logits, softmax_over_pixels
+
+
+def softmax(z):
+    """Turn logits (..., C) into probabilities over the last axis, for logits of any size."""
+    e = np.exp(z - z.max(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+QUESTION = Question(
+    name="03_gradient.softmax",
+    reference=softmax,
+    inputs=lambda rng: (random_logits(rng),),
+    by_hand=((TOY,), (SURE,)),
+    properties=(
+        Property(
+            "the probabilities of a pixel, over the last axis, sum to 1",
+            lambda arguments, p: bool(np.allclose(p.sum(axis=-1), 1.0, atol=1e-4)),
+        ),
+    ),
+    points=1,
+    forbidden=("scipy", "torch"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(z):
+    out = np.zeros(z.shape)
+    for place in np.ndindex(z.shape[:-1]):
+        total = sum(np.exp(other - max(z[place])) for other in z[place])
+        for c in range(z.shape[-1]):
+            out[(*place, c)] = np.exp(z[place][c] - max(z[place])) / total
+    return out
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "Each pixel has probabilities of its own: sum over one axis.")
+def softmax_over_everything(z):
+    e = np.exp(z - z.max())
+    return e / e.sum()
+
+
+@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+def softmax_that_overflows(z):
+    return np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Take each pixel's own largest logit: beside the image's, a dark pixel's exponentials all round to 0.")
+def softmax_of_global_maximum(z):
+    e = np.exp(z - z.max())
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Clipping changes the answer, a shift does not: softmax sees differences.")
+def softmax_clipped(z):
+    e = np.exp(np.clip(z, -50.0, 50.0))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Classes exclude each other: do your probabilities sum to one?")
+def sigmoid_of_each(z):
+    return 1.0 / (1.0 + np.exp(-z))
+
+
+@wrong(QUESTION, "Logits may be negative, probabilities may not.")
+def logits_divided_by_their_sum(z):
+    return z / z.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Which numbers must sum to one: those of one pixel.")
+def wrong_axis(z):
+    return softmax_over_pixels(z)
+
+
+@wrong(QUESTION, "Which number, taken off, makes the largest exponent 0? With a smaller one np.exp still overflows.")
+def smallest_logit_taken_off(z):
+    e = np.exp(z - z.min(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Dividing by the largest logit changes the differences of logits; taking it off does not.")
+def divided_by_the_largest(z):
+    e = np.exp(z / z.max(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)

@@ -1,0 +1,76 @@
+"""04_iou.iou: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t04_iou import SMALL_COUNTS, counts, divide, parts
+
+
+def iou(n):
+    """Score each class with TP / (TP + FP + FN); NaN where a class is neither true nor predicted."""
+    correct = np.diagonal(n)
+    with np.errstate(invalid="ignore"):
+        return correct / (n.sum(axis=0) + n.sum(axis=1) - correct)
+
+
+QUESTION = Question(
+    name="04_iou.iou",
+    reference=iou,
+    inputs=counts,
+    by_hand=SMALL_COUNTS,
+    random_cases=6,
+    points=2,
+    properties=(
+        Property(
+            "no IoU is below 0 or above 1",
+            lambda arguments, scores: bool(np.all(np.isnan(scores) | ((scores >= 0.0) & (scores <= 1.0)))),
+        ),
+    ),
+    forbidden=("sklearn", "torchmetrics"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(n):
+    scores = []
+    for c in range(len(n)):
+        false_positive = sum(int(n[i, c]) for i in range(len(n)) if i != c)
+        false_negative = sum(int(n[c, j]) for j in range(len(n)) if j != c)
+        union = int(n[c, c]) + false_positive + false_negative
+        scores.append(int(n[c, c]) / union if union else float("nan"))
+    return np.array(scores)
+
+
+@way(QUESTION)
+def einsum(n):
+    correct = np.einsum("ii->i", n)
+    union = np.einsum("ij->j", n) + np.einsum("ij->i", n) - correct
+    return np.divide(correct, union, out=np.full(len(n), np.nan), where=union > 0)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "The overlap stands in the row sum and in the column sum: how often is it in your union?")
+def overlap_twice_in_the_union(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true)
+
+
+@wrong(QUESTION, "That is Dice (F1), another score: the overlap stands once in an IoU, not twice.")
+def dice(n):
+    correct, predicted, true = parts(n)
+    return divide(2.0 * correct, predicted + true)
+
+
+@wrong(QUESTION, "A pixel of class 1 that is called 2 is in neither set of class 0: is it in your union of class 0?")
+def all_but_the_other_hits(n):
+    return divide(np.diagonal(n), n.sum() - np.trace(n) + np.diagonal(n))
+
+
+@wrong(QUESTION, "FP is a column, and FN a row, without the cell on the diagonal: how often is it in your union?")
+def overlap_three_times_in_the_union(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true + correct)

@@ -1,0 +1,131 @@
+"""04_iou.mean_iou: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Question, way, wrong
+from labkit.course.topics.t04_iou import iou_of, parts
+
+
+def mean_iou(n_frames):
+    """Add up the frames' confusion matrices, score each class once, average over the classes that occur at all."""
+    n = n_frames.sum(axis=0)
+    correct = np.diagonal(n)
+    with np.errstate(invalid="ignore"):
+        return np.nanmean(correct / (n.sum(axis=0) + n.sum(axis=1) - correct))
+
+
+def _counts_of_frames(rng):
+    """Draw the confusion matrices of a few frames of unlike size; a class is often absent from a frame, or from all."""
+    F, C = int(rng.choice([3, 6])), int(rng.choice([4, 5]))
+    n = rng.integers(0, 30, (F, C, C)) + np.eye(C, dtype=np.int64) * rng.integers(10, 500, (F, C, 1))
+    n *= rng.integers(1, 20, (F, 1, 1))
+    for frame in n[1:]:
+        absent = rng.integers(C)
+        frame[absent], frame[:, absent] = 0, 0
+    if rng.random() < 0.7:
+        n[:, 1], n[:, :, 1] = 0, 0
+    if rng.random() < 0.7:
+        n[:, 2] = 0
+    return (n.astype(np.int64),)
+
+
+QUESTION = Question(
+    name="04_iou.mean_iou",
+    reference=mean_iou,
+    inputs=_counts_of_frames,
+    by_hand=(
+        (np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),),  # class 1: 1/1 in one frame, 0/99 in the other
+        (np.array([[[6, 2, 0], [0, 4, 0], [0, 0, 0]]]),),
+        (np.array([[[5, 0, 1], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]]]),),  # one pixel of class 2
+    ),
+    random_cases=6,
+    points=2,
+    forbidden=("sklearn", "torchmetrics"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(n_frames):
+    C, scores = n_frames.shape[1], []
+    for c in range(C):
+        union = intersection = 0
+        for n in n_frames:
+            intersection += int(n[c, c])
+            union += int(n[c].sum() + n[:, c].sum() - n[c, c])
+        if union:
+            scores.append(intersection / union)
+    return sum(scores) / len(scores)
+
+
+@way(QUESTION)
+def einsum(n_frames):
+    correct = np.einsum("fii->i", n_frames)
+    union = np.einsum("fij->i", n_frames) + np.einsum("fij->j", n_frames) - correct
+    return (correct[union > 0] / union[union > 0]).mean()
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
+def mean_of_frames_means(n_frames):
+    return np.mean([np.nanmean(iou_of(n)) for n in n_frames if n.sum()])
+
+
+@wrong(
+    QUESTION, "Should a frame with three pixels of a class weigh as much as one with three thousand? Add counts first."
+)
+def mean_of_frames_by_class(n_frames):
+    scores = np.array([iou_of(n) for n in n_frames])
+    seen = ~np.isnan(scores).all(axis=0)
+    return np.nanmean(scores[:, seen], axis=0).mean()
+
+
+@wrong(
+    QUESTION,
+    "Each class of each frame has a vote in your mean, however few pixels it has. Add counts first, divide once.",
+)
+def mean_of_all_scores(n_frames):
+    return np.nanmean([iou_of(n) for n in n_frames])
+
+
+@wrong(QUESTION, "Your background wins: each class has one vote here, however many pixels it has.")
+def sum_over_sum(n_frames):
+    correct, predicted, true = parts(n_frames.sum(axis=0))
+    return correct.sum() / (predicted + true - correct).sum()
+
+
+@wrong(QUESTION, "A class that is predicted but never true is a mistake: its IoU is 0, and it counts.")
+def truth_only(n_frames):
+    n = n_frames.sum(axis=0)
+    return iou_of(n)[n.sum(axis=1) > 0].mean()
+
+
+@wrong(QUESTION, "A class whose IoU is 0 occurs all the same: it counts. Which number says whether a class occurs?")
+def found_only(n_frames):
+    scores = iou_of(n_frames.sum(axis=0))
+    return scores[scores > 0.0].mean()
+
+
+@wrong(QUESTION, "That is the share of pixels that are right; where are the unions?")
+def accuracy(n_frames):
+    n = n_frames.sum(axis=0)
+    return np.trace(n) / n.sum()
+
+
+@wrong(QUESTION, "The mean IoU gives each class the same weight, not the weight of its pixels.")
+def weighted_by_frequency(n_frames):
+    n = n_frames.sum(axis=0)
+    return np.nansum(iou_of(n) * n.sum(axis=1)) / n.sum()
+
+
+@wrong(QUESTION, "A class that no frame holds or predicts lifts your mean: over how many classes do you average?")
+def absent_is_1(n_frames):
+    return iou_of(n_frames.sum(axis=0), empty=1.0).mean()
+
+
+@wrong(QUESTION, "A class that occurs nowhere adds nothing to your sum: does it count in what you divide by?")
+def absent_is_0(n_frames):
+    return iou_of(n_frames.sum(axis=0), empty=0.0).mean()

@@ -1,0 +1,87 @@
+"""04_iou.merge_classes: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def merge_classes(n, group):
+    """Give the confusion matrix that the pixels would have if class c were called group[c], in truth and prediction."""
+    member = (np.arange(group.max() + 1)[:, None] == group).astype(np.int64)
+    return member @ n @ member.T
+
+
+def _counts_and_groups(rng):
+    """Draw a matrix of 5 or 6 classes with large mistakes, and 3 groups; neighbours are in different groups."""
+    C = int(rng.choice([5, 6]))
+    n = rng.integers(0, 90, (C, C)) + np.diag(rng.integers(50, 400, C))
+    return n.astype(np.int64), rng.permutation(np.arange(C) % 3).astype(np.int64)
+
+
+QUESTION = Question(
+    name="04_iou.merge_classes",
+    reference=merge_classes,
+    inputs=_counts_and_groups,
+    by_hand=(
+        (np.array([[5, 1, 0], [0, 3, 2], [0, 4, 6]]), np.array([0, 1, 1])),
+        (np.array([[5, 1, 7], [0, 3, 2], [9, 4, 6]]), np.array([1, 0, 1])),  # groups need not be in order
+        (np.array([[5, 1], [2, 3]]), np.array([0, 0])),  # everything is one class
+        (np.array([[5, 1], [2, 3]]), np.array([1, 0])),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property(
+            "the counts add up to as many pixels as before",
+            lambda arguments, merged: np.sum(merged) == arguments[0].sum(),
+        ),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(n, group):
+    G = max(group.tolist()) + 1
+    merged = np.zeros((G, G), np.int64)
+    for i in range(len(group)):
+        for j in range(len(group)):
+            merged[group[i], group[j]] += n[i, j]
+    return merged
+
+
+@way(QUESTION)
+def add_at(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, (group[:, None], group[None, :]), n)
+    return merged
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "Some pixels are lost: an index that occurs twice is written once. What adds them up?")
+def written_once(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    merged[group[:, None], group] += n
+    return merged
+
+
+@wrong(QUESTION, "A target called obstacle: if both are 'object' now, is that still a mistake?")
+def mistakes_within_a_group_dropped(n, group):
+    mistake = (group[:, None] == group) & ~np.eye(len(n), dtype=bool)
+    return merge_classes(np.where(mistake, 0, n), group)
+
+
+@wrong(QUESTION, "The rows are merged and the columns are not: a prediction has a group, too.")
+def rows_alone(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, group, n)
+    return merged
+
+
+@wrong(QUESTION, "Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
+def old_columns(n, group):
+    return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])

@@ -1,0 +1,136 @@
+"""05_class_weights.adjusted_grad: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t05_class_weights import SURE, TOY, draw_shares, some_labels
+
+
+def adjusted_grad(z, y, shares, tau):
+    """Differentiate the summed cross-entropy of the logits z + tau log(shares) by z; 0 where the label is 255."""
+    a = z + tau * np.log(shares)
+    e = np.exp(a - a.max(axis=-1, keepdims=True))
+    p = e / e.sum(axis=-1, keepdims=True)
+    Y = y[..., None] == np.arange(len(shares))
+    return (p - Y) * (y != 255)[..., None]
+
+
+def _pixels(rng):
+    """Logits (H, W, C), labels (H, W), shares of the classes, tau."""
+    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+    return (
+        2.0 * rng.normal(size=(H, W, C)),
+        some_labels(rng, H, W, C),
+        draw_shares(rng, C),
+        float(rng.uniform(0.3, 1.7)),
+    )
+
+
+QUESTION = Question(
+    name="05_class_weights.adjusted_grad",
+    reference=adjusted_grad,
+    inputs=_pixels,
+    by_hand=(
+        (np.zeros((1, 2)), np.array([1], np.uint8), np.array([0.9, 0.1]), 1.0),  # the softmax is the shares
+        (TOY, np.array([1], np.uint8), np.array([0.7, 0.1, 0.2]), 0.0),  # tau 0: the plain gradient
+        (SURE, np.array([0, 2], np.uint8), np.array([0.7, 0.1, 0.2]), 2.0),  # one maximum for both is not enough
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the gradient of each pixel sums to 0",
+            lambda arguments, grad: bool(np.allclose(grad.sum(axis=-1), 0.0, atol=1e-3)),
+        ),
+    ),
+    forbidden=("scipy", "torch"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def of_products(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    q = p * shares**tau
+    return np.where(counted, q / q.sum(axis=-1, keepdims=True) - Y, 0.0)
+
+
+@way(QUESTION)
+def loops(z, y, shares, tau):
+    out = np.zeros(z.shape)
+    for place in np.ndindex(y.shape):
+        if y[place] != 255:
+            a = [z[place][k] + tau * np.log(shares[k]) for k in range(len(shares))]
+            total = sum(np.exp(x - max(a)) for x in a)
+            for k in range(len(shares)):
+                out[place][k] = np.exp(a[k] - max(a)) / total - (k == y[place])
+    return out
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def parts(z, y):
+    """Probabilities, one-hot labels and whether a pixel counts, with an axis for the classes."""
+    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
+    return p, (y[..., None] == np.arange(z.shape[-1])).astype(float), (y != 255)[..., None]
+
+
+@wrong(QUESTION, "A share multiplies a probability. What does it do to a logit?")
+def shares_added(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * shares, y)
+    return (p - Y) * counted
+
+
+@wrong(QUESTION, "Rare classes get a logit that is lowered while training: they must earn more. Yours is raised.")
+def raised(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, -tau)
+
+
+@wrong(QUESTION, "All logits of a pixel move, each by the share of its class: yours moves only the true one.")
+def true_logit_alone(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * np.log(shares) * parts(z, y)[1], y)
+    return (p - Y) * counted
+
+
+@wrong(QUESTION, "You multiply the probabilities by powers of the shares: what do they sum to then?")
+def not_normalised_again(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p * shares**tau - Y) * counted
+
+
+@wrong(QUESTION, "The labels are not adjusted: only the logits move.")
+def one_hot_adjusted(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * np.log(shares), y)
+    return (p - Y * shares) * counted
+
+
+@wrong(QUESTION, "A pixel labelled 255 has no class: it pulls nowhere.")
+def ignored_too(z, y, shares, tau):
+    p, Y, _ = parts(z + tau * np.log(shares), y)
+    return p - Y
+
+
+@wrong(QUESTION, "You divide the gradient, as weights would: the shares move the logits, before the softmax.")
+def shares_as_weights(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
+
+
+@wrong(QUESTION, "Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
+def one_maximum_for_all(z, y, shares, tau):
+    a = z + tau * np.log(shares)
+    e = np.exp(a - a.max())
+    Y = y[..., None] == np.arange(z.shape[-1])
+    return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
+
+
+@wrong(QUESTION, "tau multiplies the logarithm: log(tau * shares) adds the same to all classes, and so nothing.")
+def tau_inside_the_logarithm(z, y, shares, tau):
+    p, Y, counted = parts(z + np.log(tau * shares), y)
+    return (p - Y) * counted
+
+
+@wrong(QUESTION, "A share stands in front of your gradient, as a weight would: here it only moves the logits.")
+def times_the_share(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]

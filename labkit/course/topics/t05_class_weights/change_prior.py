@@ -1,0 +1,62 @@
+"""05_class_weights.change_prior: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Question, way, wrong
+from labkit.course.topics.t05_class_weights import draw_shares, draw_weights
+
+
+def change_prior(z, w, shares, new_shares):
+    """Give the logits for scenes with new shares of the classes, of a network trained with weights on old ones."""
+    return z + np.log(new_shares) - np.log(w * shares)
+
+
+def shifted(z):
+    """Logits of which each pixel's largest is 0: those that differ by a constant per pixel say the same."""
+    return z - z.max(axis=-1, keepdims=True)
+
+
+def _network(rng):
+    """Logits (H, W, C), weights, and the classes' shares in the scenes of training and of use."""
+    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+    return 2.0 * rng.normal(size=(H, W, C)), draw_weights(rng, C), draw_shares(rng, C), draw_shares(rng, C)
+
+
+QUESTION = Question(
+    name="05_class_weights.change_prior",
+    reference=change_prior,
+    inputs=_network,
+    by_hand=(
+        (np.array([0.0, 0.0]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), np.array([0.9, 0.1])),  # weights alone
+        (np.array([0.0, 0.0]), np.array([1.0, 1.0]), np.array([0.5, 0.5]), np.array([0.8, 0.2])),  # scenes alone
+        (np.array([[0.5, -2.0, 1.0]]), np.array([0.5, 4.0, 1.0]), np.array([0.6, 0.1, 0.3]), np.array([0.2, 0.2, 0.6])),
+    ),
+    canonical=shifted,
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def of_probabilities(z, w, shares, new_shares):
+    p = np.exp(z - z.max(axis=-1, keepdims=True)) / w / shares * new_shares
+    return np.log(p / p.sum(axis=-1, keepdims=True))
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "A factor of a probability is a summand of its logarithm: which?")
+def ratios_added(z, w, shares, new_shares):
+    return z + new_shares / (w * shares)
+
+
+@wrong(QUESTION, "Probabilities are multiplied by the ratio; what does that do to logits?")
+def ratios_multiplied(z, w, shares, new_shares):
+    return z * new_shares / (w * shares)
+
+
+@wrong(QUESTION, "Logits go in, and logits come out.")
+def probabilities(z, w, shares, new_shares):
+    q = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True)) * new_shares / (w * shares)
+    return q / q.sum(axis=-1, keepdims=True)

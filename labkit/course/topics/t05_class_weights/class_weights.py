@@ -1,0 +1,92 @@
+"""05_class_weights.class_weights: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def class_weights(counts, power):
+    """Weigh classes by counts ** -power, with mean weight 1 over all pixels; a class without pixels gets 1."""
+    present = counts > 0
+    w = np.ones(len(counts))
+    w[present] = counts[present] ** -power
+    w[present] *= counts.sum() / (counts @ w)
+    return w
+
+
+def draw_counts(rng):
+    """Pixels of four to six classes, one of them absent, and a power."""
+    counts = (10.0 ** rng.uniform(1.0, 5.0, rng.integers(4, 7))).astype(np.int64)
+    counts[rng.integers(len(counts))] = 0
+    return counts, float(rng.uniform(0.2, 1.2))
+
+
+QUESTION = Question(
+    name="05_class_weights.class_weights",
+    reference=class_weights,
+    inputs=draw_counts,
+    by_hand=(
+        (np.array([900, 100, 0]), 1.0),
+        (np.array([900, 100, 25]), 0.5),
+        (np.array([1, 7, 0]), 0.5),
+        (np.array([3, 40]), 0.0),
+    ),
+    properties=(
+        Property(
+            "the mean weight over all pixels is 1",
+            lambda arguments, w: bool(np.isclose(arguments[0] @ w, arguments[0].sum(), rtol=1e-3)),
+        ),
+    ),
+    forbidden=("sklearn",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(counts, power):
+    raw = [float(n) ** -power if n else 0.0 for n in counts]
+    scale = sum(map(float, counts)) / sum(n * r for n, r in zip(counts, raw, strict=True))
+    return np.array([scale * r if n else 1.0 for n, r in zip(counts, raw, strict=True)])
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "What is the mean weight over the pixels? It should be 1.")
+def weights_not_scaled(counts, power):
+    present = counts > 0
+    w = np.ones(len(counts))
+    w[present] = counts[present] ** -power
+    return w
+
+
+@wrong(QUESTION, "Not the weights are to sum to one: their mean over pixels is 1.")
+def weights_summing_to_one(counts, power):
+    w = weights_not_scaled(counts, power)
+    w[counts > 0] /= w[counts > 0].sum()
+    return w
+
+
+@wrong(QUESTION, "A frequent class has more pixels: take the mean over pixels, not over classes.")
+def weights_of_mean_one_over_classes(counts, power):
+    w = weights_not_scaled(counts, power)
+    w[counts > 0] /= w[counts > 0].mean()
+    return w
+
+
+@wrong(QUESTION, "A class without pixels gets 1, whatever the power.")
+def weights_of_absent_classes(counts, power):
+    w = np.maximum(counts, 1) ** -power
+    return w * counts.sum() / (counts @ w)
+
+
+@wrong(QUESTION, "A class without pixels gets 1 and has no part in the mean; you count it as one pixel.")
+def absent_class_as_one_pixel(counts, power):
+    n = np.maximum(counts, 1)
+    return n**-power * n.sum() / (n @ n**-power)
+
+
+@wrong(QUESTION, "A class without pixels gets the weight 1, not 0.")
+def absent_class_as_nothing(counts, power):
+    return class_weights(counts, power) * (counts > 0)

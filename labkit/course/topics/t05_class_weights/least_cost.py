@@ -1,0 +1,77 @@
+"""05_class_weights.least_cost: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Question, way, wrong
+
+
+def least_cost(p, cost):
+    """Decide each pixel for the class of least expected cost; cost[i, j] is paid for saying j where i is true."""
+    return (p @ cost).argmin(axis=-1)
+
+
+def _probabilities_and_costs(rng):
+    """Draw probabilities (H, W, C) that are rarely sure, and costs that differ both ways; to be right costs nothing."""
+    shape = int(rng.integers(5, 8)), int(rng.integers(9, 12)), int(rng.integers(4, 6))
+    p = rng.dirichlet(np.full(shape[-1], 1.5), shape[:2])
+    cost = np.exp(rng.uniform(-1.0, 2.5, (shape[-1], shape[-1])))
+    np.fill_diagonal(cost, 0.0)
+    return p, cost
+
+
+QUESTION = Question(
+    name="05_class_weights.least_cost",
+    reference=least_cost,
+    inputs=_probabilities_and_costs,
+    by_hand=(
+        (np.array([0.8, 0.2]), np.array([[0.0, 1.0], [10.0, 0.0]])),  # 2 for saying 0, 0.8 for saying 1
+        (np.array([[0.5, 0.4, 0.1], [0.1, 0.4, 0.5]]), np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 9.0, 1.0]])),
+        (np.array([[0.5, 0.4, 0.1]]), np.array([[0.0, 4.0, 1.0], [1.0, 0.0, 2.0], [8.0, 1.0, 0.0]])),
+    ),
+    rtol=0.0,
+    atol=0.0,
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(p, cost):
+    said = np.zeros(p.shape[:-1], int)
+    for place in np.ndindex(said.shape):
+        prices = [sum(p[place][i] * cost[i, j] for i in range(len(cost))) for j in range(len(cost))]
+        said[place] = prices.index(min(prices))
+    return said
+
+
+@way(QUESTION)
+def einsum(p, cost):
+    return np.argmin(np.einsum("...i,ij->...j", p, cost), axis=-1).astype(np.uint8)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "That is the most likely class. Saying it may be the dearest mistake: where does `cost` come in?")
+def most_likely(p, cost):
+    return p.argmax(axis=-1)
+
+
+@wrong(QUESTION, "You gave each true class one price; here the price depends on what is said instead, too.")
+def one_weight_per_class(p, cost):
+    return (p * cost.sum(axis=1)).argmax(axis=-1)
+
+
+@wrong(QUESTION, "With which probability do you pay cost[i, j]: with p[i], or with 1 - p[i]?")
+def saved_where_it_is_not_so(p, cost):
+    return ((1.0 - p) @ cost).argmax(axis=-1)
+
+
+@wrong(QUESTION, "You decide for the class that costs most.")
+def dearest(p, cost):
+    return (p @ cost).argmax(axis=-1)
+
+
+@wrong(QUESTION, "To be right may cost something, too: the diagonal of cost need not be 0.")
+def right_for_nothing(p, cost):
+    return (p @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)

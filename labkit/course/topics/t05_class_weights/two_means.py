@@ -1,0 +1,90 @@
+"""05_class_weights.two_means: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Question, way, wrong
+from labkit.course.topics.t05_class_weights import SURE, TOY, draw_pixels
+
+
+def two_means(z, y, w):
+    """Divide the weighted loss by the number of counted pixels, and by the sum of their weights, as PyTorch does."""
+    counted = y != 255
+    z, y = z[counted].T, y[counted]  # (C, N): a row a class
+    log_p = z - np.logaddexp.reduce(z)
+    loss = -(w[y] @ log_p[y, np.arange(len(y))])
+    return float(loss / len(y)), float(loss / w[y].sum())
+
+
+QUESTION = Question(
+    name="05_class_weights.two_means",
+    reference=two_means,
+    inputs=draw_pixels,
+    by_hand=(
+        (TOY, np.array([1], np.uint8), np.array([1.0, 10.0, 3.0])),
+        (np.concatenate([SURE, TOY]), np.array([0, 255, 1], np.uint8), np.array([2.0, 5.0, 0.5])),  # not one maximum
+    ),
+    forbidden=("scipy", "torch"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(z, y, w):
+    total, pixels, weights = 0.0, 0, 0.0
+    for place in np.ndindex(y.shape):
+        if y[place] != 255:
+            weight = w[y[place]]
+            top = z[place].max()
+            total += weight * (top + np.log(np.exp(z[place] - top).sum()) - z[place][y[place]])
+            pixels, weights = pixels + 1, weights + weight
+    return total / pixels, total / weights
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def losses_and_weights(z, y, w):
+    """Loss and weight of each counted pixel."""
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
+    return -log_p[np.arange(len(y)), y], w[y]
+
+
+@wrong(QUESTION, "A pixel that adds no loss is not one of those that you divide by.")
+def means_over_all_pixels(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float((loss * weight).sum() / y.size), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "The sum of weights runs over the pixels: a class with a thousand pixels counts a thousand times.")
+def means_over_weights_of_classes(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float((loss * weight).mean()), float((loss * weight).sum() / w.sum())
+
+
+@wrong(QUESTION, "Each pixel's loss is multiplied by its weight before the sum.")
+def means_not_weighted(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float(loss.mean()), float(loss.sum() / weight.sum())
+
+
+@wrong(QUESTION, "The first mean is one of weighted losses, too: the two differ only in what they are divided by.")
+def first_mean_not_weighted(z, y, w):
+    loss, weight = losses_and_weights(z, y, w)
+    return float(loss.mean()), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "A weight multiplies the loss of a pixel, by its true class: the logits keep their values.")
+def logits_weighted(z, y, w):
+    loss, weight = losses_and_weights(z * w, y, w)
+    return float(loss.mean()), float(loss.sum() / weight.sum())
+
+
+@wrong(QUESTION, "Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has log 0.")
+def one_maximum_for_all(z, y, w):
+    z, y = z[y != 255], y[y != 255]
+    z = z - z.max()
+    loss, weight = np.log(np.exp(z).sum(axis=-1)) - z[np.arange(len(y)), y], w[y]
+    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())

@@ -1,0 +1,118 @@
+"""05_class_weights.weight_for_recall: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Question, way, wrong
+
+
+def weight_for_recall(p1, y, recall):
+    """Find the smallest weight of class 1 with which at least this share of its pixels is found."""
+    found_first = np.sort(p1[y])[::-1]
+    must = int(np.ceil(recall * len(found_first) - 1e-9))  # in floats 0.28 * 50 is more than 14
+    last = found_first[must - 1]
+    return float((1.0 - last) / last)
+
+
+def _pixels(rng):
+    """Draw probabilities of two overlapping classes, the second one rare, and a recall between two steps."""
+    y = rng.permutation(np.arange(int(rng.integers(40, 60))) < int(rng.integers(7, 12)))
+    n = int(y.sum())
+    p1 = 1.0 / (1.0 + np.exp(-rng.normal(np.where(y, -0.5, -2.5), 1.0)))
+    return p1, y, float((rng.integers(2, n) - rng.uniform(0.3, 0.7)) / n)
+
+
+QUESTION = Question(
+    name="05_class_weights.weight_for_recall",
+    reference=weight_for_recall,
+    inputs=_pixels,
+    by_hand=(
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
+        # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
+        (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
+        # Four of five, weight 1. In floats 5 * (1 - 0.8) < 1: that none may be missed is wrong.
+        (np.array([0.9, 0.8, 0.6, 0.5, 0.2]), np.ones(5, bool), 0.8),
+    ),
+    points=3,
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def trying(p1, y, recall):
+    odds = np.unique((1.0 - p1) / p1)
+    for w in odds:
+        if np.count_nonzero(w * p1[y] >= (1.0 - p1[y]) * (1 - 1e-12)) >= recall * np.count_nonzero(y):
+            return w
+
+
+@way(QUESTION)
+def partition(p1, y, recall):
+    true = p1[np.flatnonzero(y)]
+    missed = int(np.floor((1.0 - recall) * len(true) + 1e-9))
+    return 1.0 / np.partition(true, missed)[missed] - 1.0
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
+def of_all_pixels(p1, y, recall):
+    return weight_for_recall(p1, np.ones_like(y), recall)
+
+
+@wrong(QUESTION, "Pixels are found from the surest to the least sure; yours starts with the least sure one.")
+def from_below(p1, y, recall):
+    return 1.0 / weight_for_recall(1.0 - p1, y, recall)
+
+
+@wrong(QUESTION, "At least the share: 0.4 of three pixels are 1.2, and one found pixel is too few.")
+def one_too_few(p1, y, recall):
+    found_first = np.sort(p1[y])[::-1]
+    last = found_first[max(int(recall * len(found_first)), 1) - 1]
+    return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "You have the probability of the last pixel that must be found. Which w lifts w p1 to 1 - p1 there?")
+def the_threshold(p1, y, recall):
+    return 1.0 / (1.0 + weight_for_recall(p1, y, recall))
+
+
+@wrong(QUESTION, "Weighted, class 1 need not reach 1: it competes with 1 - p1.")
+def against_one(p1, y, recall):
+    return 1.0 + weight_for_recall(p1, y, recall)
+
+
+@wrong(QUESTION, "A quantile may lie between two pixels; what decides is the last pixel that must be found.")
+def at_a_quantile(p1, y, recall):
+    last = np.quantile(p1[y], 1.0 - recall)
+    return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "You find one pixel more than you promised: sorted from the surest, the k-th has the index k - 1.")
+def one_too_many(p1, y, recall):
+    found_first = np.sort(p1[y])[::-1]
+    last = found_first[min(int(np.ceil(recall * len(found_first))), len(found_first) - 1)]
+    return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "A weight may be below 1: the surest pixels alone may keep the promise.")
+def at_least_one(p1, y, recall):
+    return max(weight_for_recall(p1, y, recall), 1.0)
+
+
+@wrong(
+    QUESTION,
+    "In floats (1 - p) / p * p may be a hair less than 1 - p: leave the limit a hair of room, or sort the pixels.",
+)
+def tried_without_room(p1, y, recall):
+    odds = np.unique((1.0 - p1) / p1)
+    return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)
+
+
+@wrong(QUESTION, "In floats 5 * (1 - 0.8) is a hair less than 1: leave a hair of room, or count what must be found.")
+def missed_without_room(p1, y, recall):
+    last = np.sort(p1[y])[int(np.count_nonzero(y) * (1.0 - recall))]
+    return float((1.0 - last) / last)

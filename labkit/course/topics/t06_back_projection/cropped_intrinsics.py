@@ -1,0 +1,100 @@
+"""06_back_projection.cropped_intrinsics: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t06_back_projection import camera
+
+
+def cropped_intrinsics(K, left, top, scale):
+    """K of an image that was cropped, and then resized; the centre of the first pixel is at u = v = 0 in both."""
+    half = (scale - 1.0) / 2.0
+    crop_and_resize = np.array([[scale, 0.0, half - scale * left], [0.0, scale, half - scale * top], [0.0, 0.0, 1.0]])
+    return crop_and_resize @ K
+
+
+QUESTION = Question(
+    name="06_back_projection.cropped_intrinsics",
+    reference=cropped_intrinsics,
+    inputs=lambda rng: (
+        camera(rng, 120, 160),
+        int(rng.integers(5, 40)),
+        int(rng.integers(41, 60)),
+        float(rng.choice([0.25, 0.5, 2.0, 3.0])),
+    ),
+    by_hand=(
+        (np.array([[200.0, 0.0, 160.0], [0.0, 300.0, 119.0], [0.0, 0.0, 1.0]]), 40, 20, 1.0),  # cropped alone
+        (
+            np.array([[200.0, 0.0, 9.5], [0.0, 300.0, 7.5], [0.0, 0.0, 1.0]]),
+            0,
+            0,
+            0.5,
+        ),  # 20 x 16: 4.5, 3.5 is the middle
+        (np.array([[200.0, 0.0, 0.0], [0.0, 300.0, 0.0], [0.0, 0.0, 1.0]]), 0, 0, 2.0),  # the first pixel's centre
+    ),
+    rtol=1e-6,
+    properties=(
+        Property("the last row of K is 0, 0, 1", lambda arguments, K: np.array_equal(np.asarray(K)[2], [0, 0, 1])),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_hand(K, left, top, scale):
+    new = K.copy()
+    new[0] = scale * K[0]
+    new[1] = scale * K[1]
+    new[0, 2] = scale * (K[0, 2] - left + 0.5) - 0.5
+    new[1, 2] = scale * (K[1, 2] - top + 0.5) - 0.5
+    return new
+
+
+@way(QUESTION)
+def by_steps(K, left, top, scale):
+    def shift(right, down):
+        return np.array([[1.0, 0.0, right], [0.0, 1.0, down], [0.0, 0.0, 1.0]])
+
+    return shift(-0.5, -0.5) @ np.diag([scale, scale, 1.0]) @ shift(0.5 - left, 0.5 - top) @ K
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def with_centre(K, scale, cx, cy):
+    return np.array([[scale * K[0, 0], 0.0, cx], [0.0, scale * K[1, 1], cy], [0.0, 0.0, 1.0]])
+
+
+@wrong(
+    QUESTION, "Halve a row of two pixels: their centres are at 0 and 1, the new pixel covers both. Where is its centre?"
+)
+def centres_forgotten(K, left, top, scale):
+    return with_centre(K, scale, scale * (K[0, 2] - left), scale * (K[1, 2] - top))
+
+
+@wrong(QUESTION, "The principal point is in pixels, too: with twice as many it lies twice as far from the corner.")
+def focal_length_alone_scaled(K, left, top, scale):
+    return with_centre(K, scale, K[0, 2] - left, K[1, 2] - top)
+
+
+@wrong(QUESTION, "First cropped, then resized: left and top count pixels of the image before it was resized.")
+def resized_first(K, left, top, scale):
+    half = (scale - 1.0) / 2.0
+    return with_centre(K, scale, scale * K[0, 2] + half - left, scale * K[1, 2] + half - top)
+
+
+@wrong(QUESTION, "What was at column `left` is at column 0 of the crop: do columns grow or shrink?")
+def added(K, left, top, scale):
+    return cropped_intrinsics(K, -left, -top, scale)
+
+
+@wrong(QUESTION, "left and top count old pixels, so take them off first; and corners stay together, not centres.")
+def resized_first_about_centres(K, left, top, scale):
+    return with_centre(K, scale, scale * K[0, 2] - left, scale * K[1, 2] - top)
+
+
+@wrong(QUESTION, "Your half pixel has the wrong sign: the corner is at -1/2, so a centre u lies u + 1/2 behind it.")
+def half_pixel_with_the_other_sign(K, left, top, scale):
+    half = (1.0 - scale) / 2.0
+    return with_centre(K, scale, scale * (K[0, 2] - left) + half, scale * (K[1, 2] - top) + half)

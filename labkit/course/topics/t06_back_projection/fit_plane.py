@@ -1,0 +1,157 @@
+"""06_back_projection.fit_plane: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t06_back_projection import pose
+
+
+def fit_plane(P, sigma):
+    """Fit n . p = d by least squares of the distances along n, each divided by its point's sigma; n points up."""
+    w = 1.0 / sigma**2
+    centre = w @ P / w.sum()
+    n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
+    n = n * np.sign(n[2])
+    return n, float(n @ centre)
+
+
+def _points_near_a_plane(rng):
+    """Draw points of a slanted plane, longer than wide, half of them three times as noisy as the others."""
+    N = int(rng.integers(30, 40))
+    sigma = np.where(rng.random(N) < 0.5, 0.02, 0.06) * rng.uniform(0.8, 1.2, N)
+    local = rng.uniform(-0.5, 0.5, (N, 3)) * (1.0, 0.4, 0.0) + sigma[:, None] * rng.normal(size=(N, 3))
+    T = pose(rng)
+    while not 0.3 < abs(T[2, 2]) < 0.9:
+        T = pose(rng)
+    return local @ T[:3, :3].T + T[:3, 3], sigma
+
+
+QUESTION = Question(
+    name="06_back_projection.fit_plane",
+    reference=fit_plane,
+    inputs=_points_near_a_plane,
+    by_hand=(
+        (np.array([[0.0, 0, 2], [1, 0, 2], [0, 3, 2], [1, 3, 2]]), np.ones(4)),  # level, at height 2
+        (np.array([[0.0, 0, 1], [1, 0, 0], [0, 5, 1], [1, 5, 0]]), np.ones(4)),  # 45 degrees: x + z = 1
+        (np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0], [4, 3, 0.1]]), np.array([0.01, 0.01, 0.01, 100.0])),
+    ),
+    random_cases=6,
+    rtol=1e-4,
+    atol=1e-5,
+    points=3,
+    properties=(
+        Property("n has length 1", lambda arguments, plane: bool(np.isclose(np.linalg.norm(plane[0]), 1.0, atol=1e-3))),
+        Property("n points up, its z is above 0", lambda arguments, plane: bool(plane[0][2] > 0.0)),
+        Property(
+            "the plane goes through the weighted mean m of the points, n . m = d",
+            lambda arguments, plane: np.isclose(
+                plane[0] @ np.average(arguments[0], axis=0, weights=arguments[1] ** -2.0), plane[1], atol=1e-3
+            ),
+        ),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_eigenvectors(P, sigma):
+    w = sigma**-2.0
+    centre = np.average(P, axis=0, weights=w)
+    normal = np.linalg.eigh(np.cov(P.T, aweights=w, ddof=0))[1][:, 0]
+    normal *= 1 if normal[2] > 0 else -1
+    return normal, normal @ centre
+
+
+@way(QUESTION)
+def loops(P, sigma):
+    total = sum(1 / s**2 for s in sigma)
+    centre = sum(p / s**2 for p, s in zip(P, sigma, strict=True)) / total
+    scatter = np.zeros((3, 3))
+    for p, s in zip(P, sigma, strict=True):
+        scatter += np.outer(p - centre, p - centre) / s**2
+    values, vectors = np.linalg.eig(scatter)
+    normal = vectors[:, values.real.argmin()].real
+    return normal * np.sign(normal[2]), abs(normal[2]) / normal[2] * (normal @ centre)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def up(n, centre):
+    """A plane through centre; a normal that is level stays as it is."""
+    n = -n if n[2] < 0.0 else n
+    return n, float(n @ centre)
+
+
+def centre_and_axes(P, sigma):
+    """The weighted centre, and the axes of the weighted scatter round it as columns, the shortest first."""
+    w = 1.0 / sigma**2
+    centre = w @ P / w.sum()
+    return centre, np.linalg.eigh((P - centre).T * w @ (P - centre))[1]
+
+
+@wrong(QUESTION, "You measure errors along z. Tilt the plane: the distance of a point is measured along the normal.")
+def along_z(P, sigma):
+    A = np.column_stack([P[:, :2], np.ones(len(P))]) / sigma[:, None]
+    a, b, c = np.linalg.lstsq(A, P[:, 2] / sigma, rcond=None)[0]
+    length = np.sqrt(a * a + b * b + 1.0)
+    return np.array([-a, -b, 1.0]) / length, float(c / length)
+
+
+@wrong(QUESTION, "In which direction do points of a plane scatter least, and in which most?")
+def largest_spread(P, sigma):
+    centre, axes = centre_and_axes(P, sigma)
+    return up(axes[:, 2], centre)
+
+
+@wrong(QUESTION, "An eigenvector's sign is arbitrary: where n points down, turn n up, and d with it.")
+def not_turned_up(P, sigma):
+    centre, axes = centre_and_axes(P, sigma)
+    return axes[:, 0], float(axes[:, 0] @ centre)
+
+
+@wrong(QUESTION, "A plane need not contain the origin: from which point are the directions measured?")
+def through_the_origin(P, sigma):
+    return up(np.linalg.svd(P / sigma[:, None], full_matrices=False)[2][2], np.zeros(3))
+
+
+@wrong(QUESTION, "The point through which the best plane goes is a mean, too: do all points count alike in it?")
+def centre_without_weights(P, sigma):
+    centre = P.mean(axis=0)
+    return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][2], centre)
+
+
+@wrong(QUESTION, "A point of twice the sigma counts a quarter: squares of distances are divided by squares.")
+def weights_not_squared(P, sigma):
+    return fit_plane(P, np.sqrt(sigma))
+
+
+@wrong(QUESTION, "A point of a larger sigma is less sure, and must count less; yours counts more.")
+def unsure_points_count_more(P, sigma):
+    return fit_plane(P, sigma**-0.5)
+
+
+@wrong(QUESTION, "np.linalg.eigh gives the eigenvectors as the columns of its matrix: yours is a row.")
+def row_of_the_eigenvectors(P, sigma):
+    w = 1.0 / sigma**2
+    centre = w @ P / w.sum()
+    return up(np.linalg.eigh((P - centre).T * w @ (P - centre))[1][0], centre)
+
+
+@wrong(QUESTION, "d is gone only if you subtract the mean m from the points before you look for n; then d = n . m.")
+def not_centred(P, sigma):
+    return up(np.linalg.eigh(P.T / sigma**2 @ P)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
+
+
+@wrong(QUESTION, "You divide by sigma squared twice: in A one of the two factors has the weight, not both.")
+def weights_in_both_factors(P, sigma):
+    centred = (P - np.average(P, axis=0, weights=sigma**-2.0)) / sigma[:, None] ** 2
+    return up(np.linalg.eigh(centred.T @ centred)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
+
+
+@wrong(QUESTION, "Turn n up before you compute n . m = d: yours still has the sign of the other normal.")
+def d_before_the_turn(P, sigma):
+    centre = np.average(P, axis=0, weights=sigma**-2.0)
+    n = np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 0]
+    return up(n, centre)[0], float(n @ centre)

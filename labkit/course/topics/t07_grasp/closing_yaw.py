@@ -1,0 +1,126 @@
+"""07_grasp.closing_yaw: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t07_grasp import cloud
+
+
+def closing_yaw(Sigma):
+    """Find the direction, seen from above, in which a cloud of covariance Sigma is narrowest: its angle from x."""
+    _, axes = np.linalg.eigh(Sigma[:2, :2])
+    x, y = axes[:, 0]
+    return np.arctan2(y, x)
+
+
+def _covariance(rng):
+    return (np.cov(cloud(rng).T, bias=True),)
+
+
+def _variance(Sigma, yaw):
+    d = np.array([np.cos(yaw), np.sin(yaw)])
+    return d @ Sigma[:2, :2] @ d
+
+
+QUESTION = Question(
+    name="07_grasp.closing_yaw",
+    reference=closing_yaw,
+    inputs=_covariance,
+    by_hand=(
+        (np.diag([4.0, 1.0, 9.0]),),  # long in x: close along y
+        (np.diag([1.0, 4.0, 0.5]),),  # long in y, and flat: close along x
+        (np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]),),  # long along the diagonal
+        (np.array([[5.0, -2.0, 1.0], [-2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]),),
+    ),
+    random_cases=6,
+    atol=1e-4,
+    points=3,
+    properties=(
+        Property(
+            "among all directions of the table's plane the jaws close in the one of least variance",
+            lambda arguments, yaw: (
+                _variance(arguments[0], yaw) <= 1.001 * np.linalg.eigvalsh(arguments[0][:2, :2])[0] + 1e-12
+            ),
+        ),
+    ),
+    # An axis has no sign: yaw and yaw + pi are the same grasp, and have the same double angle on the circle.
+    canonical=lambda yaw: np.array([np.cos(2.0 * yaw), np.sin(2.0 * yaw)]),
+    forbidden=("sklearn", "cv2"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def formula(Sigma):
+    long = 0.5 * np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1])
+    return (long + np.pi / 2) % np.pi
+
+
+@way(QUESTION)
+def fan(Sigma):
+    low, high = 0.0, np.pi
+    for _ in range(12):  # a fan of directions, ever finer round the one of least variance
+        yaws = np.linspace(low, high, 61)
+        d = np.stack([np.cos(yaws), np.sin(yaws)])
+        best = yaws[np.einsum("in,ij,jn->n", d, Sigma[:2, :2], d).argmin()]
+        low, high = best - (high - low) / 20, best + (high - low) / 20
+    return best
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def yaw_of(axis):
+    return np.arctan2(axis[1], axis[0])
+
+
+@wrong(QUESTION, "That is the direction in which the cloud is longest. The jaws close across it.")
+def longest_direction(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 1])
+
+
+@wrong(QUESTION, "Check Sigma @ v against w * v for the v that you took: is an eigenvector a row or a column?")
+def axes_as_rows(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma)[1][0])
+
+
+@wrong(QUESTION, "np.linalg.eig promises no order: sometimes your first axis is the long one. Sort, or take eigh.")
+def order_of_eig(Sigma):
+    return yaw_of(np.linalg.eig(Sigma[:2, :2])[1][:, 0])
+
+
+@wrong(
+    QUESTION,
+    "A flat thing is narrowest upwards, but the jaws close in the table's plane: which block of Sigma is that?",
+)
+def least_of_three(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma)[1][:, 0])
+
+
+@wrong(QUESTION, "For a tall thing the upright axis has the most spread, not the least; look at x and y alone.")
+def middle_of_three(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma)[1][:, 1])
+
+
+@wrong(
+    QUESTION, "For a cloud long in x the answer is 90 degrees, and yours is 0: which argument comes first in arctan2?"
+)
+def yaw_with_x_and_y_swapped(Sigma):
+    x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, 0]
+    return np.arctan2(x, y)
+
+
+@wrong(QUESTION, "Turn the object by 10 degrees: your yaw turns by 20. The formula gives twice the angle.")
+def double_angle_not_halved(Sigma):
+    return np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1]) + np.pi / 2
+
+
+@wrong(QUESTION, "Your yaw does not see the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.")
+def variances_as_a_direction(Sigma):
+    return np.arctan2(Sigma[1, 1], Sigma[0, 0]) + np.pi / 2
+
+
+@wrong(QUESTION, "Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?")
+def smaller_of_the_two_variances(Sigma):
+    return 0.0 if Sigma[0, 0] < Sigma[1, 1] else np.pi / 2

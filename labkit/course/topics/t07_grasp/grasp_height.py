@@ -1,0 +1,104 @@
+"""07_grasp.grasp_height: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t07_grasp import cloud
+
+
+def grasp_height(P, table_z, palm, tips, clearance):
+    """Put the grasp as low as table and palm let it, and no lower than what was seen of the object."""
+    lowest_tips = max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance)
+    return lowest_tips + tips
+
+
+def _heights(rng):
+    """Draw a cloud of which each of the three bounds is sometimes the one that counts."""
+    P, kind = cloud(rng), rng.integers(3)
+    table_z = float(P[:, 2].min() - rng.uniform(0.01, 0.03)) if kind else float(P[:, 2].min() + 0.002)
+    high = np.ptp(P[:, 2])
+    palm = float(high * (0.6 if kind == 1 else 1.5))
+    return P, table_z, palm, float(rng.uniform(0.005, 0.012)), float(rng.uniform(0.003, 0.008))
+
+
+def _upright(low, high):
+    return np.array([[0.5, 0.1, low], [0.5, 0.1, high], [0.52, 0.1, 0.75 * low + 0.25 * high]])
+
+
+QUESTION = Question(
+    name="07_grasp.grasp_height",
+    reference=grasp_height,
+    inputs=_heights,
+    by_hand=(
+        (_upright(0.1875, 0.75), 0.125, 0.25, 0.0625, 0.03125),  # tall, its foot hidden: the palm stops at its top
+        (_upright(0.125, 0.1875), 0.125, 0.25, 0.0625, 0.03125),  # a flat one: the tips stay off the table
+        (_upright(0.375, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # only its upper part was seen
+        (_upright(-0.5, -0.25), -0.5, 0.5, 0.0625, 0.03125),  # a table below the robot's base
+    ),
+    random_cases=8,
+    atol=1e-5,
+    points=2,
+    properties=(
+        Property(
+            "the tips keep off the table",
+            lambda arguments, z: z - arguments[3] >= arguments[1] + arguments[4] - 1e-5,
+        ),
+        Property(
+            "the palm stays above the top of the object",
+            lambda arguments, z: z - arguments[3] + arguments[2] >= arguments[0][:, 2].max() - 1e-5,
+        ),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_heights(P, table_z, palm, tips, clearance):
+    return np.max([P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance]) + tips
+
+
+@way(QUESTION)
+def loops(P, table_z, palm, tips, clearance):
+    low, high = float("inf"), -float("inf")
+    for _, _, z in P.tolist():
+        low, high = min(low, z), max(high, z)
+    bound = high - palm
+    if low > bound:
+        bound = low
+    if table_z + clearance > bound:
+        bound = table_z + clearance
+    return bound + tips
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "The centroid knows neither the table nor the palm: how low may the tips go, and what stops them?")
+def height_of_centroid(P, table_z, palm, tips, clearance):
+    return P[:, 2].mean()
+
+
+@wrong(QUESTION, "A bottle is taller than the fingers are long: what does its top meet?")
+def palm_forgotten(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong(QUESTION, "Only the upper part was seen, and you reach below it: nobody knows what is there.")
+def unseen_depth(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, table_z + clearance) + tips
+
+
+@wrong(QUESTION, "All three bounds are heights of the tips, and you add tips to the table's alone.")
+def origin_from_the_table_alone(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance + tips)
+
+
+@wrong(QUESTION, "Each bound says: not lower than this. Which of them satisfies all?")
+def least_of_the_bounds(P, table_z, palm, tips, clearance):
+    return min(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong(QUESTION, "The object's top is a height in the base frame. You take how tall the object is.")
+def tallness_for_the_top(P, table_z, palm, tips, clearance):
+    return max(np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips

@@ -1,0 +1,130 @@
+"""07_grasp.pad_slice: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t07_grasp import FACING_X, cloud, leaning_grasp
+
+
+def pad_slice(P, T_base_grasp, half):
+    """Give the middle and the width, along y of the grasp frame, of the points within half of the pads' middle."""
+    x, y, _ = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    touched = y[np.abs(x) <= half]
+    if len(touched) == 0:
+        return 0.0, 0.0
+    return (touched.min() + touched.max()) / 2, touched.max() - touched.min()
+
+
+def _cloud_and_grasp(rng):
+    P, T = cloud(rng), leaning_grasp(rng)
+    P -= P.mean(axis=0)  # near the base's origin: whoever forgets the grasp's place still meets some points
+    T[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3)
+    x, y, _ = ((P - T[:3, 3]) @ T[:3, :3]).T
+    half = np.abs(x)[np.abs(y).argsort()[2]] + 0.003  # three points at least, but seldom the outermost
+    return P, T, float(half)
+
+
+# In the frame FACING_X, whose y is the base's x and whose x is the base's y: an L.
+_L = np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.5], [1.75, 0.5, 0.5], [5.0, 1.5, 0.5], [2.5, 0.75, 0.0]])
+
+
+QUESTION = Question(
+    name="07_grasp.pad_slice",
+    reference=pad_slice,
+    inputs=_cloud_and_grasp,
+    by_hand=(
+        (_L, FACING_X, 0.25),  # the point at the edge of the pads counts
+        (_L, FACING_X, 0.125),
+        (_L, FACING_X, 0.5),
+        (_L[:1], FACING_X, 0.25),
+        (_L[3:4], FACING_X, 0.25),  # nothing between the pads
+    ),
+    random_cases=6,
+    points=4,
+    properties=(Property("a width is not negative", lambda arguments, out: bool(out[1] >= 0.0)),),
+    forbidden=("scipy", "cv2"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_inverse(P, T_base_grasp, half):
+    homogeneous = np.column_stack([P, np.ones(len(P))]) @ np.linalg.inv(T_base_grasp).T
+    return middle_and_width(homogeneous[np.abs(homogeneous[:, 0]) <= half, 1])
+
+
+@way(QUESTION)
+def loops(P, T_base_grasp, half):
+    low, high = float("inf"), -float("inf")
+    for p in P:
+        x, y = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in (0, 1))
+        if -half <= x <= half:
+            low, high = min(low, y), max(high, y)
+    return (low + (high - low) / 2, high - low) if high >= low else (0.0, 0.0)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def in_grasp(P, T):
+    return ((P - T[:3, 3]) @ T[:3, :3]).T
+
+
+def middle_and_width(y):
+    return ((y.min() + y.max()) / 2, np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
+@wrong(QUESTION, "What lies beside the pads touches nothing: which of the points lie between them?")
+def whole_cloud(P, T_base_grasp, half):
+    return middle_and_width(in_grasp(P, T_base_grasp)[1])
+
+
+@wrong(QUESTION, "A median leans to the side that shows more points; the jaws meet the two outermost ones.")
+def median_for_the_middle(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return (np.median(y), np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
+@wrong(QUESTION, "A mean leans to the side that shows more points; the jaws meet the two outermost ones.")
+def mean_for_the_middle(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return (y.mean(), np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
+@wrong(QUESTION, "The jaws close along y of the grasp frame, and the pads are broad along x.")
+def x_for_y(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(x[np.abs(y) <= half])
+
+
+@wrong(QUESTION, "Cut the points in the grasp frame: does a pad know where the base's axes point?")
+def cut_in_the_base_frame(P, T_base_grasp, half):
+    x, y, _ = (P - T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong(QUESTION, "A pad reaches half of its breadth to either side of the middle.")
+def one_side_of_the_pad(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[(x >= 0.0) & (x <= half)])
+
+
+@wrong(QUESTION, "A single point between the pads is a slice, too: its middle is that point, and only its width is 0.")
+def one_point_is_nothing(P, T_base_grasp, half):
+    middle, width = pad_slice(P, T_base_grasp, half)
+    return (middle if width > 0.0 else 0.0), width
+
+
+@wrong(QUESTION, "Half of the width is a length, not a place: what is the mean of the outermost two?")
+def half_of_the_width(P, T_base_grasp, half):
+    width = pad_slice(P, T_base_grasp, half)[1]
+    return width / 2, width
+
+
+@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])

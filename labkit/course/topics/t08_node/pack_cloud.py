@@ -1,0 +1,110 @@
+"""08_node.pack_cloud: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def pack_cloud(P):
+    """Lay the points that are no holes out in bytes: little-endian float32 x, y, z and four bytes of nothing each."""
+    there = np.isfinite(P).all(axis=1)
+    cloud = np.pad(P[there], ((0, 0), (0, 1)))
+    return np.frombuffer(cloud.astype("<f4").tobytes(), np.uint8)
+
+
+def _holed_cloud(rng):
+    P = rng.normal(0.3, 0.4, (int(rng.integers(8, 14)), 3))
+    P[rng.choice(len(P), 3, replace=False)] = np.nan
+    P[rng.choice(len(P), 1), rng.integers(3)] = np.nan
+    return (P,)
+
+
+QUESTION = Question(
+    name="08_node.pack_cloud",
+    reference=pack_cloud,
+    inputs=_holed_cloud,
+    by_hand=(
+        (np.array([[1.0, 2.0, 3.0], [np.nan, np.nan, np.nan], [0.5, -0.25, 8.0]]),),
+        (np.array([[0.1, 0.2, np.nan], [1.5, -1.0, 0.75], [0.3, 2.5, 1.0]]),),
+        (np.array([[np.nan, 0.0, 0.0], [0.6, -0.4, 0.2]]),),
+        (np.array([[0.1, 0.2, np.inf], [0.4, -0.2, 0.3], [0.0, 0.0, 0.0]]),),
+    ),
+    rtol=0.0,
+    atol=0.0,
+    points=2,
+    properties=(
+        Property("16 bytes per point", lambda arguments, data: np.size(data) % 16 == 0),
+        Property(
+            "as many points as have three finite coordinates",
+            lambda arguments, data: np.size(data) == 16 * np.count_nonzero(np.isfinite(arguments[0]).all(axis=1)),
+        ),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def structured(P):
+    points = np.zeros(len(finite(P)), np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("pad", "V4")]))
+    for axis, name in enumerate("xyz"):
+        points[name] = finite(P)[:, axis]
+    return np.frombuffer(points.tobytes(), np.uint8)
+
+
+@way(QUESTION)
+def columns(P):
+    cloud = finite(P)
+    numbers = np.zeros((len(cloud), 4), np.float32)
+    numbers[:, :3] = cloud
+    return numbers.view(np.uint8).reshape(-1)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def finite(P):
+    return P[np.isfinite(P).all(axis=1)]
+
+
+def packed(P, kind="<f4", padding=4):
+    """Rows of x, y, z in a number type, each with padding behind it."""
+    rows = np.ascontiguousarray(P, kind).view(np.uint8).reshape(len(P), -1)
+    return np.hstack([rows, np.zeros((len(P), padding), np.uint8)])
+
+
+@wrong(QUESTION, "is_dense promises that no point is NaN: who promised that here?")
+def holes_kept(P):
+    return packed(P).ravel()
+
+
+@wrong(QUESTION, "A pixel without depth has become a point in the robot's foot.")
+def holes_as_origin(P):
+    return packed(np.where(np.isfinite(P).all(axis=1, keepdims=True), P, 0.0)).ravel()
+
+
+@wrong(QUESTION, "A point of yours takes 32 bytes: float32 has 4 bytes per number. How many has float64?")
+def double_precision(P):
+    return packed(finite(P), "<f8", padding=8).ravel()
+
+
+@wrong(QUESTION, "The message says is_bigendian = 0: which byte comes first?")
+def big_endian(P):
+    return packed(finite(P), ">f4").ravel()
+
+
+@wrong(QUESTION, "point_step is 16 and three numbers take 12: what fills the rest?")
+def no_padding(P):
+    return packed(finite(P), padding=0).ravel()
+
+
+@wrong(QUESTION, "The bytes of one point stand together: x, y, z, then the next point.")
+def axis_after_axis(P):
+    cloud = finite(P)
+    numbers = np.column_stack([cloud, np.zeros(len(cloud))])
+    return np.frombuffer(numbers.T.astype("<f4").tobytes(), np.uint8)
+
+
+@wrong(QUESTION, "The field x has offset 0: a point begins with its x.")
+def padding_first(P):
+    return np.roll(packed(finite(P)), 4, axis=1).ravel()

@@ -1,0 +1,179 @@
+"""08_node.pair_stamps: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def pair_stamps(a, b, slop):
+    """For each stamp of a the number of the stamp of b that is nearest to it, and to which it is; or -1."""
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b[None, :])
+    best = apart.argmin(axis=1)
+    each_others = apart.argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(each_others & (apart.min(axis=1) <= slop), best, -1)
+
+
+def _streams(rng):
+    """Two jittered streams of a second, in nanoseconds of this century; frames of each are lost."""
+    start = 1_700_000_000_000_000_000 + int(rng.integers(0, 10**9))
+    slop = int(rng.integers(12, 22)) * 1_000_000
+    a, b = (start + 33_333_333 * np.arange(30) + rng.integers(-9_000_000, 26_000_000, 30) for _ in "ab")
+    a = np.sort(a)[rng.random(30) < 0.8]
+    b = np.sort(b)[rng.random(30) < 0.7]
+    if len(b) > 3 and len(a) > 3:
+        b[1] = a[2] + slop  # exactly at the bound counts
+        b = np.sort(b)
+    return a, b, slop
+
+
+_NOW = 1_700_000_000_000_000_000
+
+
+QUESTION = Question(
+    name="08_node.pair_stamps",
+    reference=pair_stamps,
+    inputs=_streams,
+    by_hand=(
+        (np.array([0, 33, 66]), np.array([2, 40, 90]), 10),
+        (np.array([0, 33, 66]), np.array([30, 60, 100]), 6),
+        (np.array([10]), np.array([2, 6, 13, 30]), 8),
+        (np.array([10, 50, 60]), np.array([6, 14, 56, 61]), 10),  # 56 is nearest to 50, and 60 to 56
+        (np.array([10, 20]), np.array([], int), 5),
+        (np.array([0, 33, 66]), np.array([36, 70]), 40),  # 0 has lost its partner, and 36 is another's
+        (np.array([10, 20, 60]), np.array([15, 61]), 9),  # 15 is as near to 10 as to 20
+        (np.array([_NOW]), np.array([_NOW - 2**32 - 2]), 3),  # four seconds, which 32 bits do not see
+        (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
+    ),
+    random_cases=6,
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property("one answer for each stamp of a", lambda arguments, j: np.shape(j) == np.shape(arguments[0])),
+        Property(
+            "each answer is -1, or the number of a stamp of b (from 0), not a stamp",
+            lambda arguments, j: all(-1 <= k < len(arguments[1]) for k in j),
+        ),
+        Property(
+            "whatever is paired lies within slop",
+            lambda arguments, j: all(
+                k == -1 or abs(int(arguments[0][i]) - int(arguments[1][k])) <= arguments[2] for i, k in enumerate(j)
+            ),
+        ),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(a, b, slop):
+    def nearest(stamp, others):
+        return min(range(len(others)), key=lambda k: abs(int(stamp) - int(others[k])), default=-1)
+
+    found = []
+    for i, stamp in enumerate(a):
+        j = nearest(stamp, b)
+        mutual = j >= 0 and nearest(b[j], a) == i and abs(int(stamp) - int(b[j])) <= slop
+        found.append(j if mutual else -1)
+    return np.array(found, int)
+
+
+@way(QUESTION)
+def by_searching(a, b, slop):
+    def nearest(of, among):
+        after = np.searchsorted(among, of).clip(0, len(among) - 1)
+        before = (after - 1).clip(0)
+        best = np.where(np.abs(of - among[before]) <= np.abs(among[after] - of), before, after)
+        return np.searchsorted(among, among[best])  # the first of equal stamps
+
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    best = nearest(a, b)
+    mutual = nearest(b, a)[best] == np.arange(len(a))
+    return np.where(mutual & (np.abs(a - b[best]) <= slop), best, -1)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def pairs(a, b, slop, distance):
+    """For each stamp of a the b of least distance if a is its nearest, too; -1 if it is over slop."""
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = distance(a[:, None], b[None, :])
+    best = apart.argmin(axis=1)
+    mutual = apart.argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(mutual & (apart.min(axis=1) <= slop), best, -1)
+
+
+@wrong(QUESTION, "Two images share one partner: is the nearest of b also nearer to this stamp than to any other?")
+def one_partner_for_two(a, b, slop):
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b[None, :])
+    return np.where(apart.min(axis=1) <= slop, apart.argmin(axis=1), -1)
+
+
+@wrong(
+    QUESTION,
+    "A stamp of a takes a partner to which a later stamp of a is nearer: which one is the nearest of the partner?",
+)
+def first_come_first_served(a, b, slop):
+    j, free = np.full(len(a), -1), np.ones(len(b), bool)
+    for i in range(len(a)):
+        apart = np.where(free, np.abs(b - a[i]), np.iinfo(np.int64).max)
+        if free.any() and apart.min() <= slop:
+            j[i] = apart.argmin()
+            free[j[i]] = False
+    return j
+
+
+@wrong(QUESTION, "A frame whose partner was lost must stay alone: what is slop for?")
+def no_bound(a, b, slop):
+    return pairs(a, b, np.iinfo(np.int64).max, lambda x, y: np.abs(x - y))
+
+
+@wrong(QUESTION, "Depth may be stamped a little later than colour as well as a little earlier.")
+def never_later(a, b, slop):
+    far = np.iinfo(np.int64).max
+    return pairs(a, b, slop, lambda x, y: np.where(y <= x, x - y, far))
+
+
+@wrong(QUESTION, "Depth may be stamped a little earlier than colour as well as a little later.")
+def never_earlier(a, b, slop):
+    far = np.iinfo(np.int64).max
+    return pairs(a, b, slop, lambda x, y: np.where(y >= x, y - x, far))
+
+
+@wrong(QUESTION, "Where all stamps of b are too far, argmin is still a number, 0: what is asked for there?")
+def far_ones_left_in_argmin(a, b, slop):
+    far = np.iinfo(np.int64).max
+    return pairs(a, b, far, lambda x, y: np.where(np.abs(x - y) <= slop, np.abs(x - y), far))
+
+
+@wrong(QUESTION, "The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
+def signed_difference(a, b, slop):
+    return pairs(a, b, slop, lambda x, y: x - y)
+
+
+@wrong(QUESTION, "Several stamps may lie within slop; take the nearest of them, not the first.")
+def first_within(a, b, slop):
+    return pairs(a, b, 0, lambda x, y: np.where(np.abs(x - y) <= slop, 0, 1))
+
+
+@wrong(QUESTION, "One lost message shifts all pairs after it: compare stamps, not positions.")
+def in_order_of_arrival(a, b, slop):
+    j = np.arange(len(a))
+    there = j < len(b)
+    near = np.zeros(len(a), bool)
+    near[there] = np.abs(a[there] - b[j[there]]) <= slop
+    return np.where(near, j, -1)
+
+
+@wrong(QUESTION, "Nanoseconds since 1970 have 19 digits; float32 keeps 7. Subtract before you round anything.")
+def stamps_in_float32(a, b, slop):
+    a, b = (np.asarray(stamps, np.float32) for stamps in (a, b))
+    return pairs(a, b, slop, lambda x, y: np.abs(x - y))

@@ -1,0 +1,202 @@
+"""08_node.pose_at: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def pose_at(stamps, positions, quaternions, t):
+    """Where a frame stood at a time between its stamped poses; NaN outside of what is known."""
+    if t < stamps[0] or t > stamps[-1]:
+        return np.full(3, np.nan), np.full(4, np.nan)
+    i = max(np.searchsorted(stamps, t), 1)
+    share = (t - stamps[i - 1]) / (stamps[i] - stamps[i - 1])
+    a, b = quaternions[i - 1], quaternions[i]
+    if a @ b < 0:
+        b = -b
+    angle = max(np.arccos(min(a @ b, 1.0)), 1e-6)
+    q = np.sin((1 - share) * angle) * a + np.sin(share * angle) * b
+    return (1 - share) * positions[i - 1] + share * positions[i], q / np.linalg.norm(q)
+
+
+def turned(axis, angle):
+    """The unit quaternion (x, y, z, w) of a turn by an angle about an axis."""
+    axis = np.asarray(axis, float)
+    return np.array([*(np.sin(angle / 2) * axis / np.linalg.norm(axis)), np.cos(angle / 2)])
+
+
+def _stream(rng):
+    """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way."""
+    stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20_000_000, 80_000_000, 5))
+    quaternions = rng.normal(size=(5, 4))
+    quaternions = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+    i = int(rng.integers(4))
+    t = stamps[i] + rng.uniform(0.1, 0.4) * (stamps[i + 1] - stamps[i])
+    return stamps, rng.uniform(-1.0, 1.0, (5, 3)), quaternions, int(t)
+
+
+def one_of_two(output):
+    """A place, and the one of q and -q whose largest component is positive."""
+    p, q = (np.asarray(part, float) for part in output)
+    return p, q * np.sign(q[np.abs(q).argmax()])
+
+
+_STAMPS = np.array([0, 40, 80, 200])
+_PLACES = np.array([[0.5, 0.0, 0.4], [0.6, 0.2, 0.4], [0.6, 0.2, 0.8], [0.2, 0.0, 0.8]])
+_TURNS = np.array([turned((0, 0, 1), a) for a in (0.0, 1.6, 1.6, 3.0)])
+_TURNS[3] = -_TURNS[3]  # the same rotation
+_TURNS[1:3] *= 1 + 4e-16  # equal, of length 1 but for rounding; the dot product is above 1
+_FURTHER = np.array([turned((0, 0, 1), np.radians(a)) for a in (0.0, 170.0, 190.0, 300.0)])
+_HARDLY = np.array([turned((0, 0, 1), 0.006 * k) for k in range(4)])
+
+
+QUESTION = Question(
+    name="08_node.pose_at",
+    reference=pose_at,
+    inputs=_stream,
+    by_hand=(
+        (_STAMPS, _PLACES, _TURNS, 10),  # a quarter of the first way, and of its turn
+        (_STAMPS, _PLACES, _TURNS, 40),  # one that was published
+        (_STAMPS, _PLACES, _TURNS, 60),  # no turn
+        (_STAMPS, _PLACES, _TURNS, 110),  # the last quaternion has the other sign
+        (_STAMPS, _PLACES, _TURNS, 0),
+        (_STAMPS, _PLACES, _TURNS, 200),
+        (_STAMPS, _PLACES, _TURNS, 201),
+        (_STAMPS, _PLACES, _TURNS, -1),
+        (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
+        (_STAMPS, _PLACES, _HARDLY, 50),  # a small turn, but not none
+    ),
+    random_cases=6,
+    atol=1e-5,
+    points=4,
+    properties=(
+        Property(
+            "a rotation's quaternion has length 1",
+            lambda arguments, out: bool(np.isnan(out[1]).any() or abs(np.linalg.norm(out[1]) - 1.0) < 1e-3),
+        ),
+    ),
+    canonical=one_of_two,
+    forbidden=("scipy",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def by_a_frame(stamps, positions, quaternions, t):
+    """Go round the circle that a and the part of b at right angles to it span."""
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    b = np.sign(a @ b) * b
+    beside = b - (a @ b) * a
+    length = np.linalg.norm(beside)
+    angle = share * np.arctan2(length, a @ b)
+    place = [np.interp(float(t - stamps[0]), (stamps - stamps[0]).astype(float), axis) for axis in positions.T]
+    turn = np.cos(angle) * a + np.sin(angle) * beside / max(length, 1e-12)
+    return outside(stamps, t) or (np.array(place), -turn)
+
+
+@way(QUESTION)
+def by_an_angle(stamps, positions, quaternions, t):
+    """Turn from a by a share of the rotation from a to b, whose axis and angle its quaternion says."""
+
+    def product(p, q):
+        v = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
+        return np.array([*v, p[3] * q[3] - p[:3] @ q[:3]])
+
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    x = product(b, a * [-1.0, -1.0, -1.0, 1.0])
+    x = x if x[3] >= 0.0 else -x
+    sine = np.linalg.norm(x[:3])
+    half = share * np.arctan2(sine, x[3])
+    part = np.array([*(np.sin(half) * x[:3] / max(sine, 1e-12)), np.cos(half)])
+    return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def neighbours(stamps, t, side="left"):
+    """The number of the pose before a time, and the share of the way to the next; "right": at a stamp, that one's."""
+    i = int(np.clip(np.searchsorted(stamps, t, side) - 1, 0, len(stamps) - 2))
+    return i, (t - stamps[i]) / (stamps[i + 1] - stamps[i])
+
+
+def outside(stamps, t):
+    return (np.full(3, np.nan), np.full(4, np.nan)) if t < stamps[0] or t > stamps[-1] else None
+
+
+def slerp(a, b, share):
+    angle = max(np.arccos(np.clip(a @ b, -1.0, 1.0)), 1e-6)
+    q = np.sin((1 - share) * angle) * a + np.sin(share * angle) * b
+    return q / np.linalg.norm(q)
+
+
+@wrong(QUESTION, "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?")
+def turn_by_the_chord(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    q = (1 - share) * a + share * (b if a @ b >= 0 else -b)
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q / np.linalg.norm(q))
+
+
+@wrong(QUESTION, "A small turn has become a large one the other way round: which of b and -b is nearer to a?")
+def the_long_way_round(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    q = slerp(quaternions[i], quaternions[i + 1], share)
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
+
+
+@wrong(QUESTION, "The camera moved between the two poses: where was it when the image was taken?")
+def the_last_one_before(stamps, positions, quaternions, t):
+    i = max(int(np.searchsorted(stamps, t, side="right")) - 1, 0)
+    return outside(stamps, t) or (positions[i], quaternions[i])
+
+
+@wrong(QUESTION, "Nobody knows where the camera is after the last pose: what should a node say then?")
+def held_at_the_ends(stamps, positions, quaternions, t):
+    return pose_at(stamps, positions, quaternions, min(max(t, stamps[0]), stamps[-1]))
+
+
+@wrong(QUESTION, "The places are right and the turns are not in between: which turn is it at this time?")
+def turn_of_the_one_before(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    turn = quaternions[i + (share >= 1)]
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
+
+
+EXCHANGED = "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?"
+
+
+@wrong(QUESTION, EXCHANGED)
+def shares_exchanged(stamps, positions, quaternions, t, side="left"):
+    i, _ = neighbours(stamps, t, side)
+    then = stamps[i] + stamps[i + 1] - t
+    return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
+
+
+@wrong(QUESTION, EXCHANGED)  # at a stamp it goes on from there
+def shares_exchanged_after(stamps, positions, quaternions, t):
+    return shares_exchanged(stamps, positions, quaternions, t, side="right")
+
+
+@wrong(QUESTION, "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
+def only_the_angle_made_shorter(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
+    q = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
+
+
+@wrong(QUESTION, "There are poses between the first and the last: which two stand round t?")
+def from_the_first_to_the_last(stamps, positions, quaternions, t):
+    return pose_at(stamps[[0, -1]], positions[[0, -1]], quaternions[[0, -1]], t)
+
+
+@wrong(QUESTION, "Two turns are equal, yours is NaN: by 0 / 0, or as arccos of a dot b, which rounding lifts above 1?")
+def nan_between_equal_turns(stamps, positions, quaternions, t):
+    i, _ = neighbours(stamps, t)
+    p, q = pose_at(stamps, positions, quaternions, t)
+    return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)

@@ -1,0 +1,124 @@
+"""09_other_stacks.choose_region: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def choose_region(features, mean, covariance, allowed):
+    """Number, from 1, of the allowed piece with the least Mahalanobis distance to the mean; 0 if none is allowed."""
+    off = features - mean
+    squared = (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+    squared[~allowed] = np.inf
+    return squared.argmin() + 1 if allowed.any() else 0
+
+
+def _features(rng):
+    n = int(rng.integers(5, 9))
+    A = rng.normal(size=(3, 3)) * (3.0, 0.4, 1.0)
+    covariance = A.T @ A + np.diag((0.3, 0.02, 0.1))
+    mean = rng.normal(size=3) * (4.0, 1.0, 2.0)
+    features = mean + rng.normal(size=(n, 3)) * (2.0, 1.0, 1.5)
+    allowed = rng.random(n) < 0.7
+    allowed[rng.integers(n)] = True
+    return features, mean, covariance, allowed
+
+
+_LINE = np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.9, 1.9, 0.0]])
+
+
+_TILTED = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+QUESTION = Question(
+    name="09_other_stacks.choose_region",
+    reference=choose_region,
+    inputs=_features,
+    by_hand=(
+        (_LINE, np.zeros(3), np.eye(3), np.array([True, True, True])),
+        (1e10 * _LINE[::-1], np.zeros(3), np.eye(3), np.array([True, False, True])),  # all very far away
+        (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
+        (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
+        (_LINE, np.zeros(3), np.diag([0.9, 0.3, 1.0]), np.array([True, True, True])),  # the inverse twice: 1, not 2
+        (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
+        (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
+        (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
+    ),
+    random_cases=12,
+    rtol=0.0,
+    atol=0.0,
+    points=3,
+    properties=(
+        Property(
+            "the number is that of an allowed piece, or 0",
+            lambda arguments, number: bool(number == 0 or arguments[3][int(number) - 1]),
+        ),
+    ),
+    forbidden=("scipy", "sklearn"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(features, mean, covariance, allowed):
+    best, number, P = np.inf, 0, np.linalg.inv(covariance)
+    for i in range(len(features)):
+        off = features[i] - mean
+        if allowed[i] and off @ P @ off < best:
+            best, number = off @ P @ off, i + 1
+    return number
+
+
+@way(QUESTION)
+def einsum(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def distances(features, mean, covariance):
+    off = features - mean
+    return (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+
+
+def chosen(distance, allowed):
+    return 1 + int(np.where(allowed, distance, np.inf).argmin()) if np.any(allowed) else 0
+
+
+@wrong(QUESTION, "Your distance does not know that two features go together: what stands off the diagonal?")
+def chosen_by_spread(features, mean, covariance, allowed):
+    return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
+
+
+@wrong(QUESTION, "A piece at the image's edge may not be chosen.")
+def chosen_although_forbidden(features, mean, covariance, allowed):
+    return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0
+
+
+@wrong(QUESTION, "After features[allowed] the rows have new numbers: which ones does the image of pieces know?")
+def chosen_among_the_allowed(features, mean, covariance, allowed):
+    return 1 + int(distances(features[allowed], mean, covariance).argmin()) if allowed.any() else 0
+
+
+@wrong(QUESTION, "If no piece is allowed, the answer is 0: what is argmin of all inf?")
+def chosen_always(features, mean, covariance, allowed):
+    return 1 + int(np.where(allowed, distances(features, mean, covariance), np.inf).argmin())
+
+
+@wrong(QUESTION, "The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
+def inverse_twice(features, mean, covariance, allowed):
+    squared = (((features - mean) @ np.linalg.inv(covariance)) ** 2).sum(axis=1)
+    return np.where(allowed, squared, np.inf).argmin() + 1 if allowed.any() else 0
+
+
+@wrong(QUESTION, "If no piece is allowed, the answer is 0, which is no piece's number.")
+def none_is_minus_one(features, mean, covariance, allowed):
+    return choose_region(features, mean, covariance, allowed) or -1
+
+
+@wrong(QUESTION, "The diagonal holds variances, squares already, and two features go together: what is off it?")
+def divided_by_variances(features, mean, covariance, allowed):
+    return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)

@@ -1,0 +1,149 @@
+"""09_other_stacks.engine_contract: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def engine_contract(reference, other, tolerance):
+    """Whether an engine's logits keep to a tolerance; the shares of labels that changed, and that it may change."""
+    kept = np.abs(reference - other).max() <= tolerance
+    changed = np.mean(reference.argmax(axis=0) != other.argmax(axis=0))
+    second, best = np.sort(reference, axis=0)[-2:]
+    return kept, changed, np.mean(best - second <= 2 * tolerance)
+
+
+def _two_engines(rng):
+    C, H, W = (int(rng.integers(low, low + 3)) for low in (3, 6, 9))
+    tolerance = float(rng.choice([0.25, 0.5]))
+    reference = rng.integers(-24, 24, (C, H, W)) / 8
+    worst = rng.choice([0.75, 1.0, 1.5]) * tolerance
+    other = reference + rng.uniform(-0.9, 0.9, (C, H, W)) * worst
+    v, u = rng.integers(H), rng.integers(W)
+    other[0, v, u] = reference[0, v, u] - worst  # the worst of all, downwards
+    return reference.astype(np.float32), other.astype(np.float32), tolerance
+
+
+def _logits(*classes):
+    return np.array(classes, np.float32)[:, None, :]
+
+
+_BEST_AND_SECOND = _logits((4, 1, 2, -3), (1, 3, 2.5, -1), (0, 2, -9, -2))
+
+QUESTION = Question(
+    name="09_other_stacks.engine_contract",
+    reference=engine_contract,
+    inputs=_two_engines,
+    by_hand=(
+        (_BEST_AND_SECOND, _BEST_AND_SECOND, 0.25),  # equal; one margin is 2 * 0.25
+        (_BEST_AND_SECOND, _BEST_AND_SECOND - np.float32(0.5), 0.5),  # all lower by just as much as is allowed
+        (_BEST_AND_SECOND, _BEST_AND_SECOND - np.float32(0.75), 0.5),  # and by more
+        (_BEST_AND_SECOND, _BEST_AND_SECOND[::-1], 1.0),  # classes in another order
+        (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
+        (_BEST_AND_SECOND, _BEST_AND_SECOND - _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
+        # no number; and another class is best there, whether NaN counts as a label or not
+        (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0, 0), (np.nan, 0, 0, 0), (5, 0, 0, 0)), 5.0),
+        (
+            1024 * _BEST_AND_SECOND,
+            1024 * _BEST_AND_SECOND + _logits((1 / 64, 0, 0, 0), (0, 0, 0, 0), (0, 0, 0, 0)),
+            1 / 128,
+        ),
+    ),
+    random_cases=6,
+    points=3,
+    properties=(
+        Property(
+            "shares lie in 0..1",
+            lambda arguments, out: bool(0.0 <= out[1] <= 1.0 and 0.0 <= out[2] <= 1.0),
+        ),
+    ),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(reference, other, tolerance):
+    _C, H, W = reference.shape
+    kept, changed, close = True, 0, 0
+    for v in range(H):
+        for u in range(W):
+            z, y = reference[:, v, u].tolist(), other[:, v, u].tolist()
+            kept = kept and all(abs(a - b) <= tolerance for a, b in zip(z, y, strict=True))
+            changed += int(reference[:, v, u].argmax() != other[:, v, u].argmax())
+            best, second = sorted(z)[:-3:-1]
+            close += best - second <= 2 * tolerance
+    return kept, changed / (H * W), close / (H * W)
+
+
+@way(QUESTION)
+def without_the_best(reference, other, tolerance):
+    labels = reference.argmax(axis=0)
+    rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
+    margin = reference.max(axis=0) - rest.max(axis=0)
+    kept = bool(np.all(np.abs(other - reference) <= tolerance))
+    same = np.mean(labels == np.nanargmax(other, axis=0))
+    return kept, 1.0 - same, np.count_nonzero(margin <= 2 * tolerance) / margin.size
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def changed(reference, other):
+    return np.mean(reference.argmax(axis=0) != other.argmax(axis=0))
+
+
+def at_risk(reference, most):
+    ordered = np.sort(reference, axis=0)
+    return np.mean(ordered[-1] - ordered[-2] <= most)
+
+
+@wrong(QUESTION, "One logit may go up while the other goes down: how much can the gap between them shrink?")
+def margin_of_one_tolerance(reference, other, tolerance):
+    kept = np.abs(reference - other).max() <= tolerance
+    return kept, changed(reference, other), at_risk(reference, tolerance)
+
+
+@wrong(QUESTION, "A contract holds for each logit: a mean forgives the one pixel that is far off.")
+def kept_on_average(reference, other, tolerance):
+    return np.abs(reference - other).mean() <= tolerance, changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "An engine that is too low by a mile keeps your contract: which way may a logit be off?")
+def kept_upwards_alone(reference, other, tolerance):
+    return (other - reference).max() <= tolerance, changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "NaN is neither above nor below: is a comparison with it true the way you ask?")
+def kept_unless_above(reference, other, tolerance):
+    broken = np.abs(reference - other) > tolerance
+    return not broken.any(), changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "np.allclose and np.isclose forgive more at large logits: their rtol is not 0 unless you say so.")
+def kept_by_allclose(reference, other, tolerance):
+    kept = np.allclose(reference, other, atol=tolerance)
+    return kept, changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "The gap that counts is the one between the best class and the second, not the last.")
+def margin_to_the_worst(reference, other, tolerance):
+    kept = np.abs(reference - other).max() <= tolerance
+    return kept, changed(reference, other), np.mean(np.ptp(reference, axis=0) <= 2 * tolerance)
+
+
+@wrong(QUESTION, "The two best are to be found among a pixel's classes: along which axis do these lie?")
+def sorted_along_a_row(reference, other, tolerance):
+    kept, ordered = np.abs(reference - other).max() <= tolerance, np.sort(reference)
+    return kept, changed(reference, other), np.mean(ordered[..., -1] - ordered[..., -2] <= 2 * tolerance)
+
+
+@wrong(QUESTION, "An engine that is too high by a mile keeps your contract: which way may a logit be off?")
+def kept_downwards_alone(reference, other, tolerance):
+    return ((reference - other) <= tolerance).all(), changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "A label is the best of a pixel's classes: which axis do they lie on? Yours is the best column.")
+def labels_along_rows(reference, other, tolerance):
+    kept = np.abs(reference - other).max() <= tolerance
+    return kept, np.mean(reference.argmax(axis=-1) != other.argmax(axis=-1)), at_risk(reference, 2 * tolerance)

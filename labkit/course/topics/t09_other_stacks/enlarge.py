@@ -1,0 +1,132 @@
+"""09_other_stacks.enlarge: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.topics.t01_labels.resize_labels import copied
+
+
+def enlarge(labels, size):
+    """Resize labels (h, w) to size = (W, H): each new pixel shows the old one that its centre lies in."""
+    W, H = size
+    h, w = labels.shape
+    rows, columns = (2 * np.arange(H) + 1) * h // (2 * H), (2 * np.arange(W) + 1) * w // (2 * W)
+    return labels[rows[:, None], columns]
+
+
+def _labels_and_size(rng):
+    labels = rng.integers(0, 4, (int(rng.integers(5, 8)), int(rng.integers(9, 12)))).astype(np.uint8)
+    W, H = int(rng.integers(12, 30)), int(rng.integers(8, 19))
+    return labels, (W, H)
+
+
+QUESTION = Question(
+    name="09_other_stacks.enlarge",
+    reference=enlarge,
+    inputs=_labels_and_size,
+    by_hand=(
+        (np.array([[0, 2], [1, 3]], np.uint8), (6, 4)),
+        (np.array([[0, 3, 0], [2, 0, 1]], np.uint8), (4, 5)),
+        (np.array([[1, 2, 3, 0]], np.uint8), (2, 3)),
+        (np.array([[0], [3]], np.uint8), (1, 49)),  # 24.5 * (2 / 49) is less than 1 in floating point
+        (np.array([[0, 1, 2, 3]], np.uint8), (2, 1)),  # smaller: the centres of halves lie in 1 and 3
+    ),
+    random_cases=6,
+    rtol=0.0,
+    atol=0.0,
+    points=2,
+    properties=(
+        Property(
+            "no class appears that was not there",
+            lambda arguments, out: bool(np.isin(out, arguments[0]).all()),
+        ),
+    ),
+    forbidden=("cv2", "PIL"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(labels, size):
+    W, H = size
+    h, w = labels.shape
+    out = np.zeros((H, W), labels.dtype)
+    for v in range(H):
+        for u in range(W):
+            out[v, u] = labels[int((v + 0.5) * h / H), int((u + 0.5) * w / W)]
+    return out
+
+
+@way(QUESTION)
+def take(labels, size):
+    rows, columns = (
+        ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
+    )
+    return labels.take(rows, axis=0).take(columns, axis=1)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong(QUESTION, "OpenCV's size is (width, height), a shape is not.")
+def resize_swapped(labels, size):
+    return enlarge(labels, size[::-1])
+
+
+@wrong(
+    QUESTION, "From 4 pixels to 2: the first new one covers old 0 and 1, and where is its centre? Not at its corner."
+)
+def resize_by_corners(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: i * old // n)
+
+
+@wrong(QUESTION, "np.unique before and after: is the mean of class 0 and 2 a class 1?")
+def resize_bilinear(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = (np.arange(H) + 0.5) * h / H - 0.5, (np.arange(W) + 0.5) * w / W - 0.5
+    wide = [np.interp(columns, np.arange(w), row) for row in labels]
+    return np.stack([np.interp(rows, np.arange(h), column) for column in np.transpose(wide)], axis=1).round()
+
+
+@wrong(QUESTION, "From 2 to 4 pixels, each old one should appear twice: which ones do yours show?")
+def resize_rounded(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: np.minimum(np.round(i * old / n), old - 1))
+
+
+@wrong(QUESTION, "You stretch between the outermost centres: does every old pixel get the same share of new ones?")
+def resize_corner_to_corner(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: np.linspace(0, old - 1, n).round())
+
+
+@wrong(QUESTION, "24.5 * (2 / 49) is not 1 in floating point: which whole numbers give the same quotient?")
+def resize_by_floats(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) * (old / n))
+
+
+@wrong(QUESTION, "np.resize repeats the data in reading order: look at it.")
+def resize_tiled(labels, size):
+    W, H = size
+    return np.resize(labels, (H, W))
+
+
+@wrong(QUESTION, "The blob may have other proportions than the image: a factor for each side.")
+def resize_one_factor(labels, size):
+    W, H = size
+    h, w = labels.shape
+    factor = max(W // w, 1)
+    rows = np.minimum(np.arange(H) // factor, h - 1)
+    return labels[rows[:, None], np.minimum(np.arange(W) // factor, w - 1)]
+
+
+@wrong(
+    QUESTION, "A centre exactly between two old pixels belongs to the second; np.round and np.rint take the even one."
+)
+def resize_half_to_even(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n - 0.5))
+
+
+@wrong(QUESTION, "A centre at 0.7 lies in old pixel 0, which reaches from 0 to 1: which way do you round?")
+def resize_rounded_centres(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n).clip(0, old - 1))

@@ -1,0 +1,160 @@
+"""09_other_stacks.hsv_mask: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Question, way, wrong
+
+
+def hsv_mask(hsv, lower, upper):
+    """Mark the pixels within the bounds, both included; a lower hue above the upper one goes round through red."""
+    h, rest = hsv[..., 0], (hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])
+    above, below = h >= lower[0], h <= upper[0]
+    hue = above & below if lower[0] <= upper[0] else above | below
+    return hue & rest.all(axis=-1)
+
+
+def _colours_and_bounds(rng):
+    hsv = np.stack([rng.integers(0, n, (7, 12)) for n in (180, 256, 256)], axis=-1).astype(np.uint8)
+    ends = np.sort(rng.integers((0, 10, 10), (180, 246, 246), (2, 3)), axis=0)
+    ends[1, 1:] = np.maximum(ends[1, 1:], ends[0, 1:] + 60).clip(max=255)
+    lower, upper = ends
+    if rng.random() < 0.5:
+        lower[0], upper[0] = max(upper[0], lower[0] + 1), lower[0]
+    hsv[0, :3], hsv[1, :3] = lower, upper  # pixels on the bounds
+    hsv[0, 1, 1:], hsv[1, 1, 1:] = upper[1:], lower[1:]
+    return hsv, lower.astype(np.uint8), upper.astype(np.uint8)
+
+
+def _pixels(*pixels):
+    return np.array([pixels], np.uint8)
+
+
+QUESTION = Question(
+    name="09_other_stacks.hsv_mask",
+    reference=hsv_mask,
+    inputs=_colours_and_bounds,
+    by_hand=(
+        (
+            _pixels((5, 50, 50), (20, 255, 255), (4, 90, 90), (12, 49, 90), (12, 90, 49), (21, 90, 90)),
+            np.array([5, 50, 50], np.uint8),
+            np.array([20, 255, 255], np.uint8),
+        ),
+        (
+            _pixels(
+                *((175, 90, 90), (3, 90, 90), (170, 60, 70), (10, 200, 210), (90, 90, 90), (175, 59, 90)),
+                *((179, 90, 90), (0, 90, 90)),  # the last hue and the first
+            ),
+            np.array([170, 60, 70], np.uint8),
+            np.array([10, 200, 210], np.uint8),
+        ),
+        (
+            _pixels((30, 100, 100), (29, 100, 100), (31, 100, 100), (30, 101, 100), (30, 100, 99)),
+            np.array([30, 100, 100], np.uint8),
+            np.array([30, 100, 100], np.uint8),
+        ),
+        (
+            _pixels((10, 250, 90), (10, 50, 90), (10, 150, 90)),  # only the hue goes round
+            np.array([5, 200, 50], np.uint8),
+            np.array([20, 100, 255], np.uint8),
+        ),
+    ),
+    random_cases=8,
+    rtol=0.0,
+    atol=0.0,
+    points=2,
+    forbidden=("cv2",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(hsv, lower, upper):
+    mask = np.zeros(hsv.shape[:2], bool)
+    for v in range(hsv.shape[0]):
+        for u in range(hsv.shape[1]):
+            h, s, x = (int(value) for value in hsv[v, u])
+            round_ = lower[0] > upper[0]
+            hue = (h >= lower[0] or h <= upper[0]) if round_ else lower[0] <= h <= upper[0]
+            mask[v, u] = hue and lower[1] <= s <= upper[1] and lower[2] <= x <= upper[2]
+    return mask
+
+
+@way(QUESTION)
+def modulo(hsv, lower, upper):
+    shifted = (hsv[..., 0].astype(int) - int(lower[0])) % 180 <= (int(upper[0]) - int(lower[0])) % 180
+    return shifted & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def between(hsv, lower, upper):
+    return (hsv >= np.asarray(lower)) & (hsv <= np.asarray(upper))
+
+
+@wrong(QUESTION, "Try red, from 170 to 10: can any hue be above the one and below the other?")
+def mask_without_going_round(hsv, lower, upper):
+    return between(hsv, lower, upper).all(axis=-1)
+
+
+@wrong(QUESTION, "A pixel is inside only if all three channels are.")
+def mask_of_any_channel(hsv, lower, upper):
+    inside = between(hsv, lower, upper)
+    if lower[0] > upper[0]:
+        inside[..., 0] = (hsv[..., 0] >= lower[0]) | (hsv[..., 0] <= upper[0])
+    return inside.any(axis=-1)
+
+
+@wrong(QUESTION, "A pixel that equals a bound is inside, as in OpenCV.")
+def mask_without_bounds(hsv, lower, upper):
+    h, rest = hsv[..., 0], (hsv[..., 1:] > lower[1:]) & (hsv[..., 1:] < upper[1:])
+    hue = (h > lower[0]) & (h < upper[0]) if lower[0] <= upper[0] else (h > lower[0]) | (h < upper[0])
+    return hue & rest.all(axis=-1)
+
+
+@wrong(QUESTION, "Sorting the hues turns red into everything but red: which way round does the circle go?")
+def mask_with_swapped_bounds(hsv, lower, upper):
+    h, (low, high) = hsv[..., 0], sorted((lower[0], upper[0]))
+    return (h >= low) & (h <= high) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong(QUESTION, "Grey pixels have a hue too, any one: what excludes them?")
+def mask_of_hue(hsv, lower, upper):
+    h = hsv[..., 0]
+    return (h >= lower[0]) & (h <= upper[0]) if lower[0] <= upper[0] else (h >= lower[0]) | (h <= upper[0])
+
+
+@wrong(QUESTION, "OpenCV's hue goes to 179: the bounds are in the same unit.")
+def mask_in_degrees(hsv, lower, upper):
+    doubled = hsv.astype(int) * (2, 1, 1)
+    return hsv_mask(doubled, lower, upper)
+
+
+@wrong(QUESTION, "The bounds and the hues are bytes: 10 - 170 wraps round at 256, not at 180.")
+def hue_by_a_remainder_of_bytes(hsv, lower, upper):
+    hue = (hsv[..., 0] - lower[0]) % 180 <= (upper[0] - lower[0]) % 180
+    return hue & ((hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])).all(axis=-1)
+
+
+@wrong(QUESTION, "From 5 to 20 nearly every hue is in yours: when is it `or`?")
+def mask_always_round(hsv, lower, upper):
+    h = hsv[..., 0]
+    return ((h >= lower[0]) | (h <= upper[0])) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong(QUESTION, "Only the hue goes round: a saturation from 200 to 100 holds nothing.")
+def all_three_go_round(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    return np.where(lower > upper, above | below, above & below).all(axis=-1)
+
+
+@wrong(QUESTION, "When the hue goes round, saturation and value do not: `or` is for the hue alone.")
+def all_three_go_with_the_hue(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    return (above | below if lower[0] > upper[0] else above & below).all(axis=-1)
+
+
+@wrong(QUESTION, "Saturation and value have an upper bound, too.")
+def mask_without_upper_bounds(hsv, lower, upper):
+    return hsv_mask(hsv, lower, np.array([upper[0], 255, 255]))

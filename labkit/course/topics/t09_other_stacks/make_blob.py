@@ -1,0 +1,141 @@
+"""09_other_stacks.make_blob: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def make_blob(bgr, multiple):
+    """Turn an OpenCV image into a network's input whose sides are multiples: RGB in 0..1, float32 (1, 3, H', W')."""
+    H, W, _ = bgr.shape
+    blob = np.zeros((1, 3, -(-H // multiple) * multiple, -(-W // multiple) * multiple), np.float32)
+    blob[0, :, :H, :W] = bgr[:, :, ::-1].transpose(2, 0, 1) / np.float32(255)
+    return blob
+
+
+def _image(rng):
+    multiple = int(rng.integers(3, 6))
+    H, W = int(rng.integers(4, 9)), int(rng.integers(10, 17))
+    return rng.integers(1, 256, (H, W, 3)).astype(np.uint8), multiple
+
+
+_SIX = np.array([[[0, 0, 255], [255, 0, 0]], [[10, 20, 30], [40, 50, 60]], [[1, 2, 3], [4, 5, 6]]], np.uint8)
+
+
+QUESTION = Question(
+    name="09_other_stacks.make_blob",
+    reference=make_blob,
+    inputs=_image,
+    by_hand=(
+        (np.array([[[255, 0, 51]]], np.uint8), 1),
+        (_SIX, 1),
+        (_SIX, 2),
+        (_SIX // 255, 4),  # bytes of 0 and 1: what the largest is does not count
+    ),
+    rtol=1e-6,
+    atol=1e-7,
+    points=3,
+    same_dtype=True,
+    properties=(
+        Property("values lie in 0..1", lambda arguments, blob: bool(np.min(blob) >= 0.0 and np.max(blob) <= 1.0)),
+    ),
+    forbidden=("cv2",),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(bgr, multiple):
+    H, W, _ = bgr.shape
+    tall, wide = H, W
+    while tall % multiple:
+        tall += 1
+    while wide % multiple:
+        wide += 1
+    blob = np.zeros((1, 3, tall, wide), np.float32)
+    for v in range(H):
+        for u in range(W):
+            for c in range(3):
+                blob[0, c, v, u] = bgr[v, u, 2 - c] / 255.0
+    return blob
+
+
+@way(QUESTION)
+def stacked(bgr, multiple):
+    image = padded(bgr, multiple)
+    return np.stack([image[:, :, c].astype(np.float32) / 255 for c in (2, 1, 0)])[np.newaxis]
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def padded(bgr, multiple, mode="constant"):
+    room = [(0, -n % multiple) for n in bgr.shape[:2]]
+    return np.pad(bgr, (*room, (0, 0)), mode)
+
+
+def scaled(x):
+    return (x / np.float32(255)).astype(np.float32)
+
+
+def planes(bgr):
+    return bgr.transpose(2, 0, 1)[None]
+
+
+@wrong(QUESTION, "Put in one pure red pixel: which plane lights up?")
+def blob_still_bgr(bgr, multiple):
+    return scaled(planes(padded(bgr, multiple)))
+
+
+@wrong(
+    QUESTION, "The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?"
+)
+def blob_reshaped(bgr, multiple):
+    image = padded(bgr, multiple)[..., ::-1]
+    return scaled(image.reshape(1, 3, *image.shape[:2]))
+
+
+@wrong(QUESTION, "Which axis did you turn round, the channels' or the columns'?")
+def blob_mirrored(bgr, multiple):
+    return scaled(planes(padded(bgr[:, ::-1], multiple)))
+
+
+@wrong(QUESTION, "Black must become 0 here; not every network wants -1.")
+def blob_from_minus_one(bgr, multiple):
+    return 2 * scaled(planes(padded(bgr[..., ::-1], multiple))) - 1
+
+
+@wrong(QUESTION, "White must become exactly 1: what is white's byte?")
+def blob_of_256(bgr, multiple):
+    return (planes(padded(bgr[..., ::-1], multiple)) / 256.0).astype(np.float32)
+
+
+@wrong(QUESTION, "A side that is a multiple already needs no room: what do you add to 8 for a multiple of 4?")
+def room_for_one_more(bgr, multiple):
+    room = [(0, multiple - n % multiple) for n in bgr.shape[:2]]
+    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+
+
+@wrong(QUESTION, "The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+def room_all_round(bgr, multiple):
+    room = [(-n % multiple // 2, -n % multiple - -n % multiple // 2) for n in bgr.shape[:2]]
+    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+
+
+@wrong(QUESTION, "What is left over was cut off: the network should see all of the image.")
+def cut_to_a_multiple(bgr, multiple):
+    H, W = (n // multiple * multiple for n in bgr.shape[:2])
+    return scaled(planes(bgr[:H, :W, ::-1]))
+
+
+@wrong(QUESTION, "The room is to be 0, not the last pixel once more.")
+def room_like_the_edge(bgr, multiple):
+    return scaled(planes(padded(bgr, multiple, "edge")[..., ::-1]))
+
+
+@wrong(QUESTION, "Rows and columns may need different numbers of zeros: compute each by itself.")
+def one_margin_for_both(bgr, multiple):
+    margin = max(-bgr.shape[0] % multiple, -bgr.shape[1] % multiple)
+    rgb = np.pad(bgr[..., ::-1], ((0, margin), (0, margin), (0, 0)))
+    return (rgb.transpose(2, 0, 1)[None] / 255).astype(np.float32)

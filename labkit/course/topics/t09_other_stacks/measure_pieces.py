@@ -1,0 +1,117 @@
+"""09_other_stacks.measure_pieces: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labkit.course.checker.question import Property, Question, way, wrong
+
+
+def measure_pieces(pieces):
+    """Measure pieces 1 to n: areas (n,), centroids u, v (n, 2), boxes u0, v0, u1, v1 (n, 4), ends included."""
+    area, centroid, box = [], [], []
+    for i in range(1, pieces.max() + 1):
+        v, u = np.nonzero(pieces == i)
+        area.append(u.size)
+        centroid.append((u.mean(), v.mean()))
+        box.append((u.min(), v.min(), u.max(), v.max()))
+    return np.array(area), np.array(centroid), np.array(box)
+
+
+def _pieces(rng):
+    H, W, n = int(rng.integers(9, 12)), int(rng.integers(14, 19)), int(rng.integers(3, 6))
+    pieces = rng.integers(0, n + 1, (H, W))
+    pieces = np.where(rng.random((H, W)) < 0.7, 0, pieces)
+    for i in range(1, n + 1):  # no number goes without a pixel; and pieces of very different sizes
+        v, u = rng.integers(0, H - 3), rng.integers(0, W - 5)
+        pieces[v : v + int(rng.integers(1, 4)), u : u + int(rng.integers(1, 6))] = i
+    return (np.unique(pieces, return_inverse=True)[1].reshape(H, W).astype(np.int32),)
+
+
+QUESTION = Question(
+    name="09_other_stacks.measure_pieces",
+    reference=measure_pieces,
+    inputs=_pieces,
+    by_hand=(
+        (np.array([[0, 1, 1, 1], [0, 0, 0, 1], [2, 0, 0, 0]], np.int32),),
+        (np.array([[1, 1, 2, 2, 2]], np.int32),),
+    ),
+    points=3,
+    properties=(
+        Property(
+            "the areas add up to the pixels that belong to a piece",
+            lambda arguments, output: int(np.sum(output[0])) == int(np.count_nonzero(arguments[0])),
+        ),
+    ),
+    forbidden=("cv2", "scipy", "skimage"),
+)
+
+# ------------------------------------------------------------------------------------------------------- other ways
+
+
+@way(QUESTION)
+def loops(pieces):
+    n = int(pieces.max())
+    area, total = [0] * n, [[0, 0] for _ in range(n)]
+    box = [[10**9, 10**9, -1, -1] for _ in range(n)]
+    for v in range(pieces.shape[0]):
+        for u in range(pieces.shape[1]):
+            i = int(pieces[v, u]) - 1
+            if i >= 0:
+                area[i] += 1
+                total[i][0] += u
+                total[i][1] += v
+                box[i] = [min(box[i][0], u), min(box[i][1], v), max(box[i][2], u), max(box[i][3], v)]
+    area = np.array(area)
+    return area, np.array(total) / area[:, None], np.array(box)
+
+
+@way(QUESTION)
+def bincount(pieces):
+    flat, n = pieces.ravel(), int(pieces.max())
+    v, u = (grid.ravel() for grid in np.mgrid[: pieces.shape[0], : pieces.shape[1]])
+    area = np.bincount(flat, minlength=n + 1)[1:]
+    middle = np.stack([np.bincount(flat, x, n + 1)[1:] / area for x in (u, v)], axis=1)
+    box = np.array([[f(x[flat == i]) for f in (np.min, np.max) for x in (u, v)] for i in range(1, n + 1)])
+    return area, middle.astype(np.float32), box
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def pieces_by_argwhere(pieces, first=1):
+    for i in range(first, pieces.max() + 1):
+        yield np.argwhere(pieces == i)
+
+
+def measured(pieces, area=len, centroid=lambda vu: vu.mean(axis=0)[::-1], box=None, first=1):
+    box = box or (lambda vu: (*vu.min(axis=0)[::-1], *vu.max(axis=0)[::-1]))
+    found = [vu for vu in pieces_by_argwhere(pieces, first) if len(vu)]
+    return (
+        np.array([area(vu) for vu in found]),
+        np.array([centroid(vu) for vu in found], float).reshape(-1, 2),
+        np.array([box(vu) for vu in found]).reshape(-1, 4),
+    )
+
+
+@wrong(QUESTION, "The last column and row of a box still belong to the piece here.")
+def measured_with_open_boxes(pieces):
+    return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(vu.max(axis=0)[::-1] + 1)))
+
+
+@wrong(QUESTION, "0 is no piece: which piece is your first row of?")
+def measured_with_the_background(pieces):
+    return measured(pieces, first=0)
+
+
+@wrong(QUESTION, "The middle of an L-shaped piece is not that of its box.")
+def measured_by_boxes(pieces):
+    return measured(pieces, centroid=lambda vu: (vu.min(axis=0) + vu.max(axis=0))[::-1] / 2)
+
+
+@wrong(QUESTION, "Count the piece's own pixels: a box holds others too.")
+def measured_box_areas(pieces):
+    return measured(pieces, area=lambda vu: np.prod(np.ptp(vu, axis=0) + 1))
+
+
+@wrong(QUESTION, "The box is (u0, v0, u1, v1): first and last, not first and how many.")
+def measured_widths(pieces):
+    return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(np.ptp(vu, axis=0)[::-1] + 1)))

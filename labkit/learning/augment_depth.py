@@ -1,0 +1,148 @@
+"""Random changes of RGB-D training frames: another window and roll of the camera, a bad sensor, a bad calibration.
+
+Each change keeps colour, depth and labels of one scene together, and the camera that would have seen it so: heights,
+normals and sizes are computed after it, from what a robot would know. Topics 03_gradient and 06_back_projection.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from scipy.spatial.transform import Rotation
+
+from labkit.frame import RGBDFrame
+from labkit.geometry.sensor import DepthSensor
+from labkit.labels import IGNORE, OBSTACLE, TARGET
+from labkit.learning.augment import Draws, random_colour, random_noise, random_sharpness
+from labkit.learning.channels import geometry_channels, mirrored
+
+
+def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generator) -> RGBDFrame:
+    """The labelled frame of a camera that is zoomed, rolled about its axis and cut to a window of (h, w) pixels.
+
+    Rolling and zooming a camera that stays where it is moves pixels and changes no depth: pixel x of the new image
+    shows what K R K_new^-1 x of the old one did. Three windows in four lie round a place on an object: there is most to
+    learn. What lies outside the old image is labelled 255 and has no depth.
+    """
+    h, w = size
+    H, W = frame.labels.shape
+    zoom = np.exp(rng.uniform(np.log(0.75), np.log(1.35)))
+    roll = rng.uniform(-0.35, 0.35) if rng.random() < 0.5 else 0.0
+    R = Rotation.from_euler("z", roll).as_matrix()
+    spare = np.maximum(0.0, np.array([W - w / zoom, H - h / zoom]) / 2.0)
+    shift = spare * rng.uniform(-1.0, 1.0, 2)
+    objects = np.flatnonzero((frame.labels == TARGET) | (frame.labels == OBSTACLE))
+    if objects.size and rng.random() < 0.75:
+        pixel = objects[rng.integers(objects.size)]
+        shift = np.array([pixel % W, pixel // W]) - np.array([W - 1, H - 1]) / 2.0
+        shift += rng.uniform(-0.3, 0.3, 2) * np.array([w, h]) / zoom
+    # The place that the middle of the window shows, such that the window stays inside the image if it fits.
+    middle = np.array([W - 1, H - 1]) / 2.0 + np.clip(shift, -spare, spare)
+    K_new = frame.K * np.array([[zoom, zoom, 1.0], [zoom, zoom, 1.0], [1.0, 1.0, 1.0]])
+    ray = R.T @ np.linalg.solve(frame.K, [*middle, 1.0])
+    K_new[:2, 2] = np.array([w - 1, h - 1]) / 2.0 - K_new[:2, :2] @ ray[:2]
+    M = (frame.K @ R @ np.linalg.inv(K_new))[:2]
+
+    def warp(image, how: int, border: int, value: int = 0):
+        return cv2.warpAffine(image, M, (w, h), None, how | cv2.WARP_INVERSE_MAP, border, value)
+
+    T_new = frame.T_base_cam.copy()
+    T_new[:3, :3] = T_new[:3, :3] @ R
+    return replace(
+        frame,
+        rgb=warp(frame.rgb, cv2.INTER_LINEAR, cv2.BORDER_REPLICATE),
+        depth=warp(frame.depth, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT),
+        labels=warp(frame.labels, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT, IGNORE),
+        K=K_new,
+        T_base_cam=T_new,
+    )
+
+
+def random_sensor(depth: Float[np.ndarray, "H W"], rng: np.random.Generator) -> Float[np.ndarray, "H W"]:
+    """Depth as some sensor measures it: one frame in four exact, one in thirty without any depth."""
+    kind = rng.random()
+    if kind < 0.25:
+        return depth
+    if kind > 0.97:
+        return np.zeros_like(depth)
+    h, w = depth.shape
+    if rng.random() < 0.5:  # noise of neighbours that have something in common: a sensor compares patches
+        cells = int(rng.integers(3, 9))
+        coarse = rng.standard_normal((h // cells + 1, w // cells + 1)).astype(np.float32)
+        depth = depth + depth**2 * np.float32(rng.uniform(0.0, 0.002)) * cv2.resize(coarse, (w, h))
+    sensor = DepthSensor(
+        noise=rng.uniform(0.0, 0.003),
+        step=rng.choice([0.0, rng.uniform(0.0005, 0.004)]),
+        edge_loss=rng.uniform(0.0, 0.9),
+        loss=rng.choice([0.001, rng.uniform(0.0, 0.03)]),
+    )
+    depth = sensor.measure(depth, rng)
+    if rng.random() < 0.3:  # shiny or dark places give no reading
+        for _ in range(rng.integers(1, 6)):
+            middle = (int(rng.integers(w)), int(rng.integers(h)))
+            axes = (int(rng.integers(2, 16)), int(rng.integers(2, 16)))
+            cv2.ellipse(depth, middle, axes, float(rng.uniform(0.0, 180.0)), 0.0, 360.0, 0.0, -1)
+    return depth
+
+
+def random_calibration(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """The frame with a pose and a table height that are off by about 1 cm, 1 degree and 5 mm; one in five exact."""
+    if rng.random() < 0.2:
+        return frame
+    T = frame.T_base_cam.copy()
+    T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(np.radians(0.55) * rng.standard_normal(3)).as_matrix()
+    T[:3, 3] += 0.006 * rng.standard_normal(3)
+    return replace(frame, T_base_cam=T, table_z=(frame.table_z or 0.0) + 0.005 * rng.standard_normal())
+
+
+def random_size(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """All lengths times one factor, the table at 0: objects of another size, seen from as many times as far."""
+    factor = np.exp(rng.uniform(-0.12, 0.12))
+    T = frame.T_base_cam.copy()
+    T[:3, 3] = factor * (T[:3, 3] - (0.0, 0.0, frame.table_z or 0.0))
+    return replace(frame, T_base_cam=T, depth=frame.depth * np.float32(factor), table_z=0.0)
+
+
+def random_hue(x: Float[torch.Tensor, "N 3 H W"], draws: Draws) -> Float[torch.Tensor, "N 3 H W"]:
+    """Swap the colours of some images, take them from some, and the whole picture from a few."""
+    whole = torch.rand(draws.whole, generator=draws.generator).tolist()
+    orders = [torch.randperm(3, generator=draws.generator) if share < 0.3 else None for share in whole]
+    for i, (share, order) in enumerate(zip(whole[draws.rows], orders[draws.rows], strict=True)):
+        if order is not None:
+            x[i] = x[i][order]
+        elif share < 0.4:
+            x[i] = x[i].mean(dim=0, keepdim=True)
+        elif share < 0.46:
+            x[i] = 0.5
+    return x
+
+
+def augment_frames(
+    frames: Sequence[RGBDFrame],
+    size: tuple[int, int],
+    generator: torch.Generator,
+    first: int = 0,
+    whole: int | None = None,
+) -> tuple[Float[torch.Tensor, "N 3 h w"], Float[torch.Tensor, "N 7 h w"], UInt8[torch.Tensor, "N h w"]]:
+    """Make a training batch of labelled frames: colours and geometry channels in 0..1, and labels.
+
+    first, whole: as for `labkit.learning.augment.augment`.
+    """
+    seed = int(torch.randint(2**62, (), generator=generator))
+    rgb, geometry, y = [], [], []
+    for i, frame in enumerate(frames, start=first):
+        rng = np.random.default_rng([seed, i])
+        seen = random_size(random_calibration(random_view(frame, size, rng), rng), rng)
+        depth = random_sensor(seen.depth, rng)
+        images = seen.rgb, geometry_channels(depth, seen.K, seen.T_base_cam, 0.0), seen.labels[..., None]
+        if rng.random() < 0.5:
+            images = [mirrored(image) for image in images]
+        for batch, image in zip((rgb, geometry, y), images, strict=True):
+            batch.append(torch.from_numpy(image).permute(2, 0, 1))
+    draws = Draws(generator, whole or len(frames), first, len(frames))
+    x = random_colour(torch.stack(rgb).float().div_(255.0), draws)
+    x = random_hue(random_noise(random_sharpness(x, draws), draws), draws).clamp_(0.0, 1.0)
+    return x, torch.stack(geometry), torch.stack(y)[:, 0]

@@ -1,0 +1,192 @@
+"""The same network in other engines: an ONNX file, run by OpenCV's DNN module or onnxruntime (topic 09)."""
+
+import io
+import json
+import warnings
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from labkit.learning.channels import CHANNELS
+from labkit.learning.inference import Engine, NetworkInput
+from labkit.support.files import write_atomically
+from labkit.support.validation import check_rgb, check_shape, require
+
+OPSET = 13  # the newest that OpenCV 4.6 reads without a word
+ENGINES = ("torch", "opencv", "onnxruntime")
+
+
+class OpenCVEngine(Engine):
+    """An ONNX file in OpenCV's DNN module, as a node in C++ would use it."""
+
+    def __init__(self, onnx: bytes):
+        super().__init__(*_facts(onnx))
+        self.net = cv2.dnn.readNetFromONNX(np.frombuffer(onnx, np.uint8))
+
+    def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
+        for name, array in zip(self.takes.arrays, arrays, strict=True):
+            self.net.setInput(np.ascontiguousarray(array), name)
+        return self.net.forward()
+
+    def padded_side(self, side: int) -> int:
+        # OpenCV 5.0's bilinear Resize reads past the end of a map that is one pixel high: keep them all larger.
+        return max(super().padded_side(side), 2 * self.takes.divisor)
+
+
+class OnnxRuntimeEngine(Engine):
+    """An ONNX file in onnxruntime: the fast one on a CPU."""
+
+    def __init__(self, onnx: bytes):
+        import onnxruntime
+
+        super().__init__(*_facts(onnx))
+        options = onnxruntime.SessionOptions()
+        # Asked for by number, its threads are not tied to cores, which costs much where others work on the same cores.
+        options.intra_op_num_threads = cv2.getNumThreads()
+        self.session = onnxruntime.InferenceSession(onnx, options, providers=["CPUExecutionProvider"])
+
+    def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
+        contiguous = map(np.ascontiguousarray, arrays)
+        return self.session.run(None, dict(zip(self.takes.arrays, contiguous, strict=True)))[0]
+
+
+def open_engine(name: str, model) -> Engine:
+    """Make an engine by its name: "torch", "opencv" or "onnxruntime".
+
+    model: a PyTorch network (`TorchEngine` says which), or, for the last two, the path of a file that
+    `export` wrote. Raises ValueError for an unknown name, another kind of model or a file that is no such export,
+    FileNotFoundError for none. Topic 09.
+
+    >>> from labkit.learning.network import SmallSegNet
+    >>> open_engine("torch", SmallSegNet()).logits(np.zeros((5, 7, 3), np.uint8)).shape
+    (4, 5, 7)
+    """
+    require("engine", name in ENGINES, f"one of {', '.join(ENGINES)}", repr(name))
+    if name == "torch":
+        from labkit.learning.network import TorchEngine
+
+        return TorchEngine(_check_network(model))
+    onnx = Path(model).read_bytes() if isinstance(model, (str, Path)) else to_onnx(model)
+    return OpenCVEngine(onnx) if name == "opencv" else OnnxRuntimeEngine(onnx)
+
+
+def _check_network(model):
+    import torch
+
+    if not isinstance(model, torch.nn.Module):
+        got = repr(str(model)) if isinstance(model, (str, Path)) else type(model).__name__
+        raise ValueError(f"model: expected a PyTorch network, got {got}")
+    return model
+
+
+def export(model, path) -> None:
+    """Write a network as one self-contained ONNX file, atomically.
+
+    Its inputs are the arrays that the network takes, such as `image`, (1, 3, H, W), its output `logits`, (1, C, H, W),
+    all float32, for any H and W that are divisible as the file's metadata states. OpenCV 4.6 and 5 and onnxruntime read
+    it. Raises ValueError if the model is no network, OSError naming `path` if it cannot be written. Topic 09.
+    """
+    write_atomically(path, to_onnx(model))
+
+
+def to_onnx(model) -> bytes:
+    """The bytes of the file that `export` writes."""
+    import onnx
+    import torch
+
+    from labkit.learning.network import TorchEngine, evaluating, logits_of
+
+    class LogitsOnly(torch.nn.Module):
+        """The network without what it may return beside its logits."""
+
+        def __init__(self):
+            super().__init__()
+            self.network = model
+
+        def forward(self, *arrays):
+            return logits_of(self.network(*arrays))
+
+    engine = TorchEngine(_check_network(model))
+    takes = engine.takes
+    height = -(-64 // takes.divisor) * takes.divisor
+    example = {"image": np.zeros((1, 3, height, 2 * height), np.float32)}
+    if "geometry" in takes.arrays:
+        example["geometry"] = np.zeros((1, len(CHANNELS), height, 2 * height), np.float32)
+    num_classes = engine.forward(*example.values()).shape[1]
+    device = next((weight.device for weight in model.parameters()), "cpu")
+    axes = {2: "height", 3: "width"}
+    buffer = io.BytesIO()
+    with warnings.catch_warnings(), evaluating(model):
+        warnings.simplefilter("ignore")  # the older exporter is meant: the newer one writes what OpenCV 4.6 cannot read
+        torch.onnx.export(
+            LogitsOnly().train(model.training),
+            tuple(torch.from_numpy(array).to(device) for array in example.values()),
+            buffer,
+            dynamo=False,
+            opset_version=OPSET,
+            input_names=list(takes.arrays),
+            output_names=["logits"],
+            dynamic_axes=dict.fromkeys((*takes.arrays, "logits"), axes),
+        )
+    proto = onnx.load_model_from_string(buffer.getvalue())
+    facts = {"architecture": type(model).__name__, "classes": num_classes, **vars(takes)}
+    onnx.helper.set_model_props(proto, {k: v if isinstance(v, str) else json.dumps(v) for k, v in facts.items()})
+    onnx.checker.check_model(proto)
+    return proto.SerializeToString()
+
+
+def _facts(onnx_file: bytes) -> tuple[NetworkInput, int]:
+    """What the metadata of an ONNX file says: what the network takes, and its number of classes."""
+    import onnx
+
+    try:
+        facts = {entry.key: entry.value for entry in onnx.load_model_from_string(onnx_file).metadata_props}
+    except Exception as error:  # protobuf's own kind of error, and protobuf is not ours to import
+        raise ValueError("model: expected an ONNX file, got one that is damaged or of another kind") from error
+    try:
+        mean, std, divisor = (json.loads(facts[name]) for name in ("mean", "std", "divisor"))
+        arrays, classes = tuple(json.loads(facts["arrays"])), json.loads(facts["classes"])
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"model: expected a file of `labkit export`, got one that states {sorted(facts)}") from error
+    return NetworkInput(arrays, *(tuple(x) if isinstance(x, list) else x for x in (mean, std)), divisor), classes
+
+
+# ------------------------------------------------------------------------------------ the C++ listing
+
+
+def segment_like_cpp(
+    engine: Engine, bgr: UInt8[np.ndarray, "H W 3"], size: tuple[int, int] = (320, 240)
+) -> UInt8[np.ndarray, "H W"]:
+    """Label an image as a small node in C++ does: a small blob, and the mask enlarged again (topic 09).
+
+    bgr: as OpenCV and the node's message give it. size: width and height of the blob, which the engine's network must
+    take; the image is squeezed to it, whatever its proportions. Returns a mono8 mask of the image's size. Raises
+    ValueError for an image or a size that does not fit.
+
+    >>> from labkit.learning.network import SmallSegNet
+    >>> segment_like_cpp(open_engine("torch", SmallSegNet()), np.zeros((48, 64, 3), np.uint8), (32, 24)).shape
+    (48, 64)
+    """
+    bgr = check_rgb("bgr", bgr)
+    if engine.takes.arrays != ("image",):
+        raise ValueError(f"engine: expected a network that takes images alone, got one of {engine.takes.arrays}")
+    if any(side < 1 or side % engine.takes.divisor for side in size):
+        raise ValueError(f"size: expected width and height divisible by {engine.takes.divisor}, got {size}")
+    blob = cv2.dnn.blobFromImage(bgr, 1.0 / 255.0, size, (0.0, 0.0, 0.0), swapRB=True, crop=False)
+    mask = labels_of_scores(engine.forward(blob))
+    return cv2.resize(mask, (bgr.shape[1], bgr.shape[0]), interpolation=cv2.INTER_NEAREST)
+
+
+def labels_of_scores(scores: Float[np.ndarray, "1 C H W"]) -> UInt8[np.ndarray, "H W"]:
+    """The best class of each pixel of a network's output, the first one of equals.
+
+    scores are NCHW: class c of pixel (y, x) is at c * H * W + y * W + x of the memory. A common listing reads
+    y * W * C + x * C + c, which is NHWC's place, and so mixes pixels with classes. Topic 09.
+
+    >>> labels_of_scores(np.array([[[[0.1, 2.0]], [[0.3, 1.0]]]]))
+    array([[1, 0]], dtype=uint8)
+    """
+    scores = check_shape("scores", scores, (1, None, None, None))
+    return scores[0].argmax(axis=0).astype(np.uint8)

@@ -1,0 +1,116 @@
+"""From one picture to class probabilities, whatever runs the network (topics 03 and 09).
+
+A network states what it takes: which arrays, on what scale, of what sizes. All that lies between a picture and the
+probabilities is done here, once for every engine: the arrays are built and padded, the network's logits are cropped,
+softmax makes them probabilities, and those of the mirror image may be averaged in. Only the network's own run, from
+arrays to logits, is an engine's.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from labkit.frame import RGBDFrame
+from labkit.learning.channels import geometry_channels, mirrored
+from labkit.support.validation import check_rgb, require
+
+
+@dataclass(frozen=True)
+class NetworkInput:
+    """What a network takes. It says so in its attribute `takes`, and a file of `labkit export` in its metadata.
+
+    arrays: "image", or "image" and "geometry", in the order of the network's arguments. The image is (rgb - mean) / std
+    with rgb in 0..255; mean and std are one number, or one for each of R, G and B; the default scales to 0..1. geometry
+    is what depth, calibration and the table's height tell (`channels.geometry_channels`), seven channels in
+    0..1, all 0.5 where the camera read no depth. divisor: what height and width must be divisible by; pictures of other
+    sizes are padded by repeating their border, and the logits are cropped. Raises ValueError for an argument that does
+    not fit.
+
+    >>> NetworkInput(divisor=16).build(np.full((1, 1, 3), 51, np.uint8))[0].astype(float).round(3).tolist()
+    [[[0.2, 0.2, 0.2]]]
+    """
+
+    arrays: tuple[str, ...] = ("image",)
+    mean: float | tuple[float, float, float] = 0.0
+    std: float | tuple[float, float, float] = 255.0
+    divisor: int = 1
+
+    def __post_init__(self):
+        if self.arrays not in (("image",), ("image", "geometry")):
+            raise ValueError(f'arrays: expected ("image",) or ("image", "geometry"), got {self.arrays!r}')
+        for name in ("mean", "std"):
+            require(name, np.shape(getattr(self, name)) in ((), (3,)), "one number or three", repr(getattr(self, name)))
+        require("std", np.min(self.std) > 0.0, "numbers above 0", repr(self.std))
+        require("divisor", self.divisor >= 1, "at least 1", repr(self.divisor))
+
+    def build(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> list[Float32[np.ndarray, "H W _"]]:
+        """Build the arrays for one picture: a frame, or an RGB image for a network that takes nothing else."""
+        is_frame = isinstance(picture, RGBDFrame)
+        arrays = [self.scaled(picture.rgb if is_frame else check_rgb("rgb", picture))]
+        if "geometry" in self.arrays:
+            require("picture", is_frame, "an RGBDFrame, since the network looks at depth", "an RGB image")
+            depth, K, T = picture.depth, picture.K, picture.T_base_cam
+            arrays.append(geometry_channels(depth, K, T, picture.table_z or 0.0))
+        return arrays
+
+    def scaled(self, rgb: UInt8[np.ndarray, "*shape 3"]) -> Float32[np.ndarray, "*shape 3"]:
+        """Scale colours as the network expects them."""
+        return (rgb - np.float32(self.mean)) / np.float32(self.std)
+
+
+class Engine(ABC):
+    """A network that is ready to run: `engine(picture)` gives class probabilities.
+
+    takes: what the network takes. num_classes: how many classes it tells apart, None if it does not say.
+    """
+
+    def __init__(self, takes: NetworkInput, num_classes: int | None = None):
+        self.takes, self.num_classes = takes, num_classes
+
+    @abstractmethod
+    def forward(self, *arrays: Float32[np.ndarray, "N _ H W"]) -> Float32[np.ndarray, "N C H W"]:
+        """Run the network on its arrays, of a height and width that it takes; gives logits."""
+
+    def __call__(
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+    ) -> Float32[np.ndarray, "H W C"]:
+        """Class probabilities of a picture, of any height and width: the softmax of the logits (topic 03).
+
+        mirror: average them with those of the mirrored picture, mirrored back: two opinions, at twice the price, whose
+        errors differ. Raises ValueError if the picture is not what the network takes.
+        """
+        arrays = [array[None] for array in self.takes.build(picture)]
+        p = _softmax(self.padded(arrays)[0])
+        if mirror:
+            q = _softmax(self.padded([mirrored(array) for array in arrays])[0])
+            p = 0.5 * (p + q[..., ::-1])
+        return np.ascontiguousarray(p.transpose(1, 2, 0))
+
+    def logits(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "C H W"]:
+        """Logits of one picture, of any height and width; raises ValueError if it is not what the network takes."""
+        return self.padded([array[None] for array in self.takes.build(picture)])[0]
+
+    def padded(self, arrays: Sequence[Float32[np.ndarray, "N H W _"]]) -> Float32[np.ndarray, "N C H W"]:
+        """Run the network on arrays of any height and width: pad them by repeating their border, crop the logits."""
+        height, width = arrays[0].shape[1:3]
+        down, right = (self.padded_side(side) - side for side in (height, width))
+        if down or right:
+            arrays = [np.pad(array, ((0, 0), (0, down), (0, right), (0, 0)), mode="edge") for array in arrays]
+        # Channels stay last in memory: PyTorch's convolutions are fastest there, and other engines make their own copy.
+        z = self.forward(*(np.ascontiguousarray(array).transpose(0, 3, 1, 2) for array in arrays))
+        return z[..., :height, :width]
+
+    def padded_side(self, side: int) -> int:
+        """The height or width that a picture's is padded to."""
+        return -(-side // self.takes.divisor) * self.takes.divisor
+
+
+def _softmax(z: Float32[np.ndarray, "C H W"]) -> Float32[np.ndarray, "C H W"]:
+    """Softmax over the first axis: whole images at a time are several times as fast as short last axes."""
+    z = np.ascontiguousarray(z)
+    e = np.exp(z - z.max(axis=0))
+    e /= e.sum(axis=0)
+    return e

@@ -1,0 +1,496 @@
+"""Wrong answers that readers of the lessons gave: each is refused, and told what is wrong with it.
+
+ACCEPTED were right by mistake once; NAMED got a count of wrong values and nothing else. `says` is part of the hint.
+"""
+
+import numpy as np
+import pytest
+
+from labkit.course.checker.run import judge
+from labkit.course.topics import find
+
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
+
+
+def mask_of_16_bits(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    seen = segmentation >= 0
+    labels[seen] = class_of_body[segmentation[seen] & 0xFFFF]
+    return labels
+
+
+def centres_rounded(y, height, width):
+    H, W = y.shape
+    rows = np.round((np.arange(height) + 0.5) * H / height - 0.5).astype(int).clip(0, H - 1)
+    columns = np.round((np.arange(width) + 0.5) * W / width - 0.5).astype(int).clip(0, W - 1)
+    return y[rows[:, None], columns]
+
+
+def shifted_by_the_mean(z):
+    e = np.exp(z - z.mean(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+def counted_in_two_bytes(y_true, y_pred, num_classes, ignore):
+    n = np.zeros((num_classes, num_classes), np.uint16)
+    counted = y_true != ignore
+    np.add.at(n, (y_true[counted], y_pred[counted]), 1)
+    return n
+
+
+def every_channel_wraps(hsv, lower, upper):
+    inside = np.ones(hsv.shape[:2], bool)
+    for c in range(3):
+        above, below = hsv[..., c] >= lower[c], hsv[..., c] <= upper[c]
+        inside &= (above & below) if lower[c] <= upper[c] else (above | below)
+    return inside
+
+
+def by_a_float_factor(labels, size):
+    W, H = size
+    h, w = labels.shape
+    rows, columns = ((np.arange(n) + 0.5) * (old / n) for n, old in ((H, h), (W, w)))
+    rows, columns = rows.astype(int), columns.astype(int)
+    return labels[rows[:, None], columns]
+
+
+def with_a_finite_penalty(features, mean, covariance, allowed):
+    off = features - mean
+    squared = (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+    return (squared + 1e9 * ~allowed).argmin() + 1 if allowed.any() else 0
+
+
+def of_most_density(features, mean, covariance, allowed):
+    off = features - mean
+    density = np.exp(-(off @ np.linalg.inv(covariance) * off).sum(axis=1) / 2)
+    return np.where(allowed, density, -1.0).argmax() + 1 if allowed.any() else 0
+
+
+def in_shares_of_the_largest(bgr, multiple):
+    return find("09_other_stacks.make_blob").reference(bgr, multiple) * np.float32(255 / bgr.max())
+
+
+def without_the_origin(P):
+    return find("08_node.pack_cloud").reference(P[(P != 0.0).any(axis=1)])
+
+
+def nearest_of_its_suitors(a, b, slop):
+    """Of those of a whose nearest is a stamp of b, the nearest to it; where any of a might be nearer."""
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b)
+    best = apart.argmin(axis=1)
+    suitors = np.where(np.arange(len(b)) == best[:, None], apart, np.iinfo(np.int64).max)
+    chosen = suitors.argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(chosen & (apart.min(axis=1) <= slop), best, -1)
+
+
+def no_small_turn(stamps, positions, quaternions, t):
+    i = int(np.clip(np.searchsorted(stamps, t) - 1, 0, len(stamps) - 2))
+    p, q = find("08_node.pose_at").reference(stamps, positions, quaternions, t)
+    still = np.isclose(abs(quaternions[i] @ quaternions[i + 1]), 1.0) and stamps[0] <= t <= stamps[-1]
+    return p, quaternions[i] if still else q
+
+
+def blob_of_doubles(bgr, multiple):
+    return find("09_other_stacks.make_blob").reference(bgr, multiple).astype(float)
+
+
+def stamps_of_32_bits(a, b, slop):
+    a, b = a.astype(np.int32), b.astype(np.int32)
+    return find("08_node.pair_stamps").reference(a, b, slop)
+
+
+def stamps_instead_of_numbers(a, b, slop):
+    j = find("08_node.pair_stamps").reference(a, b, slop)
+    return np.where(j < 0, -1, b[j]) if len(b) else j
+
+
+def within_numpys_tolerance(reference, other, tolerance):
+    _, changed, left_open = find("09_other_stacks.engine_contract").reference(reference, other, tolerance)
+    return np.allclose(reference, other, atol=tolerance), changed, left_open
+
+
+def gradient_by_one_maximum(z, y):
+    e = np.exp(z - z.max())
+    p = e / e.sum(axis=-1, keepdims=True)
+    return np.where(y[..., None] == 255, 0.0, p - (y[..., None] == np.arange(z.shape[-1])))
+
+
+def signs_by_the_first(stamps, positions, quaternions, t):
+    """All quaternions on the side of the first, where neighbours should be on one side."""
+    signs = np.where(quaternions @ quaternions[0] < 0.0, -1.0, 1.0)
+    if not stamps[0] <= t <= stamps[-1]:
+        return np.full(3, np.nan), np.full(4, np.nan)
+    i = min(int(np.searchsorted(stamps, t, side="right")) - 1, len(stamps) - 2)
+    share = (t - stamps[i]) / (stamps[i + 1] - stamps[i])
+    a, b = (signs[:, None] * quaternions)[i : i + 2]
+    angle = max(np.arccos(np.clip(a @ b, -1.0, 1.0)), 1e-6)
+    q = np.sin((1 - share) * angle) * a + np.sin(share * angle) * b
+    return (1 - share) * positions[i] + share * positions[i + 1], q / np.linalg.norm(q)
+
+
+def adjusted_by_one_maximum(z, y, shares, tau):
+    return gradient_by_one_maximum(z + tau * np.log(shares), y)
+
+
+def by_a_number(base, order):
+    def answer(rgb, palette):
+        weights = np.array([base**2, base, 1])[::order]
+        same = (rgb @ weights)[..., None] == palette @ weights
+        return np.where(same.any(axis=-1), same.argmax(axis=-1), 255)
+
+    return answer
+
+
+def classes_of_the_labels(y, psi, weights, v, u):
+    return find("02_crf.icm_costs").reference(y, psi[..., : y.max() + 1], weights, v, u)
+
+
+def twelve_links(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for link in range(-1, 12):
+        seen = segmentation >> 24 == link + 1
+        labels[seen] = class_of_body[segmentation[seen] & 0xFFFFFF]
+    return labels
+
+
+def shares_of_bytes(y, C):
+    n = np.array([(y == c).sum() for c in range(C)]).astype(np.uint8)
+    return n / n.sum()
+
+
+def close_to_the_largest(x, g):
+    largest, g = (a.repeat(2, axis=0).repeat(2, axis=1) for a in (x.reshape(len(g), 2, -1, 2).max(axis=(1, 3)), g))
+    return np.where(np.isclose(x, largest), g, 0.0)
+
+
+def as_tall_as_seen(P, table_z, palm, tips, clearance):
+    """The top is taken for the table plus how tall the object looks, though its foot may be hidden."""
+    return max(table_z + np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
+ACCEPTED = [
+    ("01_labels.labels_from_segmentation", twelve_links),
+    ("01_labels.class_shares", shares_of_bytes),
+    ("03_gradient.max_pool_backward", close_to_the_largest),
+    *(("01_labels.labels_from_colours", by_a_number(base, order)) for base in (10, 16, 255) for order in (1, -1)),
+    ("02_crf.icm_costs", classes_of_the_labels),
+    ("07_grasp.grasp_height", as_tall_as_seen),
+    ("05_class_weights.adjusted_grad", adjusted_by_one_maximum),
+    ("03_gradient.cross_entropy_grad", gradient_by_one_maximum),
+    ("01_labels.labels_from_segmentation", mask_of_16_bits),
+    ("01_labels.resize_labels", centres_rounded),
+    ("03_gradient.softmax", shifted_by_the_mean),
+    ("04_iou.confusion_matrix", counted_in_two_bytes),
+    ("09_other_stacks.enlarge", by_a_float_factor),
+    ("09_other_stacks.choose_region", with_a_finite_penalty),
+    ("09_other_stacks.choose_region", of_most_density),
+    ("09_other_stacks.make_blob", blob_of_doubles),
+    ("09_other_stacks.make_blob", in_shares_of_the_largest),
+    ("08_node.pack_cloud", without_the_origin),
+    ("08_node.pair_stamps", nearest_of_its_suitors),
+    ("08_node.pose_at", no_small_turn),
+    ("08_node.pair_stamps", stamps_of_32_bits),
+    ("08_node.pose_at", signs_by_the_first),
+    ("09_other_stacks.hsv_mask", every_channel_wraps),
+    ("09_other_stacks.engine_contract", within_numpys_tolerance),
+]
+
+
+@pytest.mark.parametrize("name, answer", ACCEPTED)
+def test_what_was_accepted_by_mistake_is_refused(name, answer):
+    for seed in (0, 1, 2, 16):
+        assert not judge(find(name), answer, seed).passed
+
+
+def rows_from_one(K, left, top, scale):
+    K = find("06_back_projection.cropped_intrinsics").reference(K, left, top, scale)
+    K[1, 2] += 1.0
+    return K
+
+
+def grad_of_the_other_sign(z, y):
+    return -find("03_gradient.cross_entropy_grad").reference(z, y)
+
+
+def costs_of_base_2(p, floor):
+    return -np.log2(np.maximum(p, floor))
+
+
+def bitten_off(y_true, y_pred, num_classes, ignore):
+    return find("04_iou.confusion_matrix").reference(y_true[:-1], y_pred[:-1], num_classes, ignore)
+
+
+def centroid_v_u(pieces):
+    area, centroid, box = find("09_other_stacks.measure_pieces").reference(pieces)
+    return area, centroid[:, ::-1], box
+
+
+def in_metres(T_base_grasp, middle):
+    return tuple(mm / 1000.0 for mm in find("07_grasp.slip_across").reference(T_base_grasp, middle))
+
+
+def mean_over_all_pixels(z, y):
+    return find("03_gradient.cross_entropy").reference(z, y) / y.size
+
+
+def means_exchanged(z, y, w):
+    return find("05_class_weights.two_means").reference(z, y, w)[::-1]
+
+
+def plane_with_the_old_d(P, sigma):
+    n, d = find("06_back_projection.fit_plane").reference(P, sigma)
+    return n, -d if P[0, 2] == 1.0 else d  # n was turned in one case
+
+
+def lens_in_five_rounds(pixels, K, k, rounds=5):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = ideal = (pixels - c) / f
+    for _ in range(rounds):
+        r2 = (ideal**2).sum(axis=1, keepdims=True)
+        ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+    return c + f * ideal
+
+
+def indexed_by_ignored(y_true, y_pred, num_classes, ignore):
+    n = np.zeros((num_classes, num_classes), int)
+    np.add.at(n, (y_true, y_pred), 1)
+    return n
+
+
+def mean_not_divided(P, sigma):
+    w = sigma**-2.0
+    centre = w @ P / len(P)
+    n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
+    return n * np.sign(n[2]), n * np.sign(n[2]) @ centre
+
+
+def above_the_tips_or_beside_the_pads(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    out = np.abs(y) - width / 2
+    return int(((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) | (z <= tips)).sum())
+
+
+def slice_round_the_bases_origin(P, T_base_grasp, half):
+    T = T_base_grasp * np.array([1.0, 1.0, 1.0, 0.0])
+    return find("07_grasp.pad_slice").reference(P, T, half)
+
+
+def across_twice(T_base_grasp, middle):
+    return (find("07_grasp.slip_across").reference(T_base_grasp, middle)[1],) * 2
+
+
+def without_the_mean(features, mean, covariance, allowed):
+    return find("09_other_stacks.choose_region").reference(features, 0 * mean, covariance, allowed)
+
+
+def pixels_in_a_row(data, height, width, step, is_bigendian):
+    """Step is not looked at, as in the lesson's bug; an odd number of bytes raises nothing."""
+    first, second = np.moveaxis(data[: 2 * height * width].reshape(height, width, 2).astype(float), 2, 0)
+    numbers = 256 * first + second if is_bigendian else first + 256 * second
+    return np.where(numbers > 0, numbers / 1000, np.nan)
+
+
+def nobody_knows_at_the_ends(stamps, positions, quaternions, t):
+    if t in (stamps[0], stamps[-1]):
+        return np.full(3, np.nan), np.full(4, np.nan)
+    return find("08_node.pose_at").reference(stamps, positions, quaternions, t)
+
+
+def a_fourth_column_of_doubles(P):
+    P = P[np.isfinite(P).all(axis=1)]
+    return np.frombuffer(np.c_[P, np.zeros(len(P))].tobytes(), np.uint8)
+
+
+def unseen_looked_up(segmentation, class_of_body):
+    return class_of_body[segmentation % 2**24]
+
+
+def any_channel_in_a_loop(rgb, palette):
+    y = np.full(rgb.shape[:2], 255)
+    for c, colour in enumerate(palette):
+        y[(rgb == colour).any(axis=2)] = c
+    return y
+
+
+def planes_up_to_the_largest(y, C):
+    return np.stack([y == c for c in range(y.max() + 1)], axis=-1).astype(int)
+
+
+def scaled_upside_down(y, height, width):
+    H, W = y.shape
+    rows, columns = (((np.arange(n) + 0.5) * n / old).astype(int) for n, old in ((height, H), (width, W)))
+    return y[rows][:, columns]
+
+
+def fourth_kind_too_small(image, lam, sigma_I, sigma_p):
+    w = find("02_crf.pair_weights").reference(image, lam, sigma_I, sigma_p)
+    w[3] *= 0.5 + 0.4 * np.sin(np.arange(w[3].size).reshape(w[3].shape))
+    return w
+
+
+def ignored_as_the_last_class(z, y, w):
+    return find("05_class_weights.two_means").reference(z, np.minimum(y, len(w) - 1), w)
+
+
+def without_border(side):
+    """One of the four sides of the fingers' boxes is left out: x, the pad, the outer side or the tips."""
+
+    def count(P, T_base_grasp, width, half, thickness, tips):
+        x, y, z = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+        room = np.array([half - np.abs(x), np.abs(y) - width / 2, width / 2 + thickness - np.abs(y), tips - z])
+        return int(((room >= 0).all(axis=0) & (room[side] != 0)).sum())
+
+    return count
+
+
+def length_of_the_ray_times_r33(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = np.linalg.inv(K) @ np.array([[d, 0, u], [0, d, v], [0, 0, 1]])
+    return np.linalg.norm(J * T_base_cam[2, :3] * [sigma_pixel, sigma_pixel, sigma_depth])
+
+
+def nearly_right(depth, K):
+    return 1.0003 * find("06_back_projection.back_project").reference(depth, K)
+
+
+NAMED = [
+    ("06_back_projection.back_project", nearly_right, "times 1.0003, in every case"),
+    ("07_grasp.points_in_fingers", without_border(0), "made of P, T_base_grasp and half were made with <"),
+    ("07_grasp.points_in_fingers", without_border(1), "made of P, T_base_grasp and width were made with >"),
+    ("07_grasp.points_in_fingers", without_border(2), "made of P, T_base_grasp, thickness and width were made with <"),
+    ("07_grasp.points_in_fingers", without_border(3), "made of P, T_base_grasp and tips were made with <"),
+    ("06_back_projection.height_noise", length_of_the_ray_times_r33, "were taken number by number"),
+    ("08_node.decode_depth", pixels_in_a_row, "slides sideways"),
+    ("08_node.pair_stamps", stamps_instead_of_numbers, "not a stamp"),
+    ("08_node.pose_at", nobody_knows_at_the_ends, "in more cases than are asked for"),
+    ("08_node.pack_cloud", a_fourth_column_of_doubles, "float64"),
+    ("01_labels.labels_from_segmentation", unseen_looked_up, "16777215"),
+    ("01_labels.labels_from_segmentation", mask_of_16_bits, "has 24 bits"),
+    ("01_labels.labels_from_colours", any_channel_in_a_loop, "is one of them enough"),
+    ("01_labels.one_hot", planes_up_to_the_largest, "nothing to stack"),
+    ("01_labels.resize_labels", scaled_upside_down, "is yours height / H?"),
+    ("01_labels.resize_labels", centres_rounded, "which one does np.round take?"),
+    ("02_crf.pair_weights", fourth_kind_too_small, "in the last entry along axis 0"),
+    ("06_back_projection.cropped_intrinsics", rows_from_one, "entry at [1, 2]. There: Yours are too large by 1"),
+    ("03_gradient.cross_entropy_grad", grad_of_the_other_sign, "The sign is the other one"),
+    ("02_crf.unary_from_probabilities", costs_of_base_2, "log 2"),
+    ("04_iou.confusion_matrix", bitten_off, "y_true and y_pred were without their last row"),
+    ("09_other_stacks.measure_pieces", centroid_v_u, "Output 2 of 3"),
+    ("07_grasp.slip_across", in_metres, "1000"),
+    ("04_iou.confusion_matrix", indexed_by_ignored, "255"),
+    ("05_class_weights.two_means", ignored_as_the_last_class, "or is too much counted?"),
+    ("05_class_weights.two_means", means_exchanged, "Outputs 1 and 2 are exchanged"),
+    ("06_back_projection.fit_plane", mean_not_divided, "Yours is always 0"),
+    ("07_grasp.points_in_fingers", above_the_tips_or_beside_the_pads, "were an `or`"),
+    ("07_grasp.pad_slice", slice_round_the_bases_origin, "T_base_grasp were without its translation"),
+    ("07_grasp.slip_across", across_twice, "Output 1 holds what output 2 should be"),
+    ("09_other_stacks.choose_region", without_the_mean, "mean did not count"),
+    ("03_gradient.cross_entropy", mean_over_all_pixels, "a factor that is the number of all entries of y"),
+    ("02_crf.terminal_capacities", lambda psi: (psi[..., 1], psi[..., 0], 0.0), "What you return is psi[..., 1]: what"),
+    ("06_back_projection.fit_plane", plane_with_the_old_d, "n . m = d"),
+    ("06_back_projection.undistort", lens_in_five_rounds, "put into the lens"),
+    ("03_gradient.softmax_backward", lambda p, g: p * g - p**2 * g.sum(axis=-1, keepdims=True), "p[c] twice"),
+]
+
+
+@pytest.mark.parametrize("name, answer, says", NAMED)
+def test_what_was_only_counted_is_named(name, answer, says):
+    assert says in judge(find(name), answer, seed=0).hint
+
+
+def not_summed(counts, power):
+    present = counts > 0
+    w = np.ones(len(counts))
+    w[present] = counts[present] ** (-power)
+    w[present] *= counts.sum() / counts
+    return w
+
+
+def three_bytes_each(data, height, width, step, is_bigendian):
+    numbers = [[data[v * step + 3 * u] for u in range(width)] for v in range(height)]
+    return np.array(numbers, float)
+
+
+def without_blue(rgb, palette):
+    rgb, palette = rgb * np.uint8([1, 1, 0]), palette * np.uint8([1, 1, 0])
+    found = (rgb[:, :, None] == palette).all(axis=-1)
+    return np.where(found.any(axis=-1), found.cumsum(axis=-1).argmax(axis=-1), 255)
+
+
+def walk_without_memory(psi, w):
+    labels = [psi[-1].argmin()]
+    for best, weight in zip(psi[-2::-1], w[::-1], strict=True):
+        stays = best <= best.min() + weight
+        labels.append(labels[-1] if stays[labels[-1]] else best.argmin())
+    return np.array(labels[::-1])
+
+
+def source_cost_kept_whole(psi):
+    source = np.where(psi[..., 1] > psi[..., 0], psi[..., 1], 0.0)
+    return source, psi[..., 0] - psi.min(axis=2), psi.min(axis=2).sum()
+
+
+def one_nan_for_a_pose(stamps, positions, quaternions, t):
+    right = find("08_node.pose_at").reference(stamps, positions, quaternions, t)
+    return right if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
+
+
+def losses_of_clipped(z, y):
+    p = find("03_gradient.softmax").reference(z[y != 255])
+    return -np.log(np.maximum(p[np.arange(len(p)), y[y != 255]], 1e-12))
+
+
+def means_of_clipped(z, y, w):
+    loss, weights = losses_of_clipped(z, y), w[y[y != 255]]
+    return (weights * loss).mean(), np.average(loss, weights=weights)
+
+
+def one_link_taken_off(segmentation, class_of_body):
+    segmentation = np.where(segmentation < len(class_of_body), segmentation, segmentation - 2**24)
+    return np.where(segmentation >= 0, class_of_body[segmentation], 0)
+
+
+def rows_for_columns(y, C):
+    Y = np.zeros((*y.shape, C), int)
+    for v in range(len(y)):
+        for u in range(len(y)):
+            if y[v, u] < C:
+                Y[v, u, y[v, u]] = 1
+    return Y
+
+
+def channels_anywhere(rgb, palette):
+    y = np.full(rgb.shape[:2], 255)
+    for c, colour in enumerate(palette):
+        y[np.isin(rgb, colour).all(axis=2)] = c
+    return y
+
+
+def columns_of_all_pixels(z, y):
+    z, y = z[y != 255], y[y != 255]
+    return (np.logaddexp.reduce(z, axis=-1) - z[:, y].sum(axis=-1)).sum()
+
+
+MISLED = [  # what was said of them by accident
+    ("06_back_projection.undistort", lambda pixels, K, k: lens_in_five_rounds(pixels, K, k, 15), "times 1,"),
+    ("01_labels.labels_from_segmentation", one_link_taken_off, "all ones"),
+    ("01_labels.one_hot", rows_for_columns, "255"),
+    ("01_labels.labels_from_colours", channels_anywhere, "arange"),
+    ("03_gradient.cross_entropy", columns_of_all_pixels, "does not: a loss"),  # that of the case shown is positive
+    ("03_gradient.cross_entropy", lambda z, y: losses_of_clipped(z, y).sum(), "above 255"),
+    ("05_class_weights.two_means", means_of_clipped, "a number in the formula"),
+    ("05_class_weights.class_weights", not_summed, "It fails only in cases where power"),
+    ("02_crf.row_labels", walk_without_memory, "Where it is wrong: Wherever"),
+    ("02_crf.terminal_capacities", source_cost_kept_whole, "times the place of"),
+    ("08_node.decode_depth", three_bytes_each, "It fails only in cases where height"),
+    ("08_node.pose_at", one_nan_for_a_pose, "What you return is"),
+    ("01_labels.labels_from_colours", without_blue, "where rgb is 0"),
+    ("09_other_stacks.hsv_mask", every_channel_wraps, "largest value"),
+    ("09_other_stacks.hsv_mask", every_channel_wraps, "upper is 255"),
+]
+
+
+@pytest.mark.parametrize("name, answer, says", MISLED)
+def test_what_is_true_by_accident_is_not_said(name, answer, says):
+    assert says not in (judge(find(name), answer, seed=0).hint or "")

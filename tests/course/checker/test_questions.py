@@ -1,0 +1,242 @@
+"""All questions of all topics: right answers pass, wrong ones lose and earn their hint, and none slips through.
+
+`pytest tests/course/checker -k 04_iou` tries one topic. Right are the reference and the alternatives; wrong are the
+misconceptions, and the mutants of the reference (tests/mutants.py) that do not behave like it. A mutant that passes
+every case is searched for a difference on many more inputs: without one it is equivalent; with one, the question's
+cases are too weak, unless EQUIVALENT says why the difference is none that matters.
+"""
+
+import ast
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+from alternatives import alternatives
+from mutants import mutants
+
+from labkit.course.checker.diagnosis import Sentence
+from labkit.course.checker.judge import Case, Problem, compare, expected_cases, trusted
+from labkit.course.checker.question import Question
+from labkit.course.checker.run import judge, run
+from labkit.course.checker.slips import Slip, compiled
+from labkit.course.topics import TOPICS, find, of_topic
+
+SEEDS = (0, 1, 20_260_101)  # the first is the one of `check`
+SEARCHED = 150  # random inputs on which a surviving mutant must differ nowhere
+LIMIT_S = 1.0
+
+# Mutants that differ from the reference somewhere, and are right all the same: question -> mutant -> why.
+EQUIVALENT: dict[str, dict[str, str]] = {}
+
+
+def names() -> list[str]:
+    """Names of all questions; a topic that cannot be imported is left to `test_a_topic_has_questions`."""
+    found = []
+    for topic in TOPICS:
+        try:
+            found += [question.name for question in of_topic(topic).values()]
+        except Exception:  # any error of a module: the other topics are tried all the same
+            continue
+    return found
+
+
+QUESTIONS = pytest.mark.parametrize("name", names())
+pytestmark = pytest.mark.bad_input  # graded as outside the suite: thousands of calls, many with wrong shapes on purpose
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What grading many answers to one question gave: names of answers by how they fared."""
+
+    right: int
+    wrong: int
+    false_rejects: tuple[str, ...]
+    false_accepts: tuple[str, ...]
+    equivalent: tuple[str, ...]
+
+
+@cache
+def trial(name: str) -> Trial:
+    """Grade the right and the wrong answers to one of the kit's questions."""
+    return grade(find(name), EQUIVALENT.get(name, {}), alternatives(find(name)))
+
+
+def grade(question: Question, excused: dict[str, str], extra: tuple[Callable, ...] = ()) -> Trial:
+    """Grade the right and the wrong answers to a question under several seeds; extra: right ones beside its own."""
+    cases = [expected_cases(question, seed) for seed in SEEDS]
+    rng = np.random.default_rng(7)
+    right = {function.__name__: function for function in (question.reference, *extra)}
+    rejected = [said for title, answer in right.items() for said in objections(question, title, answer)]
+    accepted = [m.name for m in question.misconceptions if any(judge(question, m.answer, s).passed for s in SEEDS)]
+    all_mutants = mutants(question.reference)
+    survivors = [m for m in all_mutants if any(passes(question, m, of_seed) for of_seed in cases)]
+    drawn = [question.inputs(rng) for _ in range(SEARCHED)] if survivors else []
+    searched = [Case(args, trusted(question.reference, args), False) for args in drawn]
+    different = [m.name for m in survivors if not all(passes(question, m, some) for some in (searched, *cases))]
+    accepted += [name for name in different if name not in excused]
+    equivalent = [m.name for m in survivors if m.name not in accepted]
+    wrong = len(question.misconceptions) + len(all_mutants) - len(equivalent)
+    return Trial(len(right), wrong, tuple(rejected), tuple(accepted), tuple(equivalent))
+
+
+def objections(question: Question, title: str, answer) -> list[str]:
+    """What the judge has against an answer, under each seed."""
+    verdicts = {seed: judge(question, answer, seed) for seed in SEEDS}
+    return [f"{title}, seed {seed}: {v.problem} in {v.where}" for seed, v in verdicts.items() if not v.passed]
+
+
+def passes(question: Question, mutant: Slip, cases: list[Case]) -> bool:
+    """Whether a mutant is right on all cases, and returns in time."""
+    for case in cases:
+        (got,), _ = run(mutant.function, [case.args], LIMIT_S)
+        if isinstance(got, Problem) or compare(question, case.expected, got) is not None:
+            return False
+    return True
+
+
+# ---------------------------------------------------------------------------------------- the tests
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_a_topic_has_questions_under_its_name(topic):
+    questions = of_topic(topic)
+    assert len(questions) >= 3
+    for function, question in questions.items():
+        assert question.name == f"{topic}.{function}" and find(question.name) is question
+
+
+@QUESTIONS
+def test_a_question_is_complete(name):
+    question = find(name)
+    titles = [m.name for m in question.misconceptions]
+    assert len(set(titles)) == len(titles)
+    assert len(set(alternatives(question))) >= 3
+    assert question.by_hand and question.random_cases >= 3 and question.points > 0
+    for right in question.ways:  # its arguments are given and told of one by one
+        assert tuple(inspect.signature(right).parameters) == question.parameters, right.__name__
+    for misconception in question.misconceptions:
+        assert 20 <= len(misconception.hint) <= 200 and "\n" not in misconception.hint
+        assert misconception.hint[-1] in ".?!:", misconception.hint
+
+
+@QUESTIONS
+def test_a_reference_is_short_and_complete_in_itself(name):
+    """So that it can be read as the answer, and mutated: no helper of its own module, constants excepted."""
+    question = find(name)
+    source = inspect.getsource(question.reference)
+    assert question.reference.__name__ == question.function
+    assert ast.get_docstring(ast.parse(source).body[0])
+    used = {node.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)}
+    globals_used = {key: question.reference.__globals__[key] for key in used & question.reference.__globals__.keys()}
+    assert not [key for key, value in globals_used.items() if inspect.isfunction(value) or inspect.isclass(value)]
+
+
+@QUESTIONS
+def test_cases_are_the_seeds_and_hold_what_is_claimed(name):
+    """The same seed gives the same cases; the reference alters nothing; every property holds."""
+    question = find(name)
+    first, again, other = (expected_cases(question, seed) for seed in (3, 3, 4))
+    assert all(same(a.args, b.args) and same(a.expected, b.expected) for a, b in zip(first, again, strict=True))
+    assert not all(same(a.args, b.args) for a, b in zip(first, other, strict=True))
+    _, altered = run(question.reference, [case.args for case in first])
+    assert not altered
+    for case in (*first, *other):
+        assert not isinstance(case.expected, Problem), case.expected
+        for prop in question.properties:
+            assert prop.holds(case.args, case.expected), prop.says
+
+
+def same(a, b) -> bool:
+    """Whether two arguments or outputs are equal to the last bit."""
+    if isinstance(a, tuple | list):
+        return len(a) == len(b) and all(map(same, a, b))
+    return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind in "fc")
+
+
+@QUESTIONS
+def test_right_answers_pass(name):
+    assert not trial(name).false_rejects
+
+
+@QUESTIONS
+def test_wrong_answers_lose(name):
+    assert not trial(name).false_accepts
+
+
+@QUESTIONS
+def test_misconceptions_earn_their_own_hints(name):
+    """And none is wrong by a hair: they lose with a hundred times the tolerance, too."""
+    question = find(name)
+    lenient = replace(question, rtol=100 * question.rtol, atol=100 * question.atol)
+    for misconception in question.misconceptions:
+        for seed in SEEDS:
+            found = judge(question, misconception.answer, seed)
+            assert found.sentence == Sentence("misconception", misconception.hint), (misconception.name, seed, found)
+        assert not judge(lenient, misconception.answer, SEEDS[0]).passed, misconception.name
+
+
+def shares(n):
+    """Divide each row by its sum."""
+    return n / n.sum(axis=1, keepdims=True)
+
+
+def test_weak_cases_let_mutants_through_and_are_found_out():
+    """The net catches what it should: symmetric counts do not tell rows from columns, general ones do."""
+    by_row = Question(name="00_test.shares", reference=shares, inputs=lambda rng: (rng.random((3, 4)),))
+    found = grade(by_row, {})
+    assert (found.right, found.false_rejects, found.false_accepts, found.equivalent) == (1, (), (), ())
+    symmetric = replace(by_row, inputs=lambda rng: (np.full((3, 3), rng.integers(3)) + np.eye(3),))
+    assert any("1 -> 0" in name for name in grade(symmetric, {}).equivalent)
+    rarely = replace(by_row, inputs=lambda rng: (np.eye(3) + (rng.random() < 0.05) * np.arange(9).reshape(3, 3),))
+    weak = grade(rarely, {}).false_accepts
+    assert any("1 -> 0" in name for name in weak)
+    assert grade(rarely, dict.fromkeys(weak, "known")).false_accepts == ()
+
+
+def test_mutants_are_the_slips_that_they_should_be():
+    """And a copy without a change behaves as the original does."""
+    found, held_out = ([mutant.name for mutant in mutants(shares, which)] for which in (False, True))
+    whole, total = "line 3: n / n.sum(axis=1, keepdims=True)", "line 3: n.sum(axis=1, keepdims=True)"
+    assert found == [
+        f"{whole} -> n * n.sum(axis=1, keepdims=True)",
+        f"{whole} -> n",
+        f"{whole} -> n.sum(axis=1, keepdims=True)",
+        f"{whole} -> n.sum(axis=1, keepdims=True) / n",
+        f"{total} -> n",
+        f"{total} -> n.mean(axis=1, keepdims=True)",
+        f"{total} -> n.prod(axis=1, keepdims=True)",
+        f"{total} -> n.sum(keepdims=True)",
+        f"{total} -> n.sum(axis=1)",
+        "line 3: 1 -> 2",
+        "line 3: 1 -> 0",
+        "line 3: True -> False",
+    ]
+    zeros = "line 3: return n / n.sum(axis=1, keepdims=True) -> return 0 * (n / n.sum(axis=1, keepdims=True))"
+    assert held_out == [zeros, "line 3: n -> -n", "line 3: n -> -n"]
+    source = inspect.getsource(shares)
+    assert compiled(source, shares)(np.array([[1.0, 3.0]])).tolist() == [[0.25, 0.75]]
+
+
+def test_no_excuse_is_out_of_date():
+    for name, excused in EQUIVALENT.items():
+        stale = excused.keys() - set(trial(name).equivalent)
+        assert not stale, f"{name}: {stale} are caught, or exist no more"
+
+
+def test_error_rates_over_all_questions(capsys):
+    """The two rates that a grade stands on, printed and bounded."""
+    trials = {name: trial(name) for name in names()}
+    accepts = sum(len(t.false_accepts) for t in trials.values())
+    rejects = sum(len(t.false_rejects) for t in trials.values())
+    wrong, right = sum(t.wrong for t in trials.values()), sum(t.right for t in trials.values())
+    with capsys.disabled():
+        print(f"\n{len(trials)} questions, seeds {SEEDS}:")
+        print(f"false accepts {accepts} of {wrong} wrong answers, false rejects {rejects} of {right} right answers")
+        for name, t in trials.items():
+            for mutant in t.equivalent:
+                print(f"  {name} equivalent: {mutant}")
+    assert accepts == 0 and rejects == 0
+    assert wrong > 30 * len(trials) and right >= 4 * len(trials)

@@ -1,0 +1,110 @@
+"""The explorers of topic 06: what each bug does to a cloud, and that the noise drawn is the noise predicted."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from labkit.course.explorers import back_projection as widgets
+from labkit.frame import RGBDFrame
+from labkit.geometry import back_project_to_base, back_projection_noise, transform_points
+
+K = np.array([[60.0, 0.0, 33.0], [0.0, 66.0, 20.0], [0.0, 0.0, 1.0]])
+# The camera stands at (1, 0.2, 0.8) and looks at the base, tilted down.
+Z = np.array([-0.8, 0.0, -0.6])
+X = np.array([0.0, 1.0, 0.0])
+T_BASE_CAM = np.eye(4)
+T_BASE_CAM[:3, :3] = np.stack([X, np.cross(Z, X), Z], axis=1)
+T_BASE_CAM[:3, 3] = 1.0, 0.2, 0.8
+
+
+@pytest.fixture
+def frame():
+    """A table, the plane z = 0, as the camera sees it, with a hole in its depth."""
+    v, u = np.mgrid[0:48, 0:64]
+    rays = np.stack([u, v, np.ones(u.shape)], axis=-1) @ np.linalg.inv(K).T @ T_BASE_CAM[:3, :3].T
+    depth = (-0.8 / rays[..., 2]).astype(np.float32)
+    depth[8:12] = 0.0
+    labels = np.ones(depth.shape, np.uint8)
+    labels[40:] = 0
+    return RGBDFrame(np.zeros((48, 64, 3), np.uint8), depth, K, T_BASE_CAM, labels)
+
+
+def test_without_a_bug_it_is_the_kits_cloud(frame):
+    points = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[::4, ::4]
+    seen = np.isfinite(points[..., 0]) & (frame.labels[::4, ::4] > 0)
+    np.testing.assert_allclose(widgets.bent_cloud(frame), points[seen], atol=1e-5)
+    assert 0 < seen.sum() < seen.size
+
+
+def test_no_two_sets_of_bugs_bend_alike(frame):
+    sets = [bugs for size in range(3) for bugs in combinations(widgets.BUGS, size)]
+    for a, b in combinations(sets, 2):
+        assert np.abs(widgets.bent_cloud(frame, a) - widgets.bent_cloud(frame, b)).max() > 0.01, (a, b)
+
+
+def test_each_bug_does_what_the_lesson_says(frame):
+    flat = widgets.bent_cloud(frame)
+    assert np.abs(flat[:, 2]).max() < 1e-5  # the table is flat, at height 0
+
+    bowed = widgets.bent_cloud(frame, ["ray"])
+    assert bowed[:, 2].min() > -1e-5 and bowed[:, 2].max() > 0.02  # its far corners rise
+
+    camera = T_BASE_CAM[:3, 3]
+    behind = (widgets.bent_cloud(frame, ["opengl"]) - camera) @ Z
+    assert (behind < 0.0).all()
+
+    depth_along_z = (widgets.bent_cloud(frame, ["buffer"]) - camera) @ Z
+    assert (depth_along_z < 1.0).all() and np.ptp(depth_along_z) < 0.15
+
+    P_cam = transform_points(np.linalg.inv(T_BASE_CAM), flat)
+    np.testing.assert_allclose(widgets.bent_cloud(frame, ["view"]), transform_points(np.linalg.inv(T_BASE_CAM), P_cam))
+
+
+@pytest.mark.bad_input
+def test_an_unknown_bug_and_a_frame_without_labels_are_named(frame):
+    with pytest.raises(ValueError, match=r"^bugs: expected some of swapped"):
+        widgets.bent_cloud(frame, ["typo"])
+    bare = RGBDFrame(frame.rgb, frame.depth, frame.K, frame.T_base_cam)
+    with pytest.raises(ValueError, match=r"^frame: expected a frame with labels"):
+        widgets.bent_cloud(bare)
+
+
+def test_each_mystery_hides_one_bug_and_its_box_covers_it(frame):
+    assert sorted(widgets.MYSTERIES[1:]) == sorted(widgets.BUGS) and widgets.MYSTERIES[0] is None
+    explorer = widgets.name_that_bug(frame)
+    for number, bug in enumerate(widgets.MYSTERIES[1:], start=1):
+        ticked = dict.fromkeys(widgets.BUGS, False) | {bug: True}
+        axes = explorer.figure(mystery=number, **ticked).axes[0]
+        _, mystery, bent, _ = axes.lines  # the table is one class; the last is the camera
+        np.testing.assert_allclose(mystery.get_xydata(), bent.get_xydata())
+
+
+def test_noisy_points_spread_as_the_covariance_says():
+    arguments = (50.0, 24.0, 1.3, K, 0.7, 0.02)
+    P = widgets.noisy_points(*arguments, n=40_000, seed=3)
+    Sigma = back_projection_noise(*arguments)
+    np.testing.assert_allclose(np.cov(P.T), Sigma, atol=0.03 * np.diagonal(Sigma).max())
+
+
+def test_the_ellipse_lies_two_standard_deviations_out():
+    Sigma, axes = np.array([[4.0, 1.0], [1.0, 2.0]]), Figure().subplots()
+    widgets.draw_ellipse(axes, np.array([5.0, -1.0]), Sigma)
+    off = axes.lines[0].get_xydata() - (5.0, -1.0)
+    np.testing.assert_allclose(np.einsum("ni,ij,nj->n", off, np.linalg.inv(Sigma), off), 4.0)
+
+
+def test_the_noise_explorer_follows_its_sliders():
+    explorer = widgets.depth_noise(K, 48, 64)
+    moved = explorer.figure(u=10, d=2.0, sigma_pixel=2.0, sigma_depth=3.0)
+    std = 1000.0 * np.sqrt(np.diagonal(back_projection_noise(10.0, 24.0, 2.0, K, 2.0, 0.003)))
+    assert moved.axes[1].get_title() == f"std of x {std[0]:.1f} mm, of z {std[2]:.1f} mm"
+
+
+def test_the_names_of_all_five_bugs_fit_over_the_picture(frame):
+    figure = widgets.name_that_bug(frame).figure(**dict.fromkeys(widgets.BUGS, True), mystery=3)
+    figure.canvas.draw()
+    title = figure.get_suptitle()
+    (text,) = [text for text in figure.texts if text.get_text() == title]
+    assert figure.bbox.x0 <= text.get_window_extent().x0 and text.get_window_extent().x1 <= figure.bbox.x1

@@ -1,0 +1,90 @@
+"""The explorers of topic 02: what a change of a control does to the picture and to the numbers that it shows."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from labkit.course.explorers import crf as widgets
+from labkit.crf import PottsCRF, solve
+
+PSI = np.array([[[0.0, 2.0], [1.5, 0.5]], [[0.2, 1.0], [3.0, 0.1]]])
+
+
+def titles(explorer) -> list[str]:
+    """The titles of an explorer's picture."""
+    return [axes.get_title() for axes in explorer.figure().axes]
+
+
+def test_without_pairs_z_is_the_product_of_the_pixels_sums():
+    explorer = widgets.gibbs(PSI)
+    Z = np.exp(-PSI).sum(axis=2).prod()
+    assert f"Z = {Z:.3f}" in titles(explorer)[0]
+    assert explorer.figure(w=2.5).axes[0].get_title().startswith("w = 2.5")
+
+
+def test_a_clicked_pixel_changes_the_energy_that_is_shown():
+    explorer = widgets.you_are_the_solver()
+    y = np.zeros((4, 5), np.uint8)
+    assert titles(explorer)[0] == f"you: {widgets.toy_model(2.0).energy(y):.2f}"
+    explorer.controls["pixel_2_1"].value = True
+    y[2, 1] = 1
+    assert titles(explorer)[0] == f"you: {widgets.toy_model(2.0).energy(y):.2f}"
+    explorer.controls["lam"].value = 0.3
+    assert titles(explorer)[0] == f"you: {widgets.toy_model(0.3).energy(y):.2f}"
+
+
+def test_the_cut_that_is_revealed_is_the_least_energy_of_all_labellings():
+    shown, least = widgets.you_are_the_solver().figure(reveal=True), solve(widgets.toy_model(2.0), "brute_force").energy
+    assert shown.axes[1].get_title() == f"the cut: {least:.2f}"
+
+
+@pytest.mark.parametrize("start", ["nothing", "network alone"])
+def test_the_toy_has_dead_ends_for_single_clicks(start):
+    """What the lesson asks its readers to find: no click helps, yet the cut is better, and it is the truth."""
+    crf = widgets.toy_model(2.0)
+    labels = np.zeros((4, 5), np.uint8) if start == "nothing" else crf.unary.argmin(axis=2)
+    stuck, best = solve(crf, "icm", labels=labels), solve(crf, "min_cut")
+    assert stuck.energy > best.energy + 0.5
+    assert np.array_equal(best.labels == 1, widgets.TOY_IMAGE > 120)
+
+
+def test_lam_moves_cost_from_the_pairs_to_the_pixels():
+    rng = np.random.default_rng(0)
+    p, image = rng.dirichlet(np.ones(4), (12, 16)), rng.integers(0, 256, (12, 16, 3)).astype(np.uint8)
+    y_true = np.full((12, 16), 2, np.uint8)
+    explorer = widgets.lam_slider(p, image, y_true)
+    explorer.controls["sigma_I"].value = 200.0
+    assert "changed pixels 0.0%" in titles(explorer)[2]
+    explorer.controls["lam"].value = 32.0
+    assert titles(explorer)[1] == "labels, lam = 32" and "changed pixels 0.0%" not in titles(explorer)[2]
+
+
+def test_both_parts_of_the_energy_add_up_to_it():
+    rng = np.random.default_rng(4)
+    crf = PottsCRF.from_image(rng.random((5, 6, 3)), rng.random((5, 6)), 2.0, 0.3)
+    y = rng.integers(0, 3, (5, 6))
+    unary, pairwise = widgets.energy_terms(crf, y)
+    assert unary + pairwise == pytest.approx(crf.energy(y)) and unary == pytest.approx(
+        np.take_along_axis(crf.unary, y[..., None], 2).sum()
+    )
+
+
+@pytest.mark.parametrize("y", [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)])
+def test_the_arcs_drawn_as_cut_add_up_to_the_energy(y):
+    psi, w = np.array([[1.0, 4.0], [2.5, 0.5], [3.0, 0.25]]), np.array([0.75, 2.0])
+    figure, axes = plt.subplots()
+    widgets.draw_cut(axes, psi, w, np.array(y))
+    crf = PottsCRF(psi[None], np.stack([np.append(w, 0.0)[None], np.zeros((1, 3))]))
+    assert axes.get_title() == f"labels {' '.join(map(str, y))}: cut {crf.energy(np.array([y])):g}"
+    plt.close(figure)
+
+
+def test_lines_are_drawn_where_neighbours_pay_and_only_there():
+    crf = widgets.toy_model(1.0)
+    figure, axes = plt.subplots(1, 2)
+    widgets.draw_labels(axes[0], np.zeros((4, 5), np.uint8), crf=crf)
+    y = np.zeros((4, 5), np.uint8)
+    y[1, 1] = 1
+    widgets.draw_labels(axes[1], y, widgets.TOY_P, crf=crf)
+    assert [len(a.lines) for a in axes] == [0, 4] and len(axes[1].texts) == 20
+    plt.close(figure)

@@ -1,0 +1,73 @@
+"""The explorers of topic 07: what the controls change, and that the pictures hold what geometry says."""
+
+import numpy as np
+import pytest
+
+from labkit.course.explorers import grasp as widgets
+from labkit.grasp import Gripper, principal_axis_grasp
+
+
+def stick(length=0.1, breadth=0.02, yaw=0.6):
+    """A grid of points, long in the direction `yaw`, on a table's corner."""
+    a, b = np.meshgrid(np.linspace(-0.5, 0.5, 41) * length, np.linspace(-0.5, 0.5, 11) * breadth)
+    x, y = a * np.cos(yaw) - b * np.sin(yaw), a * np.sin(yaw) + b * np.cos(yaw)
+    return np.stack([x.ravel() + 0.5, y.ravel() - 0.1, np.full(x.size, 0.03)], axis=1)
+
+
+def test_widths_equal_those_of_every_pair_of_points():
+    P = np.random.default_rng(0).normal(size=(30, 3))
+    for yaw, width in zip((0.0, 0.7, 2.0), widths_at(P, 0.0, 0.7, 2.0), strict=True):
+        d = np.array([np.cos(yaw), np.sin(yaw)])
+        assert np.isclose(width, max((p - q)[:2] @ d for p in P for q in P))
+
+
+def widths_at(P, *yaws):
+    return widgets.widths(P, np.array(yaws))
+
+
+def test_a_stick_is_narrowest_across_where_the_principal_axis_grasp_closes():
+    P = stick()
+    yaws = np.radians(np.arange(0.0, 180.0))
+    best = yaws[widgets.widths(P, yaws).argmin()]
+    closing = principal_axis_grasp(P).T_base_grasp[:2, 1]
+    assert abs(closing @ [np.cos(best), np.sin(best)]) > np.cos(np.radians(2.0))
+
+
+@pytest.mark.parametrize("degrees", [0, 34, 90, 124])
+def test_the_drawn_jaws_stand_apart_as_the_title_says_with_the_cloud_between(degrees):
+    P = stick()
+    above, opening = widgets.jaws_at_a_yaw(P).figure(yaw=degrees).axes
+    width = widths_at(P, np.radians(degrees))[0] + widgets.AIR
+    assert f"open {1000 * width:.0f} mm" in opening.get_title()
+    d = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    left, right = (jaw.get_xy() @ d for jaw in above.patches)
+    assert np.isclose(right.min() - left.max(), width)
+    assert left.max() < (P[:, :2] @ d).min() and right.min() > (P[:, :2] @ d).max()
+
+
+def test_jaws_that_cannot_open_so_far_are_red():
+    explorer = widgets.jaws_at_a_yaw(stick())
+    colours = set()
+    for degrees in (34, 124):  # along the stick, 10 cm; and across it, 2 cm
+        above, opening = explorer.figure(yaw=degrees).axes
+        colours.add(above.patches[0].get_facecolor())
+        assert ("more than it can" in opening.get_title()) == (degrees == 34)
+    assert len(colours) == 2 and Gripper().max_opening < 0.1 + widgets.AIR
+
+
+def test_a_ball_shows_its_camera_a_centroid_two_thirds_of_the_radius_off():
+    """Pixels sample the disc that a far camera sees evenly; over it the mean of sqrt(r^2 - rho^2) is 2 r / 3."""
+    clouds, centre = widgets.views("ball")
+    for elevation, cloud in zip(widgets.ELEVATIONS, clouds, strict=True):
+        ray = np.array([np.cos(np.radians(elevation)), 0.0, np.sin(np.radians(elevation))])
+        offset = cloud.mean(axis=0) - centre
+        assert np.isclose(offset @ ray, 2 / 3 * widgets.RADIUS, rtol=0.06)
+        assert np.linalg.norm(offset - offset @ ray * ray) < 0.001
+        assert np.allclose(np.linalg.norm(cloud - centre, axis=1), widgets.RADIUS, atol=0.002)
+
+
+def test_the_title_of_the_visible_centroid_says_how_far_off_it_is():
+    shown = widgets.visible_centroid().figure(elevation=75, thing="can")
+    clouds, centre = widgets.views("can")
+    off = 1000 * (clouds[widgets.ELEVATIONS.index(75)].mean(axis=0) - centre)
+    assert shown.axes[1].get_title() == f"{np.hypot(off[0], off[2]):.0f} mm off in all"

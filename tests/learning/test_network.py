@@ -1,0 +1,183 @@
+"""The networks: exactly the text's layers, any image size, and weights that load or say why not."""
+
+import io
+import pickle
+
+import numpy as np
+import pytest
+import torch
+from scenes import random_image
+from torch.nn import functional as F
+
+from labkit.frame import RGBDFrame
+from labkit.learning.network import (
+    ARCHITECTURES,
+    SmallSegNet,
+    UNet,
+    UNetRGBD,
+    load_model,
+    predict_probabilities,
+    save_model,
+)
+
+
+def small_unet(num_classes: int = 4) -> UNet:
+    torch.manual_seed(0)
+    return UNet(num_classes, widths=(8, 8, 16), blocks=(1, 0, 1))
+
+
+def test_smallsegnet_has_the_layers_of_the_text():
+    shapes = {name: tuple(weight.shape) for name, weight in SmallSegNet(num_classes=4).state_dict().items()}
+    assert shapes == {
+        "conv1.weight": (32, 3, 3, 3),
+        "conv1.bias": (32,),
+        "conv2.weight": (64, 32, 3, 3),
+        "conv2.bias": (64,),
+        "conv3.weight": (128, 64, 3, 3),
+        "conv3.bias": (128,),
+        "up1.weight": (128, 64, 2, 2),
+        "up1.bias": (64,),
+        "up2.weight": (64, 32, 2, 2),
+        "up2.bias": (32,),
+        "logits.weight": (4, 32, 1, 1),
+        "logits.bias": (4,),
+    }
+
+
+def test_smallsegnet_computes_what_the_text_does():
+    """The oracle is the text's forward pass, written out with functional calls on the same weights."""
+    model = SmallSegNet().double().eval()
+    w = model.state_dict()
+    x = torch.rand(2, 3, 12, 8, dtype=torch.float64)
+    z = F.max_pool2d(F.relu(F.conv2d(x, w["conv1.weight"], w["conv1.bias"], padding=1)), 2)
+    z = F.max_pool2d(F.relu(F.conv2d(z, w["conv2.weight"], w["conv2.bias"], padding=1)), 2)
+    z = F.relu(F.conv2d(z, w["conv3.weight"], w["conv3.bias"], padding=1))
+    z = F.relu(F.conv_transpose2d(z, w["up1.weight"], w["up1.bias"], stride=2))
+    z = F.relu(F.conv_transpose2d(z, w["up2.weight"], w["up2.bias"], stride=2))
+    z = F.conv2d(z, w["logits.weight"], w["logits.bias"])
+    torch.testing.assert_close(model(x), z)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("size", [(10, 8), (8, 9), (3, 3)])
+def test_smallsegnet_says_which_sizes_it_takes(size):
+    with pytest.raises(ValueError, match=r"^x: expected height and width divisible by 4"):
+        SmallSegNet()(torch.zeros(1, 3, *size))
+
+
+@pytest.mark.parametrize("size", [(37, 61), (1, 1), (16, 16), (17, 32), (50, 3)])
+def test_unet_takes_any_size_and_crops_what_it_pads(size):
+    """The logits of an odd size are those of the image that was padded by hand, where the two overlap."""
+    model, x = small_unet().eval(), torch.rand(2, 3, *size)
+    padded = F.pad(x, (0, -size[1] % 8, 0, -size[0] % 8), mode="replicate")
+    torch.testing.assert_close(model(x), model(padded)[..., : size[0], : size[1]])
+
+
+def test_all_weights_fit_in_eight_megabytes(tmp_path):
+    for name, kind in ARCHITECTURES.items():
+        save_model(kind(), tmp_path / name)
+    assert sum(file.stat().st_size for file in tmp_path.iterdir()) < 8_000_000
+    assert 700_000 < sum(weight.numel() for weight in UNet().parameters()) < 1_000_000
+
+
+def test_unet_sees_a_whole_object_and_smallsegnet_about_twenty_pixels():
+    """The receptive field, measured: how far away a pixel can be and still move the logits in the middle."""
+    reach = {}
+    for model in (UNet().eval(), SmallSegNet().eval()):
+        x = torch.rand(1, 3, 256, 256, requires_grad=True)
+        model(x)[0, 2, 128, 128].backward()
+        touched = x.grad.abs().sum(dim=(0, 1)).nonzero()
+        reach[type(model)] = int((touched - 128).abs().max())
+    assert reach[UNet] >= 40
+    assert 8 <= reach[SmallSegNet] <= 12
+
+
+def test_kernels_stored_in_half_give_nearly_the_same_probabilities(tmp_path):
+    torch.manual_seed(0)
+    model, image = UNetRGBD().eval(), random_image(48, 64)
+    frame = RGBDFrame(image, np.random.default_rng(1).uniform(0.5, 0.6, (48, 64)), np.diag([50.0, 50, 1]), np.eye(4))
+    save_model(model, tmp_path / "w.pt")
+    loaded = load_model(tmp_path / "w.pt")
+    assert type(loaded) is UNetRGBD and {w.dtype for w in loaded.parameters()} == {torch.float32}
+    p, q = (predict_probabilities(m, frame) for m in (model, loaded))
+    assert np.abs(p - q).max() < 1e-3
+    torch.save(model.state_dict(), tmp_path / "bare.pt")
+    assert type(load_model(tmp_path / "bare.pt")) is UNetRGBD
+
+
+@pytest.mark.parametrize("model", [UNet(3), SmallSegNet(3)], ids=["unet", "smallsegnet"])
+def test_saved_weights_load_and_predict_the_same(model, tmp_path):
+    model(torch.rand(2, 3, 16, 16))  # so that the running means of UNet are not those of a fresh one
+    save_model(model.eval(), tmp_path / "sub" / "weights.pt", epoch=3, iou=[0.5, float("nan")])
+    loaded = load_model(tmp_path / "sub" / "weights.pt", num_classes=3)
+    assert type(loaded) is type(model) and not loaded.training
+    image = random_image(20, 28)
+    np.testing.assert_allclose(predict_probabilities(loaded, image), predict_probabilities(model, image), atol=1e-6)
+    assert [file.name for file in (tmp_path / "sub").iterdir()] == ["weights.pt"]
+    assert torch.load(tmp_path / "sub" / "weights.pt", weights_only=True)["meta"]["epoch"] == 3
+    torch.save(model.state_dict(), tmp_path / "bare.pt")  # as the text saves and loads it
+    assert type(load_model(tmp_path / "bare.pt", 3)) is type(model)
+    with pytest.raises(ValueError, match=r"num_classes: expected 3, the classes that .*weights\.pt .* got 5"):
+        load_model(tmp_path / "sub" / "weights.pt", 5)
+    F.cross_entropy(loaded(torch.rand(2, 3, 32, 32)), torch.randint(0, 3, (2, 32, 32))).backward()
+    for name, weight in loaded.named_parameters():
+        assert weight.grad is not None and weight.grad.abs().max() > 0.0, f"{name} learns nothing"
+
+
+class Launcher:
+    """What a malicious file of weights would hold."""
+
+    def __reduce__(self):
+        return (print, ("a pickle ran code",))
+
+
+def truncated() -> bytes:
+    buffer = io.BytesIO()
+    torch.save(SmallSegNet().state_dict(), buffer)
+    return buffer.getvalue()[:100_000]
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    "data",
+    [truncated(), b"", b"not weights at all", pickle.dumps(Launcher(), 2), pickle.dumps([1, 2], 2)],
+    ids=["truncated", "empty", "text", "malicious", "pickle"],
+)
+def test_a_file_without_weights(data, tmp_path, capfd):
+    (tmp_path / "w.pt").write_bytes(data)
+    with pytest.raises(ValueError, match=r"^path: .*w\.pt holds no weights that can be read"):
+        load_model(tmp_path / "w.pt", 4)
+    assert "a pickle ran code" not in capfd.readouterr().out
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ([1, 2], "expected a dict of weights"),
+        ({"epoch": 3}, "expected weights by name"),
+        ({"architecture": "vit", "state_dict": {}}, "expected weights of smallsegnet, .* or `model`, .* 'vit'"),
+        (
+            {"architecture": "unet", "state_dict": SmallSegNet().state_dict()},
+            "expected the weights of unet.* got 1 that fit and 10 of other names",
+        ),
+        ({}, r"expected the weights of unet, \d+ arrays, got 0 that fit"),
+    ],
+)
+def test_other_things_than_weights(content, says, tmp_path):
+    with pytest.raises(FileNotFoundError, match="path: no file"):
+        load_model(tmp_path / "w.pt", 4)
+    torch.save(content, tmp_path / "w.pt")
+    with pytest.raises(ValueError, match=rf"path: {says}"):
+        load_model(tmp_path / "w.pt", 4)
+
+
+def test_weights_of_ones_own_network_load_into_it(tmp_path):
+    mine, other = (torch.nn.Sequential(torch.nn.Conv2d(3, 2, 1), torch.nn.BatchNorm2d(2)) for _ in range(2))
+    save_model(mine, tmp_path / "w.pt")
+    loaded = load_model(tmp_path / "w.pt", model=other)
+    assert loaded is other and not loaded.training and torch.equal(other[0].weight, mine[0].weight)
+    with pytest.raises(ValueError, match=r"path: expected weights of smallsegnet, .* or `model`, .* 'Sequential'"):
+        load_model(tmp_path / "w.pt")
+    with pytest.raises(ValueError, match="path: expected the weights of Conv2d, 2 arrays, got 0 that fit and 7 of"):
+        load_model(tmp_path / "w.pt", model=torch.nn.Conv2d(3, 2, 1))
