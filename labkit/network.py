@@ -1,1 +1,14 @@
-"""The networks at their public address; the module is `labkit.learning.network` (topic 03)."""
+"""The networks and their weights at their public address; `labkit.learning.network` has their text (topic 03)."""
+
+from labkit.learning.network import (
+    ARCHITECTURES,
+    SmallSegNet,
+    TorchEngine,
+    UNet,
+    UNetRGBD,
+    load_model,
+    predict_logits,
+    predict_probabilities,
+    save_model,
+    weights_path,
+)

@@ -10,7 +10,7 @@ from scenes import random_image
 from torch.nn import functional as F
 
 from labkit.frame import RGBDFrame
-from labkit.learning.network import (
+from labkit.network import (
     ARCHITECTURES,
     SmallSegNet,
     UNet,
