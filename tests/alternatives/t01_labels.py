@@ -3,6 +3,51 @@
 import numpy as np
 
 
+def class_shares__one_hot(y, C):
+    n = np.einsum("vuc->c", one_hot__eye(y, C).astype(np.float64))
+    return n / n.sum()
+
+
+def class_shares__float32(y, C):
+    return np.stack([np.mean(y[y != 255] == c, dtype=np.float32) for c in range(C)])
+
+
+def class_shares__torch(y, C):
+    import torch
+
+    n = torch.bincount(torch.as_tensor(y[y != 255].astype(np.int64)), minlength=C).float()
+    return n / n.sum()
+
+
+def class_shares__loops(y, C):
+    n = [0] * C
+    for c in y.ravel().tolist():
+        if c != 255:
+            n[c] += 1
+    return np.array([count / sum(n) for count in n])
+
+
+def labels_from_colours__loops(rgb, palette):
+    """Pixel by pixel, in a dictionary of colours."""
+    names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
+    return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
+
+
+def labels_from_colours__class_by_class(rgb, palette):
+    y = np.full(rgb.shape[:2], 255, np.uint8)
+    for c, colour in enumerate(palette):
+        y[(rgb == colour).all(axis=2)] = c
+    return y
+
+
+def labels_from_colours__as_numbers(rgb, palette):
+    """Each colour as one number of 24 bits."""
+    weights = np.array([65536, 256, 1])
+    picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
+    found = picture[..., None] == table
+    return np.where(found.any(axis=-1), found.argmax(axis=-1), 255)
+
+
 def labels_from_segmentation__modulo(segmentation, class_of_body):
     with_nothing = np.append(class_of_body, np.uint8(0))
     return with_nothing[np.where(segmentation < 0, -1, segmentation % (1 << 24))]
@@ -13,6 +58,14 @@ def labels_from_segmentation__torch(segmentation, class_of_body):
 
     s, table = torch.as_tensor(segmentation.astype(np.int64)), torch.as_tensor(class_of_body.astype(np.int64))
     return torch.where(s < 0, 0, table[torch.bitwise_and(s.clamp(min=0), 0xFFFFFF)])
+
+
+def labels_from_segmentation__loops(segmentation, class_of_body):
+    labels = np.zeros(segmentation.shape, np.uint8)
+    for place, value in np.ndenumerate(segmentation):
+        if value != -1:
+            labels[place] = class_of_body[int(value) - ((int(value) >> 24) << 24)]
+    return labels
 
 
 def one_hot__eye(y, C):
@@ -30,20 +83,12 @@ def one_hot__torch(y, C):
     return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
 
 
-def class_shares__one_hot(y, C):
-    n = np.einsum("vuc->c", one_hot__eye(y, C).astype(np.float64))
-    return n / n.sum()
-
-
-def class_shares__float32(y, C):
-    return np.stack([np.mean(y[y != 255] == c, dtype=np.float32) for c in range(C)])
-
-
-def class_shares__torch(y, C):
-    import torch
-
-    n = torch.bincount(torch.as_tensor(y[y != 255].astype(np.int64)), minlength=C).float()
-    return n / n.sum()
+def one_hot__loops(y, C):
+    Y = np.zeros((*y.shape, C), np.uint8)
+    for place, c in np.ndenumerate(y):
+        if c != 255:
+            Y[(*place, c)] = 1
+    return Y
 
 
 def resize_labels__take(y, height, width):
@@ -59,3 +104,11 @@ def resize_labels__torch(y, height, width):
     rows = torch.div((2 * torch.arange(height) + 1) * H, 2 * height, rounding_mode="floor")
     columns = torch.div((2 * torch.arange(width) + 1) * W, 2 * width, rounding_mode="floor")
     return torch.as_tensor(y)[rows][:, columns]
+
+
+def resize_labels__loops(y, height, width):
+    (H, W), out = y.shape, np.zeros((height, width), y.dtype)
+    for i in range(height):
+        for j in range(width):
+            out[i, j] = y[int((i + 0.5) * H / height), int((j + 0.5) * W / width)]
+    return out

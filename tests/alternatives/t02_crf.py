@@ -3,35 +3,9 @@
 import numpy as np
 import torch
 
-
-def unary_from_probabilities__torch(p, floor):
-    """Clamp, then take the logarithm, in torch."""
-    return -torch.log(torch.clamp(torch.as_tensor(p), min=floor)).numpy()
-
-
-def unary_from_probabilities__float32(p, floor):
-    """In single precision, and with the cost cut off instead of the probability."""
-    return np.minimum(-np.log(np.maximum(p.astype(np.float32), 1e-30)), np.float32(-np.log(floor)))
-
+from labkit.course.topics.t02_crf import PAIRS
 
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
-
-
-def pair_weights__torch(image, lam, sigma_I, sigma_p):
-    """In single precision."""
-    x = torch.from_numpy(image.astype(np.float32))
-    w = torch.zeros(4, *image.shape[:2])
-    for d, (p, q) in enumerate(
-        (
-            (np.s_[:, :-1], np.s_[:, 1:]),
-            (np.s_[:-1], np.s_[1:]),
-            (np.s_[:-1, :-1], np.s_[1:, 1:]),
-            (np.s_[:-1, 1:], np.s_[1:, :-1]),
-        )
-    ):
-        squared = (x[p] - x[q]).pow(2).sum(dim=2)
-        w[d][p] = lam * torch.exp(-squared / (2 * sigma_I**2) - (1 + (d > 1)) / (2 * sigma_p**2))
-    return w.numpy()
 
 
 def energy__loops(y, psi, weights):
@@ -63,6 +37,13 @@ def energy__float32(y, psi, weights):
     return unary + (weights.astype(np.float32) * (near != y)).sum()
 
 
+def energy__einsum(y, psi, weights):
+    """With one-hot labels: the product of two of them is 1 where they agree."""
+    Y = np.eye(psi.shape[2])[y]
+    near = np.stack([np.roll(Y, (-down, -right), (0, 1)) for down, right in PAIRS])
+    return (Y * psi).sum() + (weights * (1 - np.einsum("vuc,dvuc->dvu", Y, near))).sum()
+
+
 def icm_costs__by_energies(y, psi, weights, v, u):
     """The whole energy with each class at the pixel, less what does not touch the pixel."""
     costs, rest = [], weights.copy()
@@ -77,12 +58,68 @@ def icm_costs__by_energies(y, psi, weights, v, u):
     return np.array(costs) - (energy__loops(y, psi, rest) - psi[v, u, y[v, u]])
 
 
-def terminal_capacities__torch(psi):
-    """In torch."""
-    psi = torch.as_tensor(psi)
-    lowest = psi.amin(dim=2, keepdim=True)
-    excess = psi - lowest
-    return excess[..., 1].numpy(), excess[..., 0].numpy(), float(lowest.sum())
+def icm_costs__loop(y, psi, weights, v, u):
+    """Every pixel asked whether it is a neighbour, in single precision."""
+    costs = psi[v, u].astype(np.float32)
+    for b, a in np.ndindex(*y.shape):
+        step = (b - v, a - u)
+        w = weights[PAIRS.index(step), v, u] if step in PAIRS else 0.0
+        step = (v - b, u - a)
+        w = weights[PAIRS.index(step), b, a] if step in PAIRS else w
+        for c in range(len(costs)):
+            costs[c] += w if c != y[b, a] else 0.0
+    return costs
+
+
+def icm_costs__padded(y, psi, weights, v, u):
+    """With a ring of pixels around the image that cost nothing."""
+    Y, w = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0))), np.pad(weights, ((0, 0), (1, 1), (1, 1)))
+    v, u, costs = v + 1, u + 1, psi[v, u].copy()
+    for d, (down, right) in enumerate(PAIRS):
+        costs += w[d, v, u] * (1 - Y[v + down, u + right])
+        costs += w[d, v - down, u - right] * (1 - Y[v - down, u - right])
+    return costs
+
+
+def pair_weights__torch(image, lam, sigma_I, sigma_p):
+    """In single precision."""
+    x = torch.from_numpy(image.astype(np.float32))
+    w = torch.zeros(4, *image.shape[:2])
+    for d, (p, q) in enumerate(
+        (
+            (np.s_[:, :-1], np.s_[:, 1:]),
+            (np.s_[:-1], np.s_[1:]),
+            (np.s_[:-1, :-1], np.s_[1:, 1:]),
+            (np.s_[:-1, 1:], np.s_[1:, :-1]),
+        )
+    ):
+        squared = (x[p] - x[q]).pow(2).sum(dim=2)
+        w[d][p] = lam * torch.exp(-squared / (2 * sigma_I**2) - (1 + (d > 1)) / (2 * sigma_p**2))
+    return w.numpy()
+
+
+def pair_weights__loops(image, lam, sigma_I, sigma_p):
+    """Pair by pair."""
+    H, W, channels = image.shape
+    w = np.zeros((4, H, W))
+    for d, v, u in np.ndindex(4, H, W):
+        b, a = v + PAIRS[d][0], u + PAIRS[d][1]
+        if b < H and 0 <= a < W:
+            squared = sum((float(image[v, u, k]) - float(image[b, a, k])) ** 2 for k in range(channels))
+            distance = np.hypot(b - v, a - u)
+            w[d, v, u] = lam * np.exp(-squared / (2 * sigma_I**2)) * np.exp(-(distance**2) / (2 * sigma_p**2))
+    return w
+
+
+def pair_weights__padded(image, lam, sigma_I, sigma_p):
+    """With a ring of pixels that are infinitely far from every colour."""
+    far = np.pad(image / sigma_I, ((0, 1), (1, 1), (0, 0)), constant_values=np.inf)
+    H, W, _ = image.shape
+    w = []
+    for down, right in PAIRS:
+        d = far[down : H + down, 1 + right : W + 1 + right] - image / sigma_I
+        w.append(lam * np.exp(-0.5 * (np.einsum("ijk,ijk->ij", d, d) + (down + right**2) / sigma_p**2)))
+    return np.array(w)
 
 
 def row_labels__enumerated(psi, w):
@@ -91,3 +128,69 @@ def row_labels__enumerated(psi, w):
     y = np.indices((C,) * n, dtype=np.int8).reshape(n, -1)
     costs = psi[np.arange(n)[:, None], y].sum(axis=0) + (w[:, None] * (y[1:] != y[:-1])).sum(axis=0)
     return y[:, costs.argmin()]
+
+
+def row_labels__by_min_marginals(psi, w):
+    """Both walks, from the left and from the right: what each class at each pixel costs at least."""
+
+    def forward(psi, w):
+        best = [psi[0]]
+        for u in range(1, len(psi)):
+            best.append(psi[u] + np.minimum(best[-1], best[-1].min() + w[u - 1]))
+        return np.array(best)
+
+    return (forward(psi, w) + forward(psi[::-1], w[::-1])[::-1] - psi).argmin(axis=1)
+
+
+def row_labels__carried_along(psi, w):
+    """The cheapest labels up to each pixel, one list per class."""
+    ways = [(cost, [c]) for c, cost in enumerate(psi[0])]
+    for costs, weight in zip(psi[1:], w, strict=True):
+        ways = [
+            min((cost + weight * (way[-1] != c) + costs[c], [*way, c]) for cost, way in ways) for c in range(len(costs))
+        ]
+    return np.array(min(ways)[1])
+
+
+def terminal_capacities__torch(psi):
+    """In torch."""
+    psi = torch.as_tensor(psi)
+    lowest = psi.amin(dim=2, keepdim=True)
+    excess = psi - lowest
+    return excess[..., 1].numpy(), excess[..., 0].numpy(), float(lowest.sum())
+
+
+def terminal_capacities__by_difference(psi):
+    """Only the difference of a pixel's two costs matters to a cut."""
+    difference = psi[..., 1] - psi[..., 0]
+    return np.maximum(difference, 0), np.maximum(-difference, 0), np.minimum(psi[..., 0], psi[..., 1]).sum()
+
+
+def terminal_capacities__loops(psi):
+    """Pixel by pixel, in single precision."""
+    H, W, _ = psi.shape
+    source, sink, constant = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32), 0.0
+    for v in range(H):
+        for u in range(W):
+            low = min(psi[v, u])
+            source[v, u], sink[v, u] = psi[v, u, 1] - low, psi[v, u, 0] - low
+            constant += low
+    return source, sink, constant
+
+
+def unary_from_probabilities__torch(p, floor):
+    """Clamp, then take the logarithm, in torch."""
+    return -torch.log(torch.clamp(torch.as_tensor(p), min=floor)).numpy()
+
+
+def unary_from_probabilities__float32(p, floor):
+    """In single precision, and with the cost cut off instead of the probability."""
+    return np.minimum(-np.log(np.maximum(p.astype(np.float32), 1e-30)), np.float32(-np.log(floor)))
+
+
+def unary_from_probabilities__loops(p, floor):
+    """Probability by probability."""
+    psi = np.zeros(p.shape)
+    for index in np.ndindex(*p.shape):
+        psi[index] = -np.log(p[index] if p[index] > floor else floor)
+    return psi

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from labkit.course.topics.t04_iou import iou_of
 from labkit.course.topics.t04_iou.confusion_matrix import counted_pairs
 
 
@@ -19,6 +18,14 @@ def confusion_matrix__torch(y_true, y_pred, num_classes, ignore):
     return torch.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, -1).numpy()
 
 
+def confusion_matrix__loops(y_true, y_pred, num_classes, ignore):
+    n = np.zeros((num_classes, num_classes), np.int64)
+    for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
+        if i != ignore:
+            n[i, j] += 1
+    return n
+
+
 def iou__torch(n):
     import torch
 
@@ -26,8 +33,20 @@ def iou__torch(n):
     return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).numpy()
 
 
-def iou__float32(n):
-    return iou_of(n.astype(np.float32)).astype(np.float32)
+def iou__loops(n):
+    scores = []
+    for c in range(len(n)):
+        false_positive = sum(int(n[i, c]) for i in range(len(n)) if i != c)
+        false_negative = sum(int(n[c, j]) for j in range(len(n)) if j != c)
+        union = int(n[c, c]) + false_positive + false_negative
+        scores.append(int(n[c, c]) / union if union else float("nan"))
+    return np.array(scores)
+
+
+def iou__einsum(n):
+    correct = np.einsum("ii->i", n)
+    union = np.einsum("ij->j", n) + np.einsum("ij->i", n) - correct
+    return np.divide(correct, union, out=np.full(len(n), np.nan), where=union > 0)
 
 
 def mean_iou__torch(n_frames):
@@ -37,15 +56,42 @@ def mean_iou__torch(n_frames):
     return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).nanmean().item()
 
 
+def mean_iou__loops(n_frames):
+    C, scores = n_frames.shape[1], []
+    for c in range(C):
+        union = intersection = 0
+        for n in n_frames:
+            intersection += int(n[c, c])
+            union += int(n[c].sum() + n[:, c].sum() - n[c, c])
+        if union:
+            scores.append(intersection / union)
+    return sum(scores) / len(scores)
+
+
+def mean_iou__einsum(n_frames):
+    correct = np.einsum("fii->i", n_frames)
+    union = np.einsum("fij->i", n_frames) + np.einsum("fij->j", n_frames) - correct
+    return (correct[union > 0] / union[union > 0]).mean()
+
+
 def merge_classes__blocks(n, group):
     classes = [np.flatnonzero(group == g) for g in np.unique(group)]
     return np.array([[n[np.ix_(rows, columns)].sum() for columns in classes] for rows in classes])
 
 
-def merge_classes__bincount(n, group):
-    G = group.max() + 1
-    pairs = G * group[:, None] + group
-    return np.bincount(pairs.ravel(), weights=n.ravel(), minlength=G * G).reshape(G, G).astype(int)
+def merge_classes__loops(n, group):
+    G = max(group.tolist()) + 1
+    merged = np.zeros((G, G), np.int64)
+    for i in range(len(group)):
+        for j in range(len(group)):
+            merged[group[i], group[j]] += n[i, j]
+    return merged
+
+
+def merge_classes__add_at(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, (group[:, None], group[None, :]), n)
+    return merged
 
 
 def trimap_band__one_class_at_a_time(y, width):
@@ -64,3 +110,23 @@ def trimap_band__torch(y, width):
     masks = (torch.from_numpy(y)[None] == classes[:, None, None]).float()
     near = torch.nn.functional.max_pool2d(masks, 2 * width + 1, stride=1, padding=width)
     return (near.sum(0) > 1).numpy() & (y != 255)
+
+
+def trimap_band__loops(y, width):
+    band = np.zeros(y.shape, bool)
+    for v, u in np.argwhere(y != 255):
+        window = y[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
+        band[v, u] = len(set(window.ravel().tolist()) - {255}) > 1
+    return band
+
+
+def trimap_band__extremes(y, width):
+    low, high = y.astype(int), np.where(y == 255, -1, y.astype(int))
+    for _ in range(width):
+        for axis in (0, 1):
+            reach = ((1, 1), (0, 0)) if axis == 0 else ((0, 0), (1, 1))
+            a, b = np.pad(low, reach, mode="edge"), np.pad(high, reach, mode="edge")
+            places = [np.arange(step, step + y.shape[axis]) for step in range(3)]
+            low = np.min([a.take(place, axis) for place in places], axis=0)
+            high = np.max([b.take(place, axis) for place in places], axis=0)
+    return (low < high) & (y < 255)

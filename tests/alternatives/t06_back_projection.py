@@ -3,16 +3,7 @@
 import numpy as np
 
 from labkit.course.topics.t06_back_projection import columns
-
-
-def cropped_intrinsics__torch(K, left, top, scale):
-    import torch
-
-    K = torch.from_numpy(K)
-    corner = torch.tensor([left - 0.5, top - 0.5], dtype=torch.float64)
-    new = torch.eye(3, dtype=torch.float64)
-    new[:2, :2], new[:2, 2] = scale * K[:2, :2], scale * (K[:2, 2] - corner) - 0.5
-    return new
+from labkit.course.topics.t06_back_projection.back_project import holes, rays
 
 
 def back_project__einsum(depth, K):
@@ -32,16 +23,44 @@ def back_project__torch(depth, K):
     return torch.stack([z * (u - K[0, 2]) / K[0, 0], z * (v - K[1, 2]) / K[1, 1], z], dim=-1).numpy()
 
 
-def undistort__halving(pixels, K, k):
-    f, c = np.diag(K)[:2], K[:2, 2]
-    x = (pixels - c) / f
-    low, high = np.zeros(len(x)), np.ones(len(x))
-    for _ in range(60):
-        middle = (low + high) / 2
-        s2 = (middle[:, None] * x * 1.3) ** 2 @ np.ones(2)
-        too_far = middle * 1.3 * (1 + k[0] * s2 + k[1] * s2**2) > 1
-        low, high = np.where(too_far, low, middle), np.where(too_far, middle, high)
-    return c + f * x * 1.3 * high[:, None]
+def back_project__closed_form(depth, K):
+    return holes(depth) * rays(depth.shape, K)
+
+
+def back_project__loops(depth, K):
+    P = np.full((*depth.shape, 3), np.nan)
+    K_inv = np.linalg.inv(K)
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1]):
+            if depth[v, u] > 0.0:
+                P[v, u] = depth[v, u] * K_inv @ np.array([u, v, 1.0])
+    return P
+
+
+def cropped_intrinsics__torch(K, left, top, scale):
+    import torch
+
+    K = torch.from_numpy(K)
+    corner = torch.tensor([left - 0.5, top - 0.5], dtype=torch.float64)
+    new = torch.eye(3, dtype=torch.float64)
+    new[:2, :2], new[:2, 2] = scale * K[:2, :2], scale * (K[:2, 2] - corner) - 0.5
+    return new
+
+
+def cropped_intrinsics__by_hand(K, left, top, scale):
+    new = K.copy()
+    new[0] = scale * K[0]
+    new[1] = scale * K[1]
+    new[0, 2] = scale * (K[0, 2] - left + 0.5) - 0.5
+    new[1, 2] = scale * (K[1, 2] - top + 0.5) - 0.5
+    return new
+
+
+def cropped_intrinsics__by_steps(K, left, top, scale):
+    def shift(right, down):
+        return np.array([[1.0, 0.0, right], [0.0, 1.0, down], [0.0, 0.0, 1.0]])
+
+    return shift(-0.5, -0.5) @ np.diag([scale, scale, 1.0]) @ shift(0.5 - left, 0.5 - top) @ K
 
 
 def fit_plane__svd(P, sigma):
@@ -62,6 +81,25 @@ def fit_plane__torch(P, sigma):
     return normal.numpy(), torch.dot(normal, centre).item()
 
 
+def fit_plane__by_eigenvectors(P, sigma):
+    w = sigma**-2.0
+    centre = np.average(P, axis=0, weights=w)
+    normal = np.linalg.eigh(np.cov(P.T, aweights=w, ddof=0))[1][:, 0]
+    normal *= 1 if normal[2] > 0 else -1
+    return normal, normal @ centre
+
+
+def fit_plane__loops(P, sigma):
+    total = sum(1 / s**2 for s in sigma)
+    centre = sum(p / s**2 for p, s in zip(P, sigma, strict=True)) / total
+    scatter = np.zeros((3, 3))
+    for p, s in zip(P, sigma, strict=True):
+        scatter += np.outer(p - centre, p - centre) / s**2
+    values, vectors = np.linalg.eig(scatter)
+    normal = vectors[:, values.real.argmin()].real
+    return normal * np.sign(normal[2]), abs(normal[2]) / normal[2] * (normal @ centre)
+
+
 def height_noise__einsum(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = np.stack(columns(u, v, d, K), axis=1)
     r, sigma = T_base_cam[2, :3], np.array([sigma_pixel, sigma_pixel, sigma_depth])
@@ -75,3 +113,50 @@ def height_noise__torch(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     K_inv, r = torch.linalg.inv(torch.as_tensor(K).double()), torch.as_tensor(T_base_cam[2, :3]).double()
     (r @ (x[2] * K_inv @ torch.stack([x[0], x[1], torch.ones_like(x[0])]))).backward()
     return (x.grad * torch.tensor([sigma_pixel, sigma_pixel, sigma_depth], dtype=torch.float64)).norm().item()
+
+
+def height_noise__covariance(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = T_base_cam[:3, :3] @ np.stack(columns(u, v, d, K), axis=1)
+    Sigma = J @ np.diag([sigma_pixel**2, sigma_pixel**2, sigma_depth**2]) @ J.T
+    return float(np.sqrt(Sigma[2, 2]))
+
+
+def height_noise__loops(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    total = 0.0
+    for column, sigma in zip(columns(u, v, d, K), (sigma_pixel, sigma_pixel, sigma_depth), strict=True):
+        total += (sum(T_base_cam[2, i] * column[i] for i in range(3)) * sigma) ** 2
+    return total**0.5
+
+
+def undistort__halving(pixels, K, k):
+    f, c = np.diag(K)[:2], K[:2, 2]
+    x = (pixels - c) / f
+    low, high = np.zeros(len(x)), np.ones(len(x))
+    for _ in range(60):
+        middle = (low + high) / 2
+        s2 = (middle[:, None] * x * 1.3) ** 2 @ np.ones(2)
+        too_far = middle * 1.3 * (1 + k[0] * s2 + k[1] * s2**2) > 1
+        low, high = np.where(too_far, low, middle), np.where(too_far, middle, high)
+    return c + f * x * 1.3 * high[:, None]
+
+
+def undistort__newton(pixels, K, k):
+    f, c = np.array([K[0, 0], K[1, 1]]), np.array([K[0, 2], K[1, 2]])
+    x = (pixels - c) / f
+    seen = np.hypot(*x.T)
+    r = seen.copy()
+    for _ in range(20):
+        r -= (r + k[0] * r**3 + k[1] * r**5 - seen) / (1 + 3 * k[0] * r**2 + 5 * k[1] * r**4)
+    return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
+
+
+def undistort__by_roots(pixels, K, k):
+    out = []
+    for pixel in pixels:
+        x = np.linalg.solve(K, [*pixel, 1.0])[:2]
+        seen = np.linalg.norm(x)
+        roots = np.roots([k[1], 0, k[0], 0, 1, -seen])
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        r = min(real[real >= 0], default=0.0)
+        out.append((K @ [*(x * (r / seen if seen else 1.0)), 1.0])[:2])
+    return np.array(out)

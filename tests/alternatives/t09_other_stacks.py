@@ -4,18 +4,34 @@ import numpy as np
 import torch
 
 from labkit.course.topics.t09_other_stacks.choose_region import chosen
+from labkit.course.topics.t09_other_stacks.hsv_mask import between
 from labkit.course.topics.t09_other_stacks.make_blob import padded
 
 
-def make_blob__torch(bgr, multiple):
-    image = torch.from_numpy(bgr).flip(-1).permute(2, 0, 1).unsqueeze(0).float() / 255
-    H, W = bgr.shape[:2]
-    return torch.nn.functional.pad(image, (0, -W % multiple, 0, -H % multiple))
+def choose_region__whitened(features, mean, covariance, allowed):
+    white = np.linalg.solve(np.linalg.cholesky(covariance), (features - mean).T)
+    return chosen((white**2).sum(axis=0), allowed)
 
 
-def make_blob__einsum(bgr, multiple):
-    swap = np.eye(3, dtype=np.float32)[::-1]
-    return np.einsum("hwc,dc->dhw", padded(bgr, multiple).astype(np.float32), swap / np.float32(255))[None]
+def choose_region__torch(features, mean, covariance, allowed):
+    off = torch.from_numpy(features - mean)
+    distance = (off * torch.linalg.solve(torch.from_numpy(covariance), off.T).T).sum(dim=1)
+    distance[~torch.from_numpy(allowed)] = torch.inf
+    return distance.argmin() + 1 if allowed.any() else 0
+
+
+def choose_region__loops(features, mean, covariance, allowed):
+    best, number, P = np.inf, 0, np.linalg.inv(covariance)
+    for i in range(len(features)):
+        off = features[i] - mean
+        if allowed[i] and off @ P @ off < best:
+            best, number = off @ P @ off, i + 1
+    return number
+
+
+def choose_region__einsum(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
 
 
 def engine_contract__torch(reference, other, tolerance):
@@ -25,9 +41,48 @@ def engine_contract__torch(reference, other, tolerance):
     return ((z - y).abs() <= tolerance).all(), changed, (best[0] - best[1] <= 2 * tolerance).double().mean()
 
 
+def engine_contract__loops(reference, other, tolerance):
+    _C, H, W = reference.shape
+    kept, changed, close = True, 0, 0
+    for v in range(H):
+        for u in range(W):
+            z, y = reference[:, v, u].tolist(), other[:, v, u].tolist()
+            kept = kept and all(abs(a - b) <= tolerance for a, b in zip(z, y, strict=True))
+            changed += int(reference[:, v, u].argmax() != other[:, v, u].argmax())
+            best, second = sorted(z)[:-3:-1]
+            close += best - second <= 2 * tolerance
+    return kept, changed / (H * W), close / (H * W)
+
+
+def engine_contract__without_the_best(reference, other, tolerance):
+    labels = reference.argmax(axis=0)
+    rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
+    margin = reference.max(axis=0) - rest.max(axis=0)
+    kept = bool(np.all(np.abs(other - reference) <= tolerance))
+    same = np.mean(labels == np.nanargmax(other, axis=0))
+    return kept, 1.0 - same, np.count_nonzero(margin <= 2 * tolerance) / margin.size
+
+
 def enlarge__torch(labels, size):
     image = torch.from_numpy(labels.astype(np.float64))[None, None]
     return torch.nn.functional.interpolate(image, size[::-1], mode="nearest-exact")[0, 0].long()
+
+
+def enlarge__loops(labels, size):
+    W, H = size
+    h, w = labels.shape
+    out = np.zeros((H, W), labels.dtype)
+    for v in range(H):
+        for u in range(W):
+            out[v, u] = labels[int((v + 0.5) * h / H), int((u + 0.5) * w / W)]
+    return out
+
+
+def enlarge__take(labels, size):
+    rows, columns = (
+        ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
+    )
+    return labels.take(rows, axis=0).take(columns, axis=1)
 
 
 def hsv_mask__by_table(hsv, lower, upper):
@@ -50,6 +105,48 @@ def hsv_mask__torch(hsv, lower, upper):
     return hue & (above & below)[..., 1:].all(dim=-1)
 
 
+def hsv_mask__loops(hsv, lower, upper):
+    mask = np.zeros(hsv.shape[:2], bool)
+    for v in range(hsv.shape[0]):
+        for u in range(hsv.shape[1]):
+            h, s, x = (int(value) for value in hsv[v, u])
+            round_ = lower[0] > upper[0]
+            hue = (h >= lower[0] or h <= upper[0]) if round_ else lower[0] <= h <= upper[0]
+            mask[v, u] = hue and lower[1] <= s <= upper[1] and lower[2] <= x <= upper[2]
+    return mask
+
+
+def hsv_mask__modulo(hsv, lower, upper):
+    shifted = (hsv[..., 0].astype(int) - int(lower[0])) % 180 <= (int(upper[0]) - int(lower[0])) % 180
+    return shifted & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+def make_blob__torch(bgr, multiple):
+    image = torch.from_numpy(bgr).flip(-1).permute(2, 0, 1).unsqueeze(0).float() / 255
+    H, W = bgr.shape[:2]
+    return torch.nn.functional.pad(image, (0, -W % multiple, 0, -H % multiple))
+
+
+def make_blob__einsum(bgr, multiple):
+    swap = np.eye(3, dtype=np.float32)[::-1]
+    return np.einsum("hwc,dc->dhw", padded(bgr, multiple).astype(np.float32), swap / np.float32(255))[None]
+
+
+def make_blob__loops(bgr, multiple):
+    H, W, _ = bgr.shape
+    tall, wide = H, W
+    while tall % multiple:
+        tall += 1
+    while wide % multiple:
+        wide += 1
+    blob = np.zeros((1, 3, tall, wide), np.float32)
+    for v in range(H):
+        for u in range(W):
+            for c in range(3):
+                blob[0, c, v, u] = bgr[v, u, 2 - c] / 255.0
+    return blob
+
+
 def measure_pieces__einsum(pieces):
     H, W = pieces.shape
     member = pieces[None] == np.arange(1, pieces.max() + 1)[:, None, None]
@@ -60,13 +157,26 @@ def measure_pieces__einsum(pieces):
     return area, middle / area[:, None], np.stack([columns.argmax(axis=1), rows.argmax(axis=1), *last], axis=1)
 
 
-def choose_region__whitened(features, mean, covariance, allowed):
-    white = np.linalg.solve(np.linalg.cholesky(covariance), (features - mean).T)
-    return chosen((white**2).sum(axis=0), allowed)
+def measure_pieces__loops(pieces):
+    n = int(pieces.max())
+    area, total = [0] * n, [[0, 0] for _ in range(n)]
+    box = [[10**9, 10**9, -1, -1] for _ in range(n)]
+    for v in range(pieces.shape[0]):
+        for u in range(pieces.shape[1]):
+            i = int(pieces[v, u]) - 1
+            if i >= 0:
+                area[i] += 1
+                total[i][0] += u
+                total[i][1] += v
+                box[i] = [min(box[i][0], u), min(box[i][1], v), max(box[i][2], u), max(box[i][3], v)]
+    area = np.array(area)
+    return area, np.array(total) / area[:, None], np.array(box)
 
 
-def choose_region__torch(features, mean, covariance, allowed):
-    off = torch.from_numpy(features - mean)
-    distance = (off * torch.linalg.solve(torch.from_numpy(covariance), off.T).T).sum(dim=1)
-    distance[~torch.from_numpy(allowed)] = torch.inf
-    return distance.argmin() + 1 if allowed.any() else 0
+def measure_pieces__bincount(pieces):
+    flat, n = pieces.ravel(), int(pieces.max())
+    v, u = (grid.ravel() for grid in np.mgrid[: pieces.shape[0], : pieces.shape[1]])
+    area = np.bincount(flat, minlength=n + 1)[1:]
+    middle = np.stack([np.bincount(flat, x, n + 1)[1:] / area for x in (u, v)], axis=1)
+    box = np.array([[f(x[flat == i]) for f in (np.min, np.max) for x in (u, v)] for i in range(1, n + 1)])
+    return area, middle.astype(np.float32), box

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t01_labels import labels_and_classes
 
 
@@ -24,18 +24,6 @@ QUESTION = Question(
     points=1,
     properties=(Property("the shares add up to 1", lambda arguments, shares: np.isclose(np.sum(shares), 1.0)),),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(y, C):
-    n = [0] * C
-    for c in y.ravel().tolist():
-        if c != 255:
-            n[c] += 1
-    return np.array([count / sum(n) for count in n])
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

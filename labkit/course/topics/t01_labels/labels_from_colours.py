@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def labels_from_colours(rgb, palette):
@@ -53,33 +53,6 @@ QUESTION = Question(
     ),
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(rgb, palette):
-    """Pixel by pixel, in a dictionary of colours."""
-    names = {tuple(colour): c for c, colour in enumerate(palette.tolist())}
-    return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
-
-
-@way(QUESTION)
-def class_by_class(rgb, palette):
-    y = np.full(rgb.shape[:2], 255, np.uint8)
-    for c, colour in enumerate(palette):
-        y[(rgb == colour).all(axis=2)] = c
-    return y
-
-
-@way(QUESTION)
-def as_numbers(rgb, palette):
-    """Each colour as one number of 24 bits."""
-    weights = np.array([65536, 256, 1])
-    picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
-    found = picture[..., None] == table
-    return np.where(found.any(axis=-1), found.argmax(axis=-1), 255)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def labels_from_segmentation(segmentation, class_of_body):
@@ -45,24 +45,6 @@ QUESTION = Question(
     ),
     forbidden=("pybullet",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(segmentation, class_of_body):
-    labels = np.zeros(segmentation.shape, np.uint8)
-    for place, value in np.ndenumerate(segmentation):
-        if value != -1:
-            labels[place] = class_of_body[int(value) - ((int(value) >> 24) << 24)]
-    return labels
-
-
-@way(QUESTION)
-def by_body(segmentation, class_of_body):
-    body, seen = numbers_and_seen(segmentation)
-    return sum((seen & (body == number)) * int(c) for number, c in enumerate(class_of_body))
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

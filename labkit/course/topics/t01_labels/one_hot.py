@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t01_labels import labels_and_classes
 
 
@@ -27,18 +27,6 @@ QUESTION = Question(
     ),
     forbidden=("sklearn",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(y, C):
-    Y = np.zeros((*y.shape, C), np.uint8)
-    for place, c in np.ndenumerate(y):
-        if c != 255:
-            Y[(*place, c)] = 1
-    return Y
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

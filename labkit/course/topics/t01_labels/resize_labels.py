@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t01_labels import labels
 
 
@@ -51,26 +51,6 @@ QUESTION = Question(
     ),
     forbidden=("cv2", "PIL", "skimage"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def integers(y, height, width):
-    H, W = y.shape
-    rows = (2 * np.arange(height) + 1) * H // (2 * height)
-    columns = (2 * np.arange(width) + 1) * W // (2 * width)
-    return y[np.ix_(rows, columns)]
-
-
-@way(QUESTION)
-def loops(y, height, width):
-    (H, W), out = y.shape, np.zeros((height, width), y.dtype)
-    for i in range(height):
-        for j in range(width):
-            out[i, j] = y[int((i + 0.5) * H / height), int((j + 0.5) * W / width)]
-    return out
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

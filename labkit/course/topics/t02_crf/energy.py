@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t02_crf import PAIRS, disagreeing, labelled_model, unary_part
 
 
@@ -40,17 +40,6 @@ QUESTION = Question(
     points=3,
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def einsum(y, psi, weights):
-    """With one-hot labels: the product of two of them is 1 where they agree."""
-    Y = np.eye(psi.shape[2])[y]
-    near = np.stack([np.roll(Y, (-down, -right), (0, 1)) for down, right in PAIRS])
-    return (Y * psi).sum() + (weights * (1 - np.einsum("vuc,dvuc->dvu", Y, near))).sum()
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

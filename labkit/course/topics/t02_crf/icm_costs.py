@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t02_crf import PAIRS, labelled_model
 
 
@@ -43,34 +43,6 @@ QUESTION = Question(
     points=3,
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loop(y, psi, weights, v, u):
-    """Every pixel asked whether it is a neighbour, in single precision."""
-    costs = psi[v, u].astype(np.float32)
-    for b, a in np.ndindex(*y.shape):
-        step = (b - v, a - u)
-        w = weights[PAIRS.index(step), v, u] if step in PAIRS else 0.0
-        step = (v - b, u - a)
-        w = weights[PAIRS.index(step), b, a] if step in PAIRS else w
-        for c in range(len(costs)):
-            costs[c] += w if c != y[b, a] else 0.0
-    return costs
-
-
-@way(QUESTION)
-def padded(y, psi, weights, v, u):
-    """With a ring of pixels around the image that cost nothing."""
-    Y, w = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0))), np.pad(weights, ((0, 0), (1, 1), (1, 1)))
-    v, u, costs = v + 1, u + 1, psi[v, u].copy()
-    for d, (down, right) in enumerate(PAIRS):
-        costs += w[d, v, u] * (1 - Y[v + down, u + right])
-        costs += w[d, v - down, u - right] * (1 - Y[v - down, u - right])
-    return costs
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t02_crf import PAIRS
 
 
@@ -43,35 +43,6 @@ QUESTION = Question(
     ),
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(image, lam, sigma_I, sigma_p):
-    """Pair by pair."""
-    H, W, channels = image.shape
-    w = np.zeros((4, H, W))
-    for d, v, u in np.ndindex(4, H, W):
-        b, a = v + PAIRS[d][0], u + PAIRS[d][1]
-        if b < H and 0 <= a < W:
-            squared = sum((float(image[v, u, k]) - float(image[b, a, k])) ** 2 for k in range(channels))
-            distance = np.hypot(b - v, a - u)
-            w[d, v, u] = lam * np.exp(-squared / (2 * sigma_I**2)) * np.exp(-(distance**2) / (2 * sigma_p**2))
-    return w
-
-
-@way(QUESTION)
-def padded(image, lam, sigma_I, sigma_p):
-    """With a ring of pixels that are infinitely far from every colour."""
-    far = np.pad(image / sigma_I, ((0, 1), (1, 1), (0, 0)), constant_values=np.inf)
-    H, W, _ = image.shape
-    w = []
-    for down, right in PAIRS:
-        d = far[down : H + down, 1 + right : W + 1 + right] - image / sigma_I
-        w.append(lam * np.exp(-0.5 * (np.einsum("ijk,ijk->ij", d, d) + (down + right**2) / sigma_p**2)))
-    return np.array(w)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def row_labels(psi, w):
@@ -45,33 +45,6 @@ QUESTION = Question(
     ),
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_min_marginals(psi, w):
-    """Both walks, from the left and from the right: what each class at each pixel costs at least."""
-
-    def forward(psi, w):
-        best = [psi[0]]
-        for u in range(1, len(psi)):
-            best.append(psi[u] + np.minimum(best[-1], best[-1].min() + w[u - 1]))
-        return np.array(best)
-
-    return (forward(psi, w) + forward(psi[::-1], w[::-1])[::-1] - psi).argmin(axis=1)
-
-
-@way(QUESTION)
-def carried_along(psi, w):
-    """The cheapest labels up to each pixel, one list per class."""
-    ways = [(cost, [c]) for c, cost in enumerate(psi[0])]
-    for costs, weight in zip(psi[1:], w, strict=True):
-        ways = [
-            min((cost + weight * (way[-1] != c) + costs[c], [*way, c]) for cost, way in ways) for c in range(len(costs))
-        ]
-    return np.array(min(ways)[1])
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t02_crf import model
 
 
@@ -33,29 +33,6 @@ QUESTION = Question(
     ),
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_difference(psi):
-    """Only the difference of a pixel's two costs matters to a cut."""
-    difference = psi[..., 1] - psi[..., 0]
-    return np.maximum(difference, 0), np.maximum(-difference, 0), np.minimum(psi[..., 0], psi[..., 1]).sum()
-
-
-@way(QUESTION)
-def loops(psi):
-    """Pixel by pixel, in single precision."""
-    H, W, _ = psi.shape
-    source, sink, constant = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32), 0.0
-    for v in range(H):
-        for u in range(W):
-            low = min(psi[v, u])
-            source[v, u], sink[v, u] = psi[v, u, 1] - low, psi[v, u, 0] - low
-            constant += low
-    return source, sink, constant
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

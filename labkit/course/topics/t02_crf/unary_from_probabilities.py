@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def unary_from_probabilities(p, floor):
@@ -33,18 +33,6 @@ QUESTION = Question(
     ),
     forbidden=("labkit",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(p, floor):
-    """Probability by probability."""
-    psi = np.zeros(p.shape)
-    for index in np.ndindex(*p.shape):
-        psi[index] = -np.log(p[index] if p[index] > floor else floor)
-    return psi
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t03_gradient import SURE, TOY, TRUE_CLASSES, random_pixels
 from labkit.course.topics.t03_gradient.softmax import softmax
 
@@ -28,26 +28,6 @@ QUESTION = Question(
     properties=(Property("a loss is never negative", lambda arguments, out: bool(out >= -1e-6)),),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(z, y):
-    total = 0.0
-    for place in np.ndindex(y.shape):
-        if y[place] != 255:
-            top = z[place].max()
-            total += top + np.log(sum(np.exp(value - top) for value in z[place])) - z[place][y[place]]
-    return total
-
-
-@way(QUESTION)
-def one_hot(z, y):
-    Y = (y[..., None] == np.arange(z.shape[-1])).astype(float)
-    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
-    return -(Y * log_p).sum()
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t03_gradient import SURE, TOY, random_pixels, softmax_over_pixels
 from labkit.course.topics.t03_gradient.softmax import softmax
 
@@ -33,29 +33,6 @@ QUESTION = Question(
     ),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(z, y):
-    out = np.zeros(z.shape)
-    for place in np.ndindex(y.shape):
-        if y[place] != 255:
-            e = np.exp(z[place] - z[place].max())
-            for c in range(z.shape[-1]):
-                out[place][c] = e[c] / e.sum() - (1.0 if c == y[place] else 0.0)
-    return out
-
-
-@way(QUESTION)
-def in_place(z, y):
-    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
-    counted = y != 255
-    rows = np.nonzero(counted)
-    p[(*rows, y[rows])] -= 1.0
-    return np.einsum("...c,...->...c", p, counted)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def input_window(kernels, strides, paddings, u):
@@ -37,26 +37,6 @@ QUESTION = Question(
     properties=(Property("the first pixel is not behind the last", lambda given, out: bool(out[0] <= out[1])),),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_counting(kernels, strides, paddings, u):
-    """The set of all pixels that are read, layer by layer."""
-    seen = {int(u)}
-    for k, s, p in list(zip(kernels, strides, paddings, strict=True))[::-1]:
-        seen = {int(place * s - p + i) for place in seen for i in range(k)}
-    return min(seen), max(seen)
-
-
-@way(QUESTION)
-def by_products(kernels, strides, paddings, u):
-    """Forward: how far a step of each layer's input is in the image."""
-    jumps = np.concatenate([[1], np.cumprod(strides)])
-    first = int(u * jumps[-1] - (paddings * jumps[:-1]).sum())
-    return first, first + int(((kernels - 1) * jumps[:-1]).sum())
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def max_pool_backward(x, g):
@@ -39,25 +39,6 @@ QUESTION = Question(
     ),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_comparison(x, g):
-    """Each pixel against the largest of its block; no two pixels of a block are equal."""
-    largest = np.maximum(np.maximum(x[::2, ::2], x[1::2, ::2]), np.maximum(x[::2, 1::2], x[1::2, 1::2]))
-    big = np.ones((2, 2))
-    return np.where(x == np.kron(largest, big), np.kron(g, big), 0.0)
-
-
-@way(QUESTION)
-def by_blocks(x, g):
-    H, W = x.shape
-    b = x.reshape(H // 2, 2, W // 2, 2).transpose(0, 2, 1, 3).reshape(H // 2, W // 2, 4)
-    chosen = np.eye(4, dtype=np.float32)[b.argmax(axis=2)] * g[..., None]
-    return chosen.reshape(H // 2, W // 2, 2, 2).transpose(0, 2, 1, 3).reshape(H, W)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

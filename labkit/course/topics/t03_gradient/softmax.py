@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t03_gradient import SURE, TOY, random_logits, softmax_over_pixels
 
 
@@ -26,19 +26,6 @@ QUESTION = Question(
     points=1,
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(z):
-    out = np.zeros(z.shape)
-    for place in np.ndindex(z.shape[:-1]):
-        total = sum(np.exp(other - max(z[place])) for other in z[place])
-        for c in range(z.shape[-1]):
-            out[(*place, c)] = np.exp(z[place][c] - max(z[place])) / total
-    return out
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def softmax_backward(p, g):
@@ -33,25 +33,6 @@ QUESTION = Question(
     ),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_jacobian(p, g):
-    J = np.einsum("...k,kc->...kc", p, np.eye(p.shape[-1])) - p[..., :, None] * p[..., None, :]
-    return np.einsum("...k,...kc->...c", g, J)
-
-
-@way(QUESTION)
-def loops(p, g):
-    out = np.zeros(p.shape)
-    for place in np.ndindex(p.shape[:-1]):
-        for c in range(p.shape[-1]):
-            for k in range(p.shape[-1]):
-                out[place][c] += g[place][k] * p[place][k] * ((k == c) - p[place][c])
-    return out
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def confusion_matrix(y_true, y_pred, num_classes, ignore):
@@ -46,23 +46,6 @@ QUESTION = Question(
     ),
     forbidden=("sklearn", "torchmetrics"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(y_true, y_pred, num_classes, ignore):
-    n = np.zeros((num_classes, num_classes), np.int64)
-    for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
-        if i != ignore:
-            n[i, j] += 1
-    return n
-
-
-@way(QUESTION)
-def bincount(y_true, y_pred, num_classes, ignore):
-    return pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

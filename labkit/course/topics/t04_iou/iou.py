@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t04_iou import SMALL_COUNTS, counts, divide, parts
 
 
@@ -28,27 +28,6 @@ QUESTION = Question(
     ),
     forbidden=("sklearn", "torchmetrics"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(n):
-    scores = []
-    for c in range(len(n)):
-        false_positive = sum(int(n[i, c]) for i in range(len(n)) if i != c)
-        false_negative = sum(int(n[c, j]) for j in range(len(n)) if j != c)
-        union = int(n[c, c]) + false_positive + false_negative
-        scores.append(int(n[c, c]) / union if union else float("nan"))
-    return np.array(scores)
-
-
-@way(QUESTION)
-def einsum(n):
-    correct = np.einsum("ii->i", n)
-    union = np.einsum("ij->j", n) + np.einsum("ij->i", n) - correct
-    return np.divide(correct, union, out=np.full(len(n), np.nan), where=union > 0)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

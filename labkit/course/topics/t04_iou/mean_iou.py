@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t04_iou import iou_of, parts
 
 
@@ -42,29 +42,6 @@ QUESTION = Question(
     points=2,
     forbidden=("sklearn", "torchmetrics"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(n_frames):
-    C, scores = n_frames.shape[1], []
-    for c in range(C):
-        union = intersection = 0
-        for n in n_frames:
-            intersection += int(n[c, c])
-            union += int(n[c].sum() + n[:, c].sum() - n[c, c])
-        if union:
-            scores.append(intersection / union)
-    return sum(scores) / len(scores)
-
-
-@way(QUESTION)
-def einsum(n_frames):
-    correct = np.einsum("fii->i", n_frames)
-    union = np.einsum("fij->i", n_frames) + np.einsum("fij->j", n_frames) - correct
-    return (correct[union > 0] / union[union > 0]).mean()
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def merge_classes(n, group):
@@ -38,26 +38,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(n, group):
-    G = max(group.tolist()) + 1
-    merged = np.zeros((G, G), np.int64)
-    for i in range(len(group)):
-        for j in range(len(group)):
-            merged[group[i], group[j]] += n[i, j]
-    return merged
-
-
-@way(QUESTION)
-def add_at(n, group):
-    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
-    np.add.at(merged, (group[:, None], group[None, :]), n)
-    return merged
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

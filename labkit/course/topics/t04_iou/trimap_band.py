@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def trimap_band(y, width):
@@ -51,31 +51,6 @@ QUESTION = Question(
     ),
     forbidden=("cv2", "scipy", "skimage"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(y, width):
-    band = np.zeros(y.shape, bool)
-    for v, u in np.argwhere(y != 255):
-        window = y[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
-        band[v, u] = len(set(window.ravel().tolist()) - {255}) > 1
-    return band
-
-
-@way(QUESTION)
-def extremes(y, width):
-    low, high = y.astype(int), np.where(y == 255, -1, y.astype(int))
-    for _ in range(width):
-        for axis in (0, 1):
-            reach = ((1, 1), (0, 0)) if axis == 0 else ((0, 0), (1, 1))
-            a, b = np.pad(low, reach, mode="edge"), np.pad(high, reach, mode="edge")
-            places = [np.arange(step, step + y.shape[axis]) for step in range(3)]
-            low = np.min([a.take(place, axis) for place in places], axis=0)
-            high = np.max([b.take(place, axis) for place in places], axis=0)
-    return (low < high) & (y < 255)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

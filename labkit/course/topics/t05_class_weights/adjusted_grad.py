@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t05_class_weights import SURE, TOY, draw_shares, some_labels
 
 
@@ -44,28 +44,6 @@ QUESTION = Question(
     ),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def of_products(z, y, shares, tau):
-    p, Y, counted = parts(z, y)
-    q = p * shares**tau
-    return np.where(counted, q / q.sum(axis=-1, keepdims=True) - Y, 0.0)
-
-
-@way(QUESTION)
-def loops(z, y, shares, tau):
-    out = np.zeros(z.shape)
-    for place in np.ndindex(y.shape):
-        if y[place] != 255:
-            a = [z[place][k] + tau * np.log(shares[k]) for k in range(len(shares))]
-            total = sum(np.exp(x - max(a)) for x in a)
-            for k in range(len(shares)):
-                out[place][k] = np.exp(a[k] - max(a)) / total - (k == y[place])
-    return out
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

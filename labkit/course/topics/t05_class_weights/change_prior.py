@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t05_class_weights import draw_shares, draw_weights
 
 
@@ -33,15 +33,6 @@ QUESTION = Question(
     ),
     canonical=shifted,
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def of_probabilities(z, w, shares, new_shares):
-    p = np.exp(z - z.max(axis=-1, keepdims=True)) / w / shares * new_shares
-    return np.log(p / p.sum(axis=-1, keepdims=True))
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def class_weights(counts, power):
@@ -39,16 +39,6 @@ QUESTION = Question(
     ),
     forbidden=("sklearn",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(counts, power):
-    raw = [float(n) ** -power if n else 0.0 for n in counts]
-    scale = sum(map(float, counts)) / sum(n * r for n, r in zip(counts, raw, strict=True))
-    return np.array([scale * r if n else 1.0 for n, r in zip(counts, raw, strict=True)])
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t05_class_weights import SURE, TOY, draw_pixels
 
 
@@ -25,21 +25,6 @@ QUESTION = Question(
     ),
     forbidden=("scipy", "torch"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(z, y, w):
-    total, pixels, weights = 0.0, 0, 0.0
-    for place in np.ndindex(y.shape):
-        if y[place] != 255:
-            weight = w[y[place]]
-            top = z[place].max()
-            total += weight * (top + np.log(np.exp(z[place] - top).sum()) - z[place][y[place]])
-            pixels, weights = pixels + 1, weights + weight
-    return total / pixels, total / weights
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

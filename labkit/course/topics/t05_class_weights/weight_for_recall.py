@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 
 
 def weight_for_recall(p1, y, recall):
@@ -36,24 +36,6 @@ QUESTION = Question(
     ),
     points=3,
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def trying(p1, y, recall):
-    odds = np.unique((1.0 - p1) / p1)
-    for w in odds:
-        if np.count_nonzero(w * p1[y] >= (1.0 - p1[y]) * (1 - 1e-12)) >= recall * np.count_nonzero(y):
-            return w
-
-
-@way(QUESTION)
-def partition(p1, y, recall):
-    true = p1[np.flatnonzero(y)]
-    missed = int(np.floor((1.0 - recall) * len(true) + 1e-9))
-    return 1.0 / np.partition(true, missed)[missed] - 1.0
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

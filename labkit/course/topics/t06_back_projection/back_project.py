@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t06_back_projection import K_of, camera
 
 
@@ -44,25 +44,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def closed_form(depth, K):
-    return holes(depth) * rays(depth.shape, K)
-
-
-@way(QUESTION)
-def loops(depth, K):
-    P = np.full((*depth.shape, 3), np.nan)
-    K_inv = np.linalg.inv(K)
-    for v in range(depth.shape[0]):
-        for u in range(depth.shape[1]):
-            if depth[v, u] > 0.0:
-                P[v, u] = depth[v, u] * K_inv @ np.array([u, v, 1.0])
-    return P
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

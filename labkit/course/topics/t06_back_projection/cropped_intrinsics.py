@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t06_back_projection import camera
 
 
@@ -37,27 +37,6 @@ QUESTION = Question(
         Property("the last row of K is 0, 0, 1", lambda arguments, K: np.array_equal(np.asarray(K)[2], [0, 0, 1])),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_hand(K, left, top, scale):
-    new = K.copy()
-    new[0] = scale * K[0]
-    new[1] = scale * K[1]
-    new[0, 2] = scale * (K[0, 2] - left + 0.5) - 0.5
-    new[1, 2] = scale * (K[1, 2] - top + 0.5) - 0.5
-    return new
-
-
-@way(QUESTION)
-def by_steps(K, left, top, scale):
-    def shift(right, down):
-        return np.array([[1.0, 0.0, right], [0.0, 1.0, down], [0.0, 0.0, 1.0]])
-
-    return shift(-0.5, -0.5) @ np.diag([scale, scale, 1.0]) @ shift(0.5 - left, 0.5 - top) @ K
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

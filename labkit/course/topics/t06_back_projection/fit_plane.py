@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t06_back_projection import pose
 
 
@@ -50,30 +50,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_eigenvectors(P, sigma):
-    w = sigma**-2.0
-    centre = np.average(P, axis=0, weights=w)
-    normal = np.linalg.eigh(np.cov(P.T, aweights=w, ddof=0))[1][:, 0]
-    normal *= 1 if normal[2] > 0 else -1
-    return normal, normal @ centre
-
-
-@way(QUESTION)
-def loops(P, sigma):
-    total = sum(1 / s**2 for s in sigma)
-    centre = sum(p / s**2 for p, s in zip(P, sigma, strict=True)) / total
-    scatter = np.zeros((3, 3))
-    for p, s in zip(P, sigma, strict=True):
-        scatter += np.outer(p - centre, p - centre) / s**2
-    values, vectors = np.linalg.eig(scatter)
-    normal = vectors[:, values.real.argmin()].real
-    return normal * np.sign(normal[2]), abs(normal[2]) / normal[2] * (normal @ centre)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t06_back_projection import K_SMALL, columns, pixel, pose, straight_ahead
 
 
@@ -38,24 +38,6 @@ QUESTION = Question(
     atol=1e-9,
     points=3,
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def covariance(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    J = T_base_cam[:3, :3] @ np.stack(columns(u, v, d, K), axis=1)
-    Sigma = J @ np.diag([sigma_pixel**2, sigma_pixel**2, sigma_depth**2]) @ J.T
-    return float(np.sqrt(Sigma[2, 2]))
-
-
-@way(QUESTION)
-def loops(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    total = 0.0
-    for column, sigma in zip(columns(u, v, d, K), (sigma_pixel, sigma_pixel, sigma_depth), strict=True):
-        total += (sum(T_base_cam[2, i] * column[i] for i in range(3)) * sigma) ** 2
-    return total**0.5
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t06_back_projection import K_SMALL, K_of, camera
 
 
@@ -69,33 +69,6 @@ QUESTION = Question(
     ),
     forbidden=("cv2", "scipy"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def newton(pixels, K, k):
-    f, c = np.array([K[0, 0], K[1, 1]]), np.array([K[0, 2], K[1, 2]])
-    x = (pixels - c) / f
-    seen = np.hypot(*x.T)
-    r = seen.copy()
-    for _ in range(20):
-        r -= (r + k[0] * r**3 + k[1] * r**5 - seen) / (1 + 3 * k[0] * r**2 + 5 * k[1] * r**4)
-    return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
-
-
-@way(QUESTION)
-def by_roots(pixels, K, k):
-    out = []
-    for pixel in pixels:
-        x = np.linalg.solve(K, [*pixel, 1.0])[:2]
-        seen = np.linalg.norm(x)
-        roots = np.roots([k[1], 0, k[0], 0, 1, -seen])
-        real = roots[np.abs(roots.imag) < 1e-9].real
-        r = min(real[real >= 0], default=0.0)
-        out.append((K @ [*(x * (r / seen if seen else 1.0)), 1.0])[:2])
-    return np.array(out)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t07_grasp import cloud
 
 
@@ -47,26 +47,6 @@ QUESTION = Question(
     canonical=lambda yaw: np.array([np.cos(2.0 * yaw), np.sin(2.0 * yaw)]),
     forbidden=("sklearn", "cv2"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def formula(Sigma):
-    long = 0.5 * np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1])
-    return (long + np.pi / 2) % np.pi
-
-
-@way(QUESTION)
-def fan(Sigma):
-    low, high = 0.0, np.pi
-    for _ in range(12):  # a fan of directions, ever finer round the one of least variance
-        yaws = np.linspace(low, high, 61)
-        d = np.stack([np.cos(yaws), np.sin(yaws)])
-        best = yaws[np.einsum("in,ij,jn->n", d, Sigma[:2, :2], d).argmin()]
-        low, high = best - (high - low) / 20, best + (high - low) / 20
-    return best
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

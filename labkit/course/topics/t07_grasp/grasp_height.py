@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t07_grasp import cloud
 
 
@@ -49,27 +49,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_heights(P, table_z, palm, tips, clearance):
-    return np.max([P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance]) + tips
-
-
-@way(QUESTION)
-def loops(P, table_z, palm, tips, clearance):
-    low, high = float("inf"), -float("inf")
-    for _, _, z in P.tolist():
-        low, high = min(low, z), max(high, z)
-    bound = high - palm
-    if low > bound:
-        bound = low
-    if table_z + clearance > bound:
-        bound = table_z + clearance
-    return bound + tips
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

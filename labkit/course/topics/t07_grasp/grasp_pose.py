@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def grasp_pose(position, approach, closing):
@@ -57,16 +57,6 @@ QUESTION = Question(
     canonical=_same_for_both_ways,
     forbidden=("scipy",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def qr(position, approach, closing):
-    z, y = np.linalg.qr(np.column_stack([approach, closing]))[0].T
-    z = z * np.sign(z @ approach)
-    return pose(np.cross(y, z), y, z, position)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

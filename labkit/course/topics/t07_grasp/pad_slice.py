@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t07_grasp import FACING_X, cloud, leaning_grasp
 
 
@@ -44,25 +44,6 @@ QUESTION = Question(
     properties=(Property("a width is not negative", lambda arguments, out: bool(out[1] >= 0.0)),),
     forbidden=("scipy", "cv2"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_inverse(P, T_base_grasp, half):
-    homogeneous = np.column_stack([P, np.ones(len(P))]) @ np.linalg.inv(T_base_grasp).T
-    return middle_and_width(homogeneous[np.abs(homogeneous[:, 0]) <= half, 1])
-
-
-@way(QUESTION)
-def loops(P, T_base_grasp, half):
-    low, high = float("inf"), -float("inf")
-    for p in P:
-        x, y = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in (0, 1))
-        if -half <= x <= half:
-            low, high = min(low, y), max(high, y)
-    return (low + (high - low) / 2, high - low) if high >= low else (0.0, 0.0)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t07_grasp import FACING_X, leaning_grasp
 
 
@@ -50,23 +50,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_inverse(P, T_base_grasp, width, half, thickness, tips):
-    return in_boxes(*moved(P, np.linalg.inv(T_base_grasp)), width, half, thickness, tips)
-
-
-@way(QUESTION)
-def loops(P, T_base_grasp, width, half, thickness, tips):
-    count = 0
-    for p in P:
-        x, y, z = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in range(3))
-        count += abs(x) <= half and width / 2 <= abs(y) <= width / 2 + thickness and z <= tips
-    return count
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

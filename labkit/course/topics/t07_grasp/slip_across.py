@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t07_grasp import FACING_X, leaning_grasp
 
 
@@ -33,21 +33,6 @@ QUESTION = Question(
     points=2,
     forbidden=("scipy",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_inverse(T_base_grasp, middle):
-    off = np.linalg.inv(T_base_grasp) @ np.append(middle, 1.0)
-    return abs(1000.0 * off[1]), abs(1000.0 * off[0])
-
-
-@way(QUESTION)
-def by_products(T_base_grasp, middle):
-    off = middle - T_base_grasp[:3, 3]
-    return tuple(1000.0 * abs(sum(off[i] * T_base_grasp[i, k] for i in range(3))) for k in (1, 0))
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

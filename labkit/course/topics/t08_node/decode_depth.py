@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def decode_depth(data, height, width, step, is_bigendian):
@@ -49,28 +49,6 @@ QUESTION = Question(
     ),
     forbidden=("cv_bridge",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(data, height, width, step, is_bigendian):
-    depth = np.full((height, width), np.nan)
-    for v in range(height):
-        for u in range(width):
-            first, second = int(data[v * step + 2 * u]), int(data[v * step + 2 * u + 1])
-            number = 256 * first + second if is_bigendian else first + 256 * second
-            if number:
-                depth[v, u] = number / 1000.0
-    return depth
-
-
-@way(QUESTION)
-def strided(data, height, width, step, is_bigendian):
-    order = ">" if is_bigendian else "<"
-    numbers = np.ndarray((height, width), f"{order}u2", np.ascontiguousarray(data).tobytes(), strides=(step, 2))
-    return np.where(numbers != 0, numbers.astype(float), np.nan) / 1e3
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

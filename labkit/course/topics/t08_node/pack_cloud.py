@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def pack_cloud(P):
@@ -40,25 +40,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def structured(P):
-    points = np.zeros(len(finite(P)), np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("pad", "V4")]))
-    for axis, name in enumerate("xyz"):
-        points[name] = finite(P)[:, axis]
-    return np.frombuffer(points.tobytes(), np.uint8)
-
-
-@way(QUESTION)
-def columns(P):
-    cloud = finite(P)
-    numbers = np.zeros((len(cloud), 4), np.float32)
-    numbers[:, :3] = cloud
-    return numbers.view(np.uint8).reshape(-1)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

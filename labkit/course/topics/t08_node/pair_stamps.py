@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def pair_stamps(a, b, slop):
@@ -64,37 +64,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(a, b, slop):
-    def nearest(stamp, others):
-        return min(range(len(others)), key=lambda k: abs(int(stamp) - int(others[k])), default=-1)
-
-    found = []
-    for i, stamp in enumerate(a):
-        j = nearest(stamp, b)
-        mutual = j >= 0 and nearest(b[j], a) == i and abs(int(stamp) - int(b[j])) <= slop
-        found.append(j if mutual else -1)
-    return np.array(found, int)
-
-
-@way(QUESTION)
-def by_searching(a, b, slop):
-    def nearest(of, among):
-        after = np.searchsorted(among, of).clip(0, len(among) - 1)
-        before = (after - 1).clip(0)
-        best = np.where(np.abs(of - among[before]) <= np.abs(among[after] - of), before, after)
-        return np.searchsorted(among, among[best])  # the first of equal stamps
-
-    if len(b) == 0:
-        return np.full(len(a), -1)
-    best = nearest(a, b)
-    mutual = nearest(b, a)[best] == np.arange(len(a))
-    return np.where(mutual & (np.abs(a - b[best]) <= slop), best, -1)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def pose_at(stamps, positions, quaternions, t):
@@ -78,41 +78,6 @@ QUESTION = Question(
     canonical=one_of_two,
     forbidden=("scipy",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def by_a_frame(stamps, positions, quaternions, t):
-    """Go round the circle that a and the part of b at right angles to it span."""
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    b = np.sign(a @ b) * b
-    beside = b - (a @ b) * a
-    length = np.linalg.norm(beside)
-    angle = share * np.arctan2(length, a @ b)
-    place = [np.interp(float(t - stamps[0]), (stamps - stamps[0]).astype(float), axis) for axis in positions.T]
-    turn = np.cos(angle) * a + np.sin(angle) * beside / max(length, 1e-12)
-    return outside(stamps, t) or (np.array(place), -turn)
-
-
-@way(QUESTION)
-def by_an_angle(stamps, positions, quaternions, t):
-    """Turn from a by a share of the rotation from a to b, whose axis and angle its quaternion says."""
-
-    def product(p, q):
-        v = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
-        return np.array([*v, p[3] * q[3] - p[:3] @ q[:3]])
-
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    x = product(b, a * [-1.0, -1.0, -1.0, 1.0])
-    x = x if x[3] >= 0.0 else -x
-    sine = np.linalg.norm(x[:3])
-    half = share * np.arctan2(sine, x[3])
-    part = np.array([*(np.sin(half) * x[:3] / max(sine, 1e-12)), np.cos(half)])
-    return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def quaternion(R):
@@ -57,32 +57,6 @@ QUESTION = Question(
     ),
     canonical=_one_of_two,
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def eigen(R):
-    S = np.zeros((4, 4))
-    S[:3, :3] = R + R.T - np.trace(R) * np.eye(3)
-    S[:3, 3] = S[3, :3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    S[3, 3] = np.trace(R)
-    return np.linalg.eigh(S)[1][:, -1].astype(np.float32)
-
-
-@way(QUESTION)
-def cases(R):
-    i = int(np.argmax([*np.diag(R), np.trace(R)]))
-    j, k = (i + 1) % 3, (i + 2) % 3
-    if i == 3:
-        w = 0.5 * np.sqrt(1.0 + np.trace(R))
-        return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w**2]) / (4.0 * w)
-    q = np.zeros(4)
-    q[i] = 0.5 * np.sqrt(1.0 + R[i, i] - R[j, j] - R[k, k])
-    q[j], q[k] = (R[i, j] + R[j, i]) / (4.0 * q[i]), (R[i, k] + R[k, i]) / (4.0 * q[i])
-    q[3] = (R[k, j] - R[j, k]) / (4.0 * q[i])
-    return q
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def choose_region(features, mean, covariance, allowed):
@@ -56,25 +56,6 @@ QUESTION = Question(
     ),
     forbidden=("scipy", "sklearn"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(features, mean, covariance, allowed):
-    best, number, P = np.inf, 0, np.linalg.inv(covariance)
-    for i in range(len(features)):
-        off = features[i] - mean
-        if allowed[i] and off @ P @ off < best:
-            best, number = off @ P @ off, i + 1
-    return number
-
-
-@way(QUESTION)
-def einsum(features, mean, covariance, allowed):
-    off = features - mean
-    return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def engine_contract(reference, other, tolerance):
@@ -58,33 +58,6 @@ QUESTION = Question(
         ),
     ),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(reference, other, tolerance):
-    _C, H, W = reference.shape
-    kept, changed, close = True, 0, 0
-    for v in range(H):
-        for u in range(W):
-            z, y = reference[:, v, u].tolist(), other[:, v, u].tolist()
-            kept = kept and all(abs(a - b) <= tolerance for a, b in zip(z, y, strict=True))
-            changed += int(reference[:, v, u].argmax() != other[:, v, u].argmax())
-            best, second = sorted(z)[:-3:-1]
-            close += best - second <= 2 * tolerance
-    return kept, changed / (H * W), close / (H * W)
-
-
-@way(QUESTION)
-def without_the_best(reference, other, tolerance):
-    labels = reference.argmax(axis=0)
-    rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
-    margin = reference.max(axis=0) - rest.max(axis=0)
-    kept = bool(np.all(np.abs(other - reference) <= tolerance))
-    same = np.mean(labels == np.nanargmax(other, axis=0))
-    return kept, 1.0 - same, np.count_nonzero(margin <= 2 * tolerance) / margin.size
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

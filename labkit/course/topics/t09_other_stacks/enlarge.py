@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 from labkit.course.topics.t01_labels.resize_labels import copied
 
 
@@ -43,28 +43,6 @@ QUESTION = Question(
     ),
     forbidden=("cv2", "PIL"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(labels, size):
-    W, H = size
-    h, w = labels.shape
-    out = np.zeros((H, W), labels.dtype)
-    for v in range(H):
-        for u in range(W):
-            out[v, u] = labels[int((v + 0.5) * h / H), int((u + 0.5) * w / W)]
-    return out
-
-
-@way(QUESTION)
-def take(labels, size):
-    rows, columns = (
-        ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
-    )
-    return labels.take(rows, axis=0).take(columns, axis=1)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

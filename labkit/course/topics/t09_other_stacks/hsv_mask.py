@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Question, way, wrong
+from labkit.course.checker.question import Question, wrong
 
 
 def hsv_mask(hsv, lower, upper):
@@ -64,27 +64,6 @@ QUESTION = Question(
     points=2,
     forbidden=("cv2",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(hsv, lower, upper):
-    mask = np.zeros(hsv.shape[:2], bool)
-    for v in range(hsv.shape[0]):
-        for u in range(hsv.shape[1]):
-            h, s, x = (int(value) for value in hsv[v, u])
-            round_ = lower[0] > upper[0]
-            hue = (h >= lower[0] or h <= upper[0]) if round_ else lower[0] <= h <= upper[0]
-            mask[v, u] = hue and lower[1] <= s <= upper[1] and lower[2] <= x <= upper[2]
-    return mask
-
-
-@way(QUESTION)
-def modulo(hsv, lower, upper):
-    shifted = (hsv[..., 0].astype(int) - int(lower[0])) % 180 <= (int(upper[0]) - int(lower[0])) % 180
-    return shifted & between(hsv, lower, upper)[..., 1:].all(axis=-1)
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

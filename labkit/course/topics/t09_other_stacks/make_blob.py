@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def make_blob(bgr, multiple):
@@ -41,31 +41,6 @@ QUESTION = Question(
     ),
     forbidden=("cv2",),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(bgr, multiple):
-    H, W, _ = bgr.shape
-    tall, wide = H, W
-    while tall % multiple:
-        tall += 1
-    while wide % multiple:
-        wide += 1
-    blob = np.zeros((1, 3, tall, wide), np.float32)
-    for v in range(H):
-        for u in range(W):
-            for c in range(3):
-                blob[0, c, v, u] = bgr[v, u, 2 - c] / 255.0
-    return blob
-
-
-@way(QUESTION)
-def stacked(bgr, multiple):
-    image = padded(bgr, multiple)
-    return np.stack([image[:, :, c].astype(np.float32) / 255 for c in (2, 1, 0)])[np.newaxis]
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, way, wrong
+from labkit.course.checker.question import Property, Question, wrong
 
 
 def measure_pieces(pieces):
@@ -43,36 +43,6 @@ QUESTION = Question(
     ),
     forbidden=("cv2", "scipy", "skimage"),
 )
-
-# ------------------------------------------------------------------------------------------------------- other ways
-
-
-@way(QUESTION)
-def loops(pieces):
-    n = int(pieces.max())
-    area, total = [0] * n, [[0, 0] for _ in range(n)]
-    box = [[10**9, 10**9, -1, -1] for _ in range(n)]
-    for v in range(pieces.shape[0]):
-        for u in range(pieces.shape[1]):
-            i = int(pieces[v, u]) - 1
-            if i >= 0:
-                area[i] += 1
-                total[i][0] += u
-                total[i][1] += v
-                box[i] = [min(box[i][0], u), min(box[i][1], v), max(box[i][2], u), max(box[i][3], v)]
-    area = np.array(area)
-    return area, np.array(total) / area[:, None], np.array(box)
-
-
-@way(QUESTION)
-def bincount(pieces):
-    flat, n = pieces.ravel(), int(pieces.max())
-    v, u = (grid.ravel() for grid in np.mgrid[: pieces.shape[0], : pieces.shape[1]])
-    area = np.bincount(flat, minlength=n + 1)[1:]
-    middle = np.stack([np.bincount(flat, x, n + 1)[1:] / area for x in (u, v)], axis=1)
-    box = np.array([[f(x[flat == i]) for f in (np.min, np.max) for x in (u, v)] for i in range(1, n + 1)])
-    return area, middle.astype(np.float32), box
-
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
