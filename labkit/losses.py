@@ -153,6 +153,9 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
     return (losses.sum(dtype=torch.float64) / counted.sum().clamp(min=1)).to(logits.dtype)
 
 
+segmentation_loss.sums_over_pixels = True  # but for the division: so ranks can share a batch, see `train`
+
+
 def _check_logits(z) -> np.ndarray:
     z = check_finite("z", z)
     require("z", z.ndim >= 1 and z.shape[-1] >= 1, "logits (..., C) of at least one class", f"shape {z.shape}")

@@ -32,7 +32,7 @@ def own_files(tmp_path_factory):
 
 
 def test_every_section_has_its_twenty_lines():
-    assert list(BLOCKS) == [f"A {thing} of your own" for thing in ("scene", "frame", "model", "gripper")] + [
+    assert list(BLOCKS) == [f"A {thing} of your own" for thing in ("scene", "frame", "model", "gripper", "loss")] + [
         "Data of your own"
     ]
     assert all(sum(bool(line.strip()) for line in code.splitlines()) <= 24 for code in BLOCKS.values())
@@ -48,6 +48,7 @@ def test_every_section_has_its_twenty_lines():
         ),
         ("A model of your own", r"\(240, 320, 2\) \[0 1\]\nPerception\(.*\n\(240, 320, 21\) .*\nPerception\("),
         ("A gripper of your own", r"GraspPlan\(no grasp: too wide .*\nGraspPlan\(10 grasps, the best Grasp\("),
+        ("A loss of your own", r"\{'epoch': 2, 'steps': 4, 'loss': 0\.\d+, 'mean_iou': 0\.\d+, .*\}"),
         ("Data of your own", r"\{.*'loss': .*\}\n\[.*\]\nPerception\("),
     ],
 )

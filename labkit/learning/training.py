@@ -12,8 +12,8 @@ import math
 import re
 import signal
 import threading
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -171,8 +171,15 @@ def fresh_model(config: TrainConfig) -> nn.Module:
 class Trainer:
     """One run: model, optimiser and position; `step` makes one step, `state` and `restore` save and load all of it."""
 
-    def __init__(self, data: ImagesInMemory, config: TrainConfig, device: torch.device, model: nn.Module | None = None):
-        self.data, self.config, self.device = data, config, device
+    def __init__(
+        self,
+        data: ImagesInMemory,
+        config: TrainConfig,
+        device: torch.device,
+        model: nn.Module | None = None,
+        loss: Callable = segmentation_loss,
+    ):
+        self.data, self.config, self.device, self.loss = data, config, device, loss
         self.batches = math.ceil(len(data) / config.batch)  # in an epoch
         self.total = config.steps if config.steps is not None else config.epochs * self.batches
         model = fresh_model(config) if model is None else model
@@ -237,7 +244,7 @@ class Trainer:
             logits = logits_of(self.call(*(array.to(self.device) for array in arrays)))
         counted = (y != IGNORE).sum()
         share = counted / ranks.total(counted).clamp(min=1)  # of the batch's pixels
-        loss = segmentation_loss(logits, y.to(self.device), self.weights) * share
+        loss = self.loss(logits, y.to(self.device), self.weights) * share
         self.optimiser.zero_grad(set_to_none=True)
         (loss * ranks.place()[1]).backward()  # gradients are means over ranks, and the loss is their sum
         nn.utils.clip_grad_norm_(self.model.parameters(), 5.0)  # one odd batch must not undo an hour
@@ -255,13 +262,21 @@ class Trainer:
             "losses": self.losses,
             "history": self.history,
             "config": asdict(self.config),
-            "images": len(self.data),
+            **self.what(),
         }
 
+    def what(self) -> dict:
+        """What makes another run of the same configuration: how many images there are, and the loss's name."""
+        return {"images": len(self.data), "loss": name_of(self.loss)}
+
     def restore(self, state: dict, source) -> None:
-        """Go on from a `state`; raises ValueError naming `config` if it is of another run."""
-        ours, theirs = asdict(self.config) | {"images": len(self.data)}, dict(state.get("config", {}))
-        theirs["images"] = state.get("images")
+        """Go on from a `state`; raises ValueError naming `config` if it is of another run.
+
+        What a state does not name was no choice yet when it was written, and had what is now its default.
+        """
+        ours = asdict(self.config) | self.what()
+        defaults = {field.name: field.default for field in fields(TrainConfig)} | {"loss": name_of(segmentation_loss)}
+        theirs = defaults | state.get("config", {}) | {key: state[key] for key in self.what() if key in state}
         differ = sorted(key for key in ours if theirs.get(key) != ours[key])
         if differ:
             raise ValueError(
@@ -302,31 +317,50 @@ def train(
     progress: bool = True,
     model: nn.Module | None = None,
     memory_gb: float | None = None,
+    loss: Callable = segmentation_loss,
 ) -> list[dict]:
     """Train a network and return its history: one dict per epoch (epoch, steps, loss, and mean_iou and iou by class).
 
     train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. model: a network
     of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. memory_gb: beyond so many
-    gigabytes, decoded images are kept in a file in `out`, not in memory; None is half of the machine's memory. In the
+    gigabytes, decoded images are kept in a file in `out`, not in memory; None is half of the machine's memory. loss: a
+    function of logits (N, C, H, W), labels (N, H, W) and class weights (C,) to a scalar, as `segmentation_loss` is; its
+    attribute `sums_over_pixels` tells that the scalar is a sum over pixels, divided by how many are counted. In the
     folder `out` are written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json;
     NAME.checkpoint.pt, from which `resume` goes on. The checkpoint is written at Ctrl-C, too, which then raises
     KeyboardInterrupt and says where it is. On one machine, with as many threads, a resumed run ends with the very
     weights of an undisturbed one. Under torchrun, each process makes its part of every batch; the first one writes.
-    Raises ValueError for data that do not fit, or a checkpoint of another configuration. Topics 03 and 05.
+    Raises ValueError for data that do not fit, a checkpoint of another configuration, or a loss that is not a sum over
+    pixels where one is needed: under torchrun, and to take class weights out again. Topics 03 and 05.
     """
     out, where, progress = Path(out), choose_device(device), progress and ranks.leads()
     model = fresh_model(config) if model is None else model
     with ranks.joined(where):
+        check_loss(loss, config, validated=val_set is not None)
         how = {"progress": progress, "depth": "geometry" in TorchEngine(model).takes.arrays, "memory_gb": memory_gb}
         train_data = kept(train_set, config.num_classes, "train_set", out, **how)
         val_data = None if val_set is None else kept(val_set, config.num_classes, "val_set", out, **how)
         checkpoint = out / f"{config.model}.checkpoint.pt"
-        trainer = Trainer(train_data, config, where, model)
+        trainer = Trainer(train_data, config, where, model, loss)
         if resume and checkpoint.is_file():
             trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
         trainer.check_together()
         run(trainer, val_data, checkpoint, progress)
         return trainer.history
+
+
+def name_of(loss: Callable) -> str:
+    """The name of a loss: a function's own, or its class's."""
+    return getattr(loss, "__name__", type(loss).__name__)
+
+
+def check_loss(loss: Callable, config: TrainConfig, validated: bool) -> None:
+    """Raise ValueError if a loss that is not a sum over pixels meets what only a sum allows."""
+    if not getattr(loss, "sums_over_pixels", False):
+        expected = "one process, or a sum over pixels (sums_over_pixels = True), whose parts ranks can add up"
+        require("loss", ranks.place()[1] == 1, expected, name_of(loss))
+        expected = f"'none', since validation takes them out again, from sums over pixels alone, not {name_of(loss)}"
+        require("weights", config.weights == "none" or not validated, expected, repr(config.weights))
 
 
 def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, progress: bool) -> None:

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 import torch
-from learning.test_training import CONFIG, batch, frames, scenes
+from learning.test_training import CONFIG, batch, focal, frames, scenes
 
 import data_gen
 from labkit.learning import training
 from labkit.learning.augment import augment
+from labkit.losses import segmentation_loss
 
 ROOT = Path(__file__).parents[2]
 # As each rank has: sums of two threads are rounded otherwise, and Adam's first steps magnify that.
@@ -27,8 +28,9 @@ def small_run(model: str, out: Path, epochs: int = 2, memory_gb: float | None = 
     """Five images in batches of four: the second batch of an epoch has one image for two ranks. In float32."""
     training.bf16_is_native = lambda device: False
     data = (frames if model == "unet_rgbd" else scenes)(5, 32, 48)
+    loss = focal if model == "smallsegnet" else segmentation_loss
     config = replace(CONFIG, model=model, epochs=epochs, batch=4, crop=None, lr=1e-3)
-    return training.train(data, data[:3], config, out, device="cpu", memory_gb=memory_gb)
+    return training.train(data, data[:3], config, out, device="cpu", memory_gb=memory_gb, loss=loss)
 
 
 def environment() -> dict[str, str]:
@@ -42,7 +44,7 @@ def by_two(*words: str, check: bool = True) -> subprocess.CompletedProcess:
 
 @pytest.mark.parametrize(("model", "memory_gb"), [("smallsegnet", 1.0), ("unet", 0.0), ("unet_rgbd", 0.0)])
 def test_two_ranks_go_through_the_losses_of_one_process(model, memory_gb, tmp_path, monkeypatch):
-    """Also with batch normalisation, a rank without an image, class weights, and a file of images that they share."""
+    """Also with batch normalisation, a rank without an image, class weights, a shared file of images, another loss."""
     monkeypatch.setattr(training, "bf16_is_native", None)
     alone = small_run(model, tmp_path / "alone")
     by_two(__file__, model, str(tmp_path / "two"), "2", str(memory_gb))

@@ -13,6 +13,7 @@ from torch import nn
 
 import data_gen
 from labkit.frame import RGBDFrame
+from labkit.learning import ranks
 from labkit.learning.augment import (
     Draws,
     augment,
@@ -284,6 +285,64 @@ def test_the_loss_of_a_step_is_the_weighted_loss_of_its_batch():
     model.load_state_dict(trainer.model.state_dict())
     weights = class_weights(data.class_counts(4), "inverse")
     assert trainer.step() == pytest.approx(float(segmentation_loss(model(x), y, weights).detach()), rel=2e-2)
+
+
+def focal(logits, labels, weights):
+    """A sum over pixels that is not the kit's: pixels that are right already count less."""
+    counted = labels != 255
+    p = logits.float().softmax(dim=1).movedim(1, -1)[counted]
+    p = p.gather(1, labels[counted].long()[:, None])[:, 0]
+    return (-weights[labels[counted].long()] * (1 - p) ** 2 * p.log()).sum() / counted.sum().clamp(min=1)
+
+
+def soft_iou(logits, labels, weights):
+    """A ratio of sums over the whole batch, which is not a sum over pixels."""
+    counted = labels != 255
+    p = logits.float().softmax(dim=1).movedim(1, -1)[counted]
+    hit = p.gather(1, labels[counted].long()[:, None]).sum()
+    return 1 - hit / (2 * len(p) - hit)
+
+
+focal.sums_over_pixels = True
+
+
+@pytest.mark.parametrize("loss", [focal, soft_iou])
+def test_a_loss_of_ones_own_is_what_a_run_lowers_and_its_checkpoint_names_it(loss, tmp_path):
+    config = replace(CONFIG, epochs=20, lr=2e-2, augment=False, weights="sqrt" if loss is focal else "none")
+    data = scenes(6)
+    history = train(data, data[:2], config, tmp_path, progress=False, loss=loss)
+    assert history[-1]["loss"] < 0.99 * history[0]["loss"]
+    data = ImagesInMemory(data, progress=False)
+    trainer = Trainer(data, config, torch.device("cpu"), loss=loss)
+    (x,), y = trainer.batch_of_step(0)
+    model = SmallSegNet()
+    model.load_state_dict(trainer.model.state_dict())
+    weights = torch.from_numpy(class_weights(data.class_counts(4), config.weights)).float()
+    assert trainer.step() == pytest.approx(float(loss(model(x), y, weights).detach()), rel=2e-2)
+    with pytest.raises(ValueError, match=rf"config: .* differs in loss: expected \['{loss.__name__}'\]"):
+        train(data, None, config, tmp_path, progress=False)
+
+
+def test_what_only_a_sum_over_pixels_allows_is_refused_to_others(tmp_path, monkeypatch):
+    with pytest.raises(ValueError, match=r"weights: expected 'none', since .* not soft_iou, got 'sqrt'"):
+        train(scenes(2), scenes(1), CONFIG, tmp_path, progress=False, loss=soft_iou)
+    monkeypatch.setattr(ranks, "place", lambda: (0, 2))
+    with pytest.raises(ValueError, match=r"loss: expected one process, or a sum over pixels .*, got soft_iou"):
+        train(scenes(2), None, CONFIG, tmp_path, progress=False, loss=soft_iou)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_checkpoint_from_before_a_setting_goes_on_with_its_default(tmp_path):
+    """Its run had no other: a step of learning rate less, and no loss but the kit's."""
+    config, data = replace(CONFIG, epochs=1), scenes(2)
+    history = train(data, None, config, tmp_path, progress=False)
+    path = tmp_path / "smallsegnet.checkpoint.pt"
+    state = torch.load(path, weights_only=True)
+    del state["loss"], state["config"]["warmup"], state["config"]["weights"]
+    torch.save(state, path)
+    assert train(data, None, config, tmp_path, progress=False) == history
+    with pytest.raises(ValueError, match=r"differs in warmup: expected \[0.05\], got \[0.1\]"):
+        train(data, None, replace(config, warmup=0.1), tmp_path, progress=False)
 
 
 def test_an_epoch_shows_every_image_once():
