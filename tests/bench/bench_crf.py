@@ -8,8 +8,6 @@ to 1/1000 (PyMaxflow's expansion, which starts from the cheapest classes). Energ
 """
 
 import os
-import subprocess
-import sys
 import time
 
 import gco
@@ -247,61 +245,10 @@ def peer_dense_crf(psi, image):
     return np.array(crf.inference(10)).reshape(C, H, W).transpose(1, 2, 0)
 
 
-def growth_table() -> str:
-    """Show how time and gap grow with the image and with the number of classes."""
-    rows = []
-    cases = [((120, 160), 5), (QVGA, 5), (VGA, 5), ((960, 1280), 5), (QVGA, 2), (QVGA, 10), (QVGA, 21)]
-    for (H, W), C in cases:
-        ms, result = solved(model(*costs(0, (H, W), C, hard=False)))
-        cost = f"{1e6 * ms / (H * W * C):.0f}"
-        rows.append([f"{W}x{H}", C, f"{ms:.0f}", cost, result.iterations, f"{100.0 * result.gap:.4f}"])
-    header = "trws+expansion, easy, 4 neighbours | C | CPU ms | ns per pixel and class | sweeps and moves | gap, %"
-    return table(header, rows)
-
-
-def memory_table() -> str:
-    """Measure the peak of resident memory while solving, in a process of its own; the model's own arrays are added."""
-    if not os.path.exists("/proc/self/clear_refs"):
-        return ""
-    rows = []
-    pairs = VGA[0] * VGA[1] * 5
-    arrays = 8.0 * (1.0 + 2.0 / 5.0)  # float64: unary, and two weights for five classes
-    for method in ("expansion", "trws", "trws+expansion"):
-        # Every array is mapped and unmapped on its own, so that freed ones do not hide new ones.
-        done = subprocess.run(
-            [sys.executable, "-m", "tests.bench.bench_crf", method],
-            env={**os.environ, "MALLOC_MMAP_THRESHOLD_": "65536"},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        each = float(done.stdout) / pairs
-        rows.append([method, f"{each:.1f}", f"{each + arrays:.1f}", 60])
-    header = "peak memory, bytes per pixel and class, 640x480, C = 5 | solver | with the model | asked"
-    return table(header, rows)
-
-
-def peak_bytes(method: str) -> int:
-    """Solve once and return by how much the resident memory rose at its peak."""
-
-    def status(field):
-        with open("/proc/self/status") as lines:
-            return next(int(line.split()[1]) for line in lines if line.startswith(field)) * 1024
-
-    solve(model(*costs(0, (20, 30), 5, hard=False)), method)
-    crf = model(*costs(0, VGA, 5, hard=False))
-    with open("/proc/self/clear_refs", "w") as file:
-        file.write("5")  # the peak is counted from now on
-    before = status("VmRSS")
-    solve(crf, method)
-    return status("VmHWM") - before
-
-
 def main(seeds: int = SEEDS) -> str:
     """Measure all tables and return them in Markdown."""
-    tables = [cut_table(seeds), expansion_table(seeds), certificate_table(seeds), dense_table(seeds)]
-    return "\n\n".join([*tables, memory_table(), growth_table()])
+    return "\n\n".join([cut_table(seeds), expansion_table(seeds), certificate_table(seeds), dense_table(seeds)])
 
 
 if __name__ == "__main__":
-    print(peak_bytes(sys.argv[1]) if len(sys.argv) > 1 else main())
+    print(main())

@@ -3,31 +3,22 @@
 For each network the best of a few settings is chosen by target IoU on 40 `test` scenes (seeds from 500000), and then
 scored on 200 others (seeds from 900000), together with the defaults of `labkit.crf.refine`. IoU is pooled over scenes;
 boundary IoU looks at the pixels within 2 of a mask's edge and is the target's. "no CRF" is the argmax of the network.
-
-The second table shows the rate, from probabilities, image and depth to labels: the UNet's on other scenes in three
-sizes, the fastest of three calls, in milliseconds of one core. "Certain" are the pixels that the first test fixes.
-Energies are relative to those of "trws+expansion", which solves the whole image.
 """
 
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import product
 
 import numpy as np
 
 from data_gen import render, sample_scene
 from labkit.apps.evaluation import BOUNDARY_WIDTH
-from labkit.crf import PottsCRF, refine, unary_from_probabilities
-from labkit.crf.cuts import Moves
-from labkit.crf.integers import quantise
-from labkit.crf.persistency import fix_certain
+from labkit.crf import refine
 from labkit.labels import CLASSES, TARGET
 from labkit.learning.network import load_model, predict_probabilities, weights_path
 from labkit.metrics import boundary_counts, confusion_matrix, iou, mean_iou
 from labkit.pipeline import most_probable
-from tests.bench.measure import in_turns, table
 
 TUNING, SCENES = range(500_000, 500_040), range(900_000, 900_200)
 SETTINGS = [
@@ -80,39 +71,6 @@ def score(model, seeds: Iterable[int], ways: dict[str, dict | None], method: str
     return scores
 
 
-def rate_table(scenes: int = 8) -> str:
-    """Time `refine` beside the method that fixes no pixel."""
-    rows, network = [], load_model(weights_path("unet"))
-    for (W, H), count in (((320, 240), scenes), ((640, 480), scenes // 2), ((1280, 720), scenes // 4)):
-        for config in ("test", "hard"):
-            found = [rate(network, sample_scene(910_000 + number, config), (W, H)) for number in range(count)]
-            ms, before, energy, gap, certain = np.array(found).T
-            times = [f"{np.median(ms):.0f}", f"{ms.max():.0f}", f"{np.median(before):.0f}"]
-            quality = [f"{100 * (energy.max() - 1):+.4f}", f"{100 * gap.max():.4f}", f"{100 * np.median(certain):.1f}"]
-            rows.append([f"{W}x{H}, {config}", *times, *quality])
-    header = "refine | median ms | longest | trws+expansion | energy, %, at the most | largest gap, % | certain, %"
-    return table(header, rows)
-
-
-def rate(network, spec, size: tuple[int, int]) -> tuple[float, ...]:
-    """Milliseconds of both methods, their energies' ratio, the gap, and the share of pixels that one test fixes."""
-    frame = render(spec, size)
-    p = predict_probabilities(network, frame.rgb, mirror=True)
-    ways = {name: partial(refine, p, frame.rgb, frame.depth, method=name) for name in ("persistency", "trws+expansion")}
-    ms = in_turns(ways, 1, time.process_time, best_of=3)
-    ours, whole = (way() for way in ways.values())
-    return *(float(times[0]) for times in ms.values()), ours.energy / whole.energy, ours.gap, certain_share(p, frame)
-
-
-def certain_share(p, frame) -> float:
-    """Share of the pixels whose label of least cost is proven to be best, with the defaults of `refine`."""
-    depth = np.where(frame.depth > 0.0, frame.depth, np.nan)
-    crf = PottsCRF.from_image(unary_from_probabilities(p, 1e-4), frame.rgb, 8.0, 30.0, 1.0, 8, ((depth, 0.03),))
-    moves = Moves(quantise(crf), crf.unary.argmin(axis=2))
-    fix_certain(moves)
-    return 1.0 - len(moves.nodes) / p[..., 0].size
-
-
 def main() -> str:
     """Choose, score, and return the table."""
     rows = ["| network | labels | mean IoU | target IoU | target boundary IoU | CPU ms |", "|---|---|---|---|---|---|"]
@@ -124,7 +82,7 @@ def main() -> str:
         ways = {"no CRF": None, "CRF, defaults": {}, chosen: best}
         for name, result in score(model, SCENES, ways, "persistency").items():
             rows.append(f"| {network} | {name} | {result.cells()}")
-    return "\n".join(rows) + "\n\n" + rate_table()
+    return "\n".join(rows)
 
 
 if __name__ == "__main__":
