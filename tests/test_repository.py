@@ -198,89 +198,16 @@ def make(folder: Path, *arguments: str, path: str | None = None) -> subprocess.C
     return subprocess.run(["make", *arguments], cwd=folder, env=environment, capture_output=True, text=True)
 
 
-def write_program(path: Path, text: str) -> None:
-    """Write a program, and its folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-    path.chmod(0o755)
-
-
-FAILS = "#!/bin/sh\nexit 1\n"
-
-
 @pytest.fixture
 def checkout(tmp_path):
-    """A checkout of nothing but what the setup needs, with a Python 3.11 that only writes down what it is asked.
-
-    Its `-m venv DIR` makes DIR/bin/python, a copy of itself; pip fails while a file `offline` is there.
-    """
+    """A folder with nothing but the Makefile and what it reads."""
     for name in ("Makefile", "pyproject.toml", "constraints.txt"):
         shutil.copy(ROOT / name, tmp_path)
-    write_program(
-        tmp_path / "bin/python3.11",
-        "#!/bin/bash\n"
-        'if [ "$1" = -c ]; then exit 0; fi\n'
-        f'echo "$@" >> "{tmp_path}/log"\n'
-        'if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; fi\n'
-        f'if [ "$2" = pip ] && [ -e "{tmp_path}/offline" ]; then exit 1; fi\n',
-    )
     return tmp_path
 
 
-def set_up(checkout: Path, target: str = ".venv/installed") -> tuple[int, list[str]]:
-    """Run the setup; return make's status and what Python was asked to do."""
-    log = checkout / "log"
-    log.write_text("")
-    done = make(checkout, target, f"PYTHON={checkout / 'bin/python3.11'}")
-    return done.returncode, log.read_text().splitlines()
-
-
-def extras(asked: list[str]) -> set[str]:
-    """The extras that the last line asks pip for."""
-    return set(re.search(r"-e \.\[(.*)\]", asked[-1])[1].split(","))
-
-
-def test_setup_runs_once_and_again_when_the_pins_change(checkout):
-    status, asked = set_up(checkout)
-    assert status == 0 and asked[0] == "-m venv .venv" and "-c constraints.txt" in asked[-1]
-    assert set_up(checkout) == (0, [])
-    later = (checkout / ".venv/installed").stat().st_mtime + 5
-    os.utime(checkout / "constraints.txt", (later, later))
-    status, asked = set_up(checkout)
-    assert status == 0 and asked and "-m venv .venv" not in asked
-
-
-def test_an_unfinished_setup_is_made_again_from_nothing(checkout):
-    (checkout / "offline").touch()
-    assert set_up(checkout)[0] != 0
-    (checkout / ".venv/half-written").touch()
-    assert set_up(checkout)[0] != 0
-    assert not (checkout / ".venv/half-written").exists()
-    (checkout / "offline").unlink()
-    status, asked = set_up(checkout)
-    assert status == 0 and asked[0] == "-m venv .venv"
-
-
-def test_each_environment_gets_its_extras(checkout):
-    assert extras(set_up(checkout)[1]) == EXTRAS.keys() - {"bench", "site"}
-    assert extras(set_up(checkout, ".venv-bench/installed")[1]) == EXTRAS.keys() - {"site"}
-    assert extras(set_up(checkout, ".venv-site/installed")[1]) == EXTRAS.keys() - {"bench"}
-
-
-def test_make_lab_installs_what_students_need_and_uses_what_is_there(checkout):
-    """The toy Python is `jupyter`, too: it writes down that it was asked to run JupyterLab."""
-    (checkout / ".venv/bin").mkdir(parents=True)
-    shutil.copy(checkout / "bin/python3.11", checkout / ".venv/bin/jupyter")
-    shutil.copy(checkout / "bin/python3.11", checkout / ".venv/bin/python")
-    _, asked = set_up(checkout, "lab")
-    assert asked[-1] == "lab" and extras(asked[:-1]) == {"course", "stacks"}
-    assert set_up(checkout, "lab")[1] == ["lab"]
-    assert extras(set_up(checkout)[1]) == EXTRAS.keys() - {"bench", "site"}
-    assert set_up(checkout, "lab")[1] == ["lab"]
-
-
-def test_the_versions_of_python_are_the_same_everywhere(checkout):
-    """In the package's metadata, when it is imported, and in make, which takes the newest that fits."""
+def test_the_versions_of_python_are_the_same_everywhere():
+    """In the package's metadata, when it is imported, and in make."""
     wanted = SpecifierSet(PROJECT["requires-python"])
     check = re.search(r"is_right='(.*)'", (ROOT / "Makefile").read_text())[1]
     for version in [(3, 10), (3, 11), (3, 12), (3, 13), (3, 14)]:
@@ -293,11 +220,6 @@ def test_the_versions_of_python_are_the_same_everywhere(checkout):
             assert (done.returncode == 0) == fits, (version, done.stderr)
         if not fits:
             assert "ImportError: labkit needs Python 3.11, 3.12 or 3.13, this is" in done.stderr.splitlines()[-1]
-    toy = (checkout / "bin/python3.11").read_text()
-    for name, text in {"python3.13": FAILS, "python3.12": toy.replace("echo", "echo 3.12")}.items():
-        write_program(checkout / "bin" / name, text)
-    make(checkout, ".venv/installed", path=f"{checkout / 'bin'}:{os.environ['PATH']}")
-    assert (checkout / "log").read_text().startswith("3.12 -m venv .venv\n")
 
 
 @pytest.mark.parametrize("arguments", [[], ["PYTHON=./python3.12"]])
@@ -308,7 +230,8 @@ def test_the_wrong_python_gets_one_line(checkout, arguments):
     for tool in ("make", "bash", "sh", "env"):
         (tools / tool).symlink_to(shutil.which(tool))
     for folder, name in ((tools, "python3"), (tools, "python3.11"), (checkout, "python3.12")):
-        write_program(folder / name, FAILS)
+        (folder / name).write_text("#!/bin/sh\nexit 1\n")
+        (folder / name).chmod(0o755)
     done = make(checkout, "test", *arguments, path=str(tools))
     assert done.returncode != 0
     lines = [line for line in done.stderr.splitlines() if not line.startswith("make")]
@@ -337,28 +260,7 @@ def test_clean_removes_what_was_generated_and_nothing_else(checkout):
         (checkout / name).touch()
     assert make(checkout, "clean").returncode == 0
     files = {str(p.relative_to(checkout)) for p in checkout.rglob("*") if p.is_file()}
-    assert files == {*kept, "Makefile", "pyproject.toml", "constraints.txt", "bin/python3.11"}
-
-
-@pytest.mark.parametrize(
-    "fails, last",
-    [
-        ("nothing", "all parts passed"),
-        ("lessons", "FAILED: lessons and solutions; the other parts passed"),
-        ("pytest", "FAILED: pytest; lessons and solutions; labs;"),
-    ],
-)
-def test_the_suite_goes_on_where_a_part_fails_and_names_it(checkout, fails, last):
-    """In a checkout where ruff and every pytest are toys, of which those that meet a word in their arguments fail."""
-    (checkout / "tests").mkdir()
-    shutil.copy(ROOT / "tests/run", checkout / "tests")
-    for name in ("ruff", "python"):
-        write_program(checkout / ".venv/bin" / name, '#!/bin/bash\n[[ " $* " != *" $FAILS "* ]]\n')
-
-    done = subprocess.run([checkout / "tests/run"], env=os.environ | {"FAILS": fails}, capture_output=True, text=True)
-    said = done.stdout.splitlines()
-    assert len(said) == 6 and said[-1].startswith(f"=== {last}")
-    assert done.returncode == (fails != "nothing")
+    assert files == {*kept, "Makefile", "pyproject.toml", "constraints.txt"}
 
 
 def test_the_fresh_run_and_the_container_take_the_same_steps():
@@ -372,67 +274,3 @@ def test_the_fresh_run_and_the_container_take_the_same_steps():
     steps = (ROOT / "Containerfile").read_text()
     assert f"WORKDIR {fresh['HOME']}/labkit\n" in steps and f"--home-dir {fresh['HOME']} " in steps
     assert steps.endswith('RUN make demo\nCMD ["make", "test"]\n')
-
-
-# ---------------------------------------------------------------------------- what a machine does not have
-
-
-@pytest.mark.parametrize("options, status", [([], 0), (["--no-skip"], 1)])
-def test_what_needs_debian_packages_skips_and_the_table_says_what_to_install(tmp_path, options, status):
-    (tmp_path / "test_one.py").write_text(
-        "import pytest\n\n@pytest.mark.debian('no-such-package', 'dpkg-too')\n@pytest.mark.parametrize('i', [0, 1])\n"
-        "def test_one(i):\n    assert False\n\ndef test_two():\n    pass\n"
-    )
-    command = [sys.executable, "-m", "pytest", "-c", ROOT / "pyproject.toml", "-p", "conftest", "-n", "2", tmp_path]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
-    done = subprocess.run([*command, *options], cwd=ROOT, env=environment, capture_output=True, text=True)
-    assert done.returncode == status and "1 passed" in done.stdout, done.stdout + done.stderr
-    if not options:
-        assert re.search(r"2 tests +needs Debian's dpkg-too no-such-package\n", done.stdout)
-        assert "apt-get install --no-install-recommends dpkg-too no-such-package\n" in done.stdout
-
-
-# ------------------------------------------------------------------------------ the benchmarks' runner
-
-
-@pytest.fixture
-def bench(tmp_path, monkeypatch):
-    """A function that runs benchmarks of the test's folder by name, on a machine that is quiet."""
-    monkeypatch.syspath_prepend(ROOT)
-    monkeypatch.setattr("os.getloadavg", lambda: (0.0,))
-    from tests.bench import run
-
-    return lambda *names: run.main([*names, "--page", str(tmp_path / "PAGE.md")], tmp_path)
-
-
-def test_a_benchmark_waits_for_a_quiet_machine_and_says_when_it_never_was(bench, tmp_path, monkeypatch):
-    (tmp_path / "bench_one.py").write_text('"""One."""\n\ndef main():\n    return ""\n')
-    loads = iter([(3.0,), (0.9,), (0.4,)])
-    monkeypatch.setattr("os.getloadavg", lambda: next(loads))
-    monkeypatch.setattr("time.sleep", lambda seconds: None)
-    assert bench() == 0
-    assert "load before it 0.4." in (tmp_path / "PAGE.md").read_text()
-    monkeypatch.setattr("os.getloadavg", lambda: (3.0,))
-    monkeypatch.setattr("tests.bench.run.PATIENCE_S", 0.0)
-    assert bench() == 0
-    assert re.search(r"load before it 3\.0 after .* never quiet", (tmp_path / "PAGE.md").read_text())
-
-
-def test_the_benchmark_page_keeps_what_was_not_measured_again(bench, tmp_path, capsys):
-    for name in ("one", "two"):
-        (tmp_path / f"bench_{name}.py").write_text(
-            f'"""Title {name}.\n\nHow to read it."""\n\ndef main():\n    return "| a |\\n|---|\\n| {name} first |"\n'
-        )
-    page = tmp_path / "PAGE.md"
-    assert bench() == 0
-    first = page.read_text()
-    assert first.index("## Title one\n\nHow to read it.") < first.index("| one first |") < first.index("## Title two")
-    two = tmp_path / "bench_two.py"
-    two.write_text(two.read_text().replace("first", "second"))
-    assert bench("two") == 0
-    assert "| one first |" in page.read_text() and "| two second |" in page.read_text()
-    two.write_text("raise RuntimeError('broken')")
-    assert bench("two") == 1
-    assert "| two second |" in page.read_text() and "failed: two" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        bench("three")

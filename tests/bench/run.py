@@ -35,13 +35,13 @@ VERSIONS = ("numpy", "scipy", "numba", "torch", "opencv-python-headless", "pybul
 PEERS = ("scikit-learn", "torchmetrics", "open3d", "pymaxflow", "gco-wrapper", "pydensecrf2", "onnxruntime", "nbgrader")
 
 
-def main(arguments: list[str] | None = None, folder: Path = HERE) -> int:
+def main() -> int:
     """Run the benchmarks that are named, all by default, and write the page; returns 1 if one of them failed."""
-    names = sorted(path.stem.removeprefix("bench_") for path in folder.glob("bench_*.py"))
+    names = sorted(path.stem.removeprefix("bench_") for path in HERE.glob("bench_*.py"))
     parser = argparse.ArgumentParser(prog="python -m tests.bench.run", description="Measure, and write the page.")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"one or more of: {', '.join(names)}; default: all")
     parser.add_argument("--page", type=Path, default=PAGE, help="the page to write (default: %(default)s)")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args()
     unknown = sorted(set(options.names) - set(names))
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are: {', '.join(names)}")
@@ -52,7 +52,7 @@ def main(arguments: list[str] | None = None, folder: Path = HERE) -> int:
     for name in options.names or names:
         print(f"bench: {name}", file=sys.stderr, flush=True)
         try:
-            sections[name] = measure(name, folder)
+            sections[name] = measure(name)
         except Exception:
             traceback.print_exc()
             failed.append(name)
@@ -64,11 +64,11 @@ def main(arguments: list[str] | None = None, folder: Path = HERE) -> int:
     return 1 if failed else 0
 
 
-def measure(name: str, folder: Path) -> str:
+def measure(name: str) -> str:
     """Run one benchmark in a process of its own and return its section of the page."""
     load, start = wait_until_quiet(), time.perf_counter()
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        description, table = pool.submit(run, name, folder).result()
+        description, table = pool.submit(run, name).result()
     seconds = time.perf_counter() - start
     title, _, rest = description.partition("\n")
     busy = "" if load < QUIET_LOAD else f" after {PATIENCE_S / 60:.0f} minutes of waiting: the machine was never quiet"
@@ -85,13 +85,9 @@ def wait_until_quiet() -> float:
     return load
 
 
-def run(name: str, folder: Path) -> tuple[str, str]:
+def run(name: str) -> tuple[str, str]:
     """Import a benchmark and run it: its docstring and its table."""
-    if folder == HERE:
-        module = importlib.import_module(f"tests.bench.bench_{name}")
-    else:
-        sys.path.insert(0, str(folder))
-        module = importlib.import_module(f"bench_{name}")
+    module = importlib.import_module(f"tests.bench.bench_{name}")
     return module.__doc__.strip(), module.main()
 
 
