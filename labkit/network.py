@@ -7,8 +7,6 @@ from labkit.learning.network import (
     UNet,
     UNetRGBD,
     load_model,
-    predict_logits,
-    predict_probabilities,
     save_model,
     weights_path,
 )

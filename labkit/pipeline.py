@@ -1,6 +1,5 @@
 """The whole chain: RGBDFrame -> class probabilities -> labels -> target clouds in the base frame -> grasps."""
 
-import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from labkit.geometry import back_project_to_base, cluster_indices, inliers
 from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
 from labkit.labels import IGNORE, TARGET
 from labkit.learning.engines import open_engine
-from labkit.learning.inference import Engine
+from labkit.learning.inference import FunctionEngine, check_probabilities
 from labkit.support.validation import (
     check_finite,
     check_height,
@@ -91,7 +90,7 @@ class Pipeline:
         target_class: int = TARGET,
         *,
         mirror: bool = False,
-        engine: str | None = None,
+        engine: str = "torch",
         crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] | None = None,
         workspace: Sequence[Sequence[float]] = WORKSPACE,
         gripper: Gripper | None = None,
@@ -99,17 +98,14 @@ class Pipeline:
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
         grasp: Callable[..., GraspPlan] | None = None,
     ):
-        model = as_engine(model) if engine is None else open_engine(engine, model)
-        if model is not None and not callable(model):
-            raise ValueError(f"model: expected a network or a function of an RGB image, got {type(model).__name__}")
-        check_whole("target_class", target_class, 0, (getattr(model, "num_classes", None) or IGNORE) - 1)
+        self.model = None if model is None else open_engine(model, engine)
+        check_whole("target_class", target_class, 0, (getattr(self.model, "num_classes", None) or IGNORE) - 1)
         if grasp is not None and gripper is not None:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
-        self.model = model
         self.table_z = None if table_z is None else check_height("table_z", table_z)
         self.target_class = target_class
         self.mirror = mirror
-        crf = isinstance(model, Engine) if crf is None else crf
+        crf = not isinstance(self.model, FunctionEngine) if crf is None else crf
         self.crf = refine_labels if crf is True else crf
         self.workspace = check_finite("workspace", check_shape("workspace", workspace, (3, 2))).astype(np.float64)
         if not (self.workspace[:, 0] < self.workspace[:, 1]).all():
@@ -161,7 +157,7 @@ class Pipeline:
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
         require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
         with timed(seconds, "network"):
-            probabilities = self._with_target(class_probabilities(self.model, frame, self.mirror))
+            probabilities = self._with_target(self.model(frame, self.mirror))
         with timed(seconds, "labels"):
             labels = most_probable(probabilities)
         if self.crf:
@@ -221,50 +217,6 @@ def timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-def as_engine(model):
-    """Make a PyTorch network an engine (`labkit.learning.network.TorchEngine`); give anything else back as it is."""
-    torch = sys.modules.get("torch")  # heavy: a pipeline around a plain function does without it
-    if torch is None or not isinstance(model, torch.nn.Module):
-        return model
-    from labkit.learning.network import TorchEngine
-
-    return TorchEngine(model)
-
-
-def class_probabilities(
-    model, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
-) -> Float[np.ndarray, "H W C"]:
-    """Class probabilities of a frame or an RGB image from a network, an engine or a function of the RGB image.
-
-    mirror: as in `Engine`; a function decides for itself. Raises ValueError if what comes is not
-    finite (a network with NaN weights, say), or a function's result is no probabilities.
-    """
-    model = as_engine(model)
-    if not isinstance(model, Engine):
-        rgb = picture.rgb if isinstance(picture, RGBDFrame) else check_rgb("rgb", picture)
-        return check_probabilities(model(rgb), rgb.shape[:2])
-    return check_finite("probabilities", model(picture, mirror))
-
-
-def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
-    """Return what a model gave as an array (H, W, C) if these are probabilities of its classes at each pixel.
-
-    Raises ValueError for another shape, NaN (the weights may hold it), and logits or 0..255 scores.
-
-    >>> check_probabilities([[[20, 235]]], (1, 1))
-    Traceback (most recent call last):
-    ...
-    ValueError: probabilities: expected numbers in 0..1 that sum to 1 at each pixel, got 20 to 235; are they scores?
-    """
-    p = check_finite("probabilities", check_shape("probabilities", p, (*size, None)))
-    low, high = p.min(), p.max()
-    total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
-    fits = low >= -1e-3 and high <= 1.001 and np.abs(total - 1.0).max() <= 0.01
-    expected = "numbers in 0..1 that sum to 1 at each pixel"
-    require("probabilities", fits, expected, lambda: f"{low:.4g} to {high:.4g}; are they scores?")
-    return p if p.dtype.kind == "f" else p.astype(np.float32)
-
-
 def most_probable(probabilities: Float[np.ndarray, "H W C"]) -> UInt8[np.ndarray, "H W"]:
     """The label of each pixel: the class of highest probability, the first one of equals (topic 03).
 
@@ -310,4 +262,4 @@ def segment_rgb_image(model, image: UInt8[np.ndarray, "H W 3"], order: str = "rg
     require("order", order in ("rgb", "bgr"), '"rgb" or "bgr"', repr(order))
     image = check_rgb("image", image)
     rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if order == "bgr" else image
-    return most_probable(class_probabilities(model, rgb))
+    return most_probable(open_engine(model)(rgb))

@@ -11,11 +11,11 @@ from torch import nn
 from labkit.frame import RGBDFrame
 from labkit.grasp import GraspPlan, Gripper
 from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
+from labkit.learning.engines import open_engine
 from labkit.learning.network import SmallSegNet
 from labkit.pipeline import (
     WORKSPACE,
     Pipeline,
-    class_probabilities,
     most_probable,
     refine_labels,
     segment_rgb_image,
@@ -60,7 +60,7 @@ def test_a_network_or_a_function_of_the_image_may_be_the_model(frame):
     p = Pipeline(network, mirror=False).run(frame)
     assert np.mean(p.labels != expected) < 1e-3
     assert np.allclose(p.probabilities.sum(axis=-1), 1.0, atol=1e-5)
-    q = Pipeline(lambda rgb: class_probabilities(network, rgb)).run(frame)
+    q = Pipeline(lambda rgb: open_engine(network)(rgb)).run(frame)
     assert np.array_equal(p.labels, q.labels)
 
 

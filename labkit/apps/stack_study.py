@@ -85,7 +85,7 @@ def methods(frames: Sequence[RGBDFrame], unet) -> dict[str, Method]:
     anywhere = fit_hsv(images, [y == SURFACE for y in labels])
     typical = regions.learn_typical(target_masks(frames))
     small, _ = train_small_fcn(images, labels, steps=STEPS)
-    opencv, onnxruntime = open_engine("opencv", unet), open_engine("onnxruntime", unet)
+    opencv, onnxruntime = open_engine(unet, "opencv"), open_engine(unet, "onnxruntime")
 
     def this_table(frame):
         return threshold_labels(frame.rgb, fit_hsv([frame.rgb], [frame.labels == SURFACE]))

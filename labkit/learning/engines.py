@@ -1,7 +1,13 @@
-"""The same network in other engines: an ONNX file, run by OpenCV's DNN module or onnxruntime (topic 09)."""
+"""One entrance from a picture to classes, whatever the model is: `open_engine` (topics 03 and 09).
+
+    engine = open_engine(model)    engine(picture) gives class probabilities, engine.logits(picture) logits
+
+A network runs in PyTorch, or as an ONNX file in OpenCV's DNN module or onnxruntime, with equal results.
+"""
 
 import io
 import json
+import sys
 import warnings
 from pathlib import Path
 
@@ -10,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from labkit.learning.channels import CHANNELS
-from labkit.learning.inference import Engine, NetworkInput
+from labkit.learning.inference import Engine, FunctionEngine, NetworkInput
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_rgb, check_shape, require
 
@@ -52,33 +58,37 @@ class OnnxRuntimeEngine(Engine):
         return self.session.run(None, dict(zip(self.takes.arrays, contiguous, strict=True)))[0]
 
 
-def open_engine(name: str, model) -> Engine:
-    """Make an engine by its name: "torch", "opencv" or "onnxruntime".
+def open_engine(model, engine: str = "torch") -> Engine:
+    """Make an engine of a model: `engine(picture)` gives class probabilities, `engine.logits(picture)` logits.
 
-    model: a PyTorch network (`TorchEngine` says which), or, for the last two, the path of a file that
-    `export` wrote. Raises ValueError for an unknown name, another kind of model or a file that is no such export,
-    FileNotFoundError for none. Topic 09.
+    model: a PyTorch network (`TorchEngine` says which), a function from an RGB image to class probabilities (H, W, C),
+    or an engine, which comes back as it is. engine: "torch", "opencv" or "onnxruntime"; the last two take a network, or
+    the path of a file that `export` wrote. Raises ValueError for an unknown engine, another kind of model or a file
+    that is no such export, FileNotFoundError for none. Topic 09.
 
     >>> from labkit.learning.network import SmallSegNet
-    >>> open_engine("torch", SmallSegNet()).logits(np.zeros((5, 7, 3), np.uint8)).shape
-    (4, 5, 7)
+    >>> open_engine(SmallSegNet())(np.zeros((5, 7, 3), np.uint8)).shape
+    (5, 7, 4)
     """
-    require("engine", name in ENGINES, f"one of {', '.join(ENGINES)}", repr(name))
-    if name == "torch":
+    require("engine", engine in ENGINES, f"one of {', '.join(ENGINES)}", repr(engine))
+    if engine != "torch":
+        onnx = Path(model).read_bytes() if isinstance(model, str | Path) else to_onnx(model)
+        return OpenCVEngine(onnx) if engine == "opencv" else OnnxRuntimeEngine(onnx)
+    if isinstance(model, Engine):
+        return model
+    if is_network(model):
         from labkit.learning.network import TorchEngine
 
-        return TorchEngine(_check_network(model))
-    onnx = Path(model).read_bytes() if isinstance(model, (str, Path)) else to_onnx(model)
-    return OpenCVEngine(onnx) if name == "opencv" else OnnxRuntimeEngine(onnx)
+        return TorchEngine(model)
+    got = repr(str(model)) if isinstance(model, str | Path) else type(model).__name__
+    require("model", callable(model), "a PyTorch network, an engine or a function of an RGB image", got)
+    return FunctionEngine(model)
 
 
-def _check_network(model):
-    import torch
-
-    if not isinstance(model, torch.nn.Module):
-        got = repr(str(model)) if isinstance(model, (str, Path)) else type(model).__name__
-        raise ValueError(f"model: expected a PyTorch network, got {got}")
-    return model
+def is_network(model) -> bool:
+    """Whether a model is a PyTorch network."""
+    torch = sys.modules.get("torch")  # heavy; where nobody imported it, nobody has a network
+    return torch is not None and isinstance(model, torch.nn.Module)
 
 
 def export(model, path) -> None:
@@ -108,7 +118,8 @@ def to_onnx(model) -> bytes:
         def forward(self, *arrays):
             return logits_of(self.network(*arrays))
 
-    engine = TorchEngine(_check_network(model))
+    require("model", is_network(model), "a PyTorch network", type(model).__name__)
+    engine = TorchEngine(model)
     takes = engine.takes
     height = -(-64 // takes.divisor) * takes.divisor
     example = {"image": np.zeros((1, 3, height, 2 * height), np.float32)}
@@ -157,25 +168,22 @@ def _facts(onnx_file: bytes) -> tuple[NetworkInput, int]:
 
 
 def segment_like_cpp(
-    engine: Engine, bgr: UInt8[np.ndarray, "H W 3"], size: tuple[int, int] = (320, 240)
+    model, bgr: UInt8[np.ndarray, "H W 3"], size: tuple[int, int] = (320, 240)
 ) -> UInt8[np.ndarray, "H W"]:
     """Label an image as a small node in C++ does: a small blob, and the mask enlarged again (topic 09).
 
-    bgr: as OpenCV and the node's message give it. size: width and height of the blob, which the engine's network must
-    take; the image is squeezed to it, whatever its proportions. Returns a mono8 mask of the image's size. Raises
+    model: as in `open_engine`, of images alone. bgr: as OpenCV and the node's message give it. size: width and height
+    of the blob; the image is squeezed to it, whatever its proportions. Returns a mono8 mask of the image's size. Raises
     ValueError for an image or a size that does not fit.
 
     >>> from labkit.learning.network import SmallSegNet
-    >>> segment_like_cpp(open_engine("torch", SmallSegNet()), np.zeros((48, 64, 3), np.uint8), (32, 24)).shape
+    >>> segment_like_cpp(SmallSegNet(), np.zeros((48, 64, 3), np.uint8), (32, 24)).shape
     (48, 64)
     """
     bgr = check_rgb("bgr", bgr)
-    if engine.takes.arrays != ("image",):
-        raise ValueError(f"engine: expected a network that takes images alone, got one of {engine.takes.arrays}")
-    if any(side < 1 or side % engine.takes.divisor for side in size):
-        raise ValueError(f"size: expected width and height divisible by {engine.takes.divisor}, got {size}")
-    blob = cv2.dnn.blobFromImage(bgr, 1.0 / 255.0, size, (0.0, 0.0, 0.0), swapRB=True, crop=False)
-    mask = labels_of_scores(engine.forward(blob))
+    require("size", min(size) >= 1, "width and height of at least 1", size)
+    small = cv2.cvtColor(cv2.resize(bgr, size), cv2.COLOR_BGR2RGB)
+    mask = labels_of_scores(open_engine(model).logits(small)[None])
     return cv2.resize(mask, (bgr.shape[1], bgr.shape[0]), interpolation=cv2.INTER_NEAREST)
 
 

@@ -1,4 +1,4 @@
-"""From one picture to class probabilities, whatever runs the network (topics 03 and 09).
+"""From one picture to class probabilities, whatever gives them (topics 03 and 09).
 
 A network states what it takes: which arrays, on what scale, of what sizes. All that lies between a picture and the
 probabilities is done here, once for every engine: the arrays are built and padded, the network's logits are cropped,
@@ -7,15 +7,15 @@ arrays to logits, is an engine's.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float, Float32, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.learning.channels import geometry_channels, mirrored
-from labkit.support.validation import check_rgb, require
+from labkit.support.validation import check_finite, check_rgb, check_shape, require
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class NetworkInput:
 
 
 class Engine(ABC):
-    """A network that is ready to run: `engine(picture)` gives class probabilities.
+    """A network that is ready to run: `engine(picture)` gives class probabilities, `engine.logits(picture)` logits.
 
     takes: what the network takes. num_classes: how many classes it tells apart, None if it does not say.
     """
@@ -80,14 +80,15 @@ class Engine(ABC):
         """Class probabilities of a picture, of any height and width: the softmax of the logits (topic 03).
 
         mirror: average them with those of the mirrored picture, mirrored back: two opinions, at twice the price, whose
-        errors differ. Raises ValueError if the picture is not what the network takes.
+        errors differ. Raises ValueError if the picture is not what the network takes, or the result is not finite (the
+        weights may hold NaN).
         """
         arrays = [array[None] for array in self.takes.build(picture)]
         p = _softmax(self.padded(arrays)[0])
         if mirror:
             q = _softmax(self.padded([mirrored(array) for array in arrays])[0])
             p = 0.5 * (p + q[..., ::-1])
-        return np.ascontiguousarray(p.transpose(1, 2, 0))
+        return check_finite("probabilities", np.ascontiguousarray(p.transpose(1, 2, 0)))
 
     def logits(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "C H W"]:
         """Logits of one picture, of any height and width; raises ValueError if it is not what the network takes."""
@@ -106,6 +107,48 @@ class Engine(ABC):
     def padded_side(self, side: int) -> int:
         """The height or width that a picture's is padded to."""
         return -(-side // self.takes.divisor) * self.takes.divisor
+
+
+class FunctionEngine(Engine):
+    """A plain function from an RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) in the place of a network.
+
+    It decides for itself whether to look into the mirror, too. Its logits are the logarithms of its probabilities.
+    Raises ValueError if what it gives is no probabilities.
+    """
+
+    def __init__(self, function: Callable[[np.ndarray], np.ndarray]):
+        super().__init__(NetworkInput(std=1.0))
+        self.function = function
+
+    def __call__(
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+    ) -> Float[np.ndarray, "H W C"]:
+        rgb = picture.rgb if isinstance(picture, RGBDFrame) else check_rgb("rgb", picture)
+        return check_probabilities(self.function(rgb), rgb.shape[:2])
+
+    def forward(self, image: Float32[np.ndarray, "N 3 H W"]) -> Float32[np.ndarray, "N C H W"]:
+        with np.errstate(divide="ignore"):  # the logarithm of 0
+            z = np.log([self(rgb) for rgb in image.transpose(0, 2, 3, 1).astype(np.uint8)])
+        return z.transpose(0, 3, 1, 2).astype(np.float32)
+
+
+def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
+    """Return what a model gave as an array (H, W, C) if these are probabilities of its classes at each pixel.
+
+    Raises ValueError for another shape, NaN (the weights may hold it), and logits or 0..255 scores.
+
+    >>> check_probabilities([[[20, 235]]], (1, 1))
+    Traceback (most recent call last):
+    ...
+    ValueError: probabilities: expected numbers in 0..1 that sum to 1 at each pixel, got 20 to 235; are they scores?
+    """
+    p = check_finite("probabilities", check_shape("probabilities", p, (*size, None)))
+    low, high = p.min(), p.max()
+    total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
+    fits = low >= -1e-3 and high <= 1.001 and np.abs(total - 1.0).max() <= 0.01
+    expected = "numbers in 0..1 that sum to 1 at each pixel"
+    require("probabilities", fits, expected, lambda: f"{low:.4g} to {high:.4g}; are they scores?")
+    return p if p.dtype.kind == "f" else p.astype(np.float32)
 
 
 def _softmax(z: Float32[np.ndarray, "C H W"]) -> Float32[np.ndarray, "C H W"]:

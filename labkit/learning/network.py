@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 from torch import nn
 from torch.nn import functional as F
 
-from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES
 from labkit.learning.channels import CHANNELS
 from labkit.learning.inference import Engine, NetworkInput
@@ -29,7 +28,7 @@ class SmallSegNet(nn.Module):
     """A compact encoder-decoder: two poolings, two transposed convolutions, 134,436 weights (topic 03).
 
     A pixel's logits depend on a window of 18 x 18 pixels, so it knows colours and edges but not the shape of an object.
-    Height and width must be divisible by 4: else ValueError. `predict_probabilities` takes any size: it pads and crops.
+    Height and width must be divisible by 4: else ValueError. `TorchEngine` takes any size: it pads and crops.
 
     >>> SmallSegNet()(torch.zeros(1, 3, 8, 12)).shape
     torch.Size([1, 4, 8, 12])
@@ -307,22 +306,3 @@ def evaluating(model: nn.Module):
     finally:
         for part in training:
             part.training = True
-
-
-def predict_logits(model: nn.Module, rgb: UInt8[np.ndarray, "H W 3"]) -> Float[torch.Tensor, "C H W"]:
-    """Run a network on one RGB image of any height and width. Raises ValueError if `rgb` is no RGB image."""
-    return torch.from_numpy(TorchEngine(model).logits(rgb))
-
-
-def predict_probabilities(
-    model: nn.Module, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
-) -> Float[np.ndarray, "H W C"]:
-    """Give each pixel's class probabilities, float32: the softmax of the network's logits (topic 03).
-
-    picture: a frame, or an RGB image for a network that needs no more. mirror: average them with those of the mirrored
-    picture, mirrored back. Raises ValueError if the picture is not what the network takes.
-
-    >>> predict_probabilities(SmallSegNet(), np.zeros((5, 7, 3), np.uint8)).shape
-    (5, 7, 4)
-    """
-    return TorchEngine(model)(picture, mirror)

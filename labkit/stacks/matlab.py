@@ -1,25 +1,22 @@
 """What the MATLAB listing does before it makes a cloud: labels with scores, and a montage (topic 09)."""
 
-from collections.abc import Callable
-
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from labkit.learning.engines import open_engine
 from labkit.support.validation import check_rgb, check_same_size, check_shape
 
 
-def semanticseg(
-    rgb: UInt8[np.ndarray, "H W 3"], net: Callable[[np.ndarray], np.ndarray]
-) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
+def semanticseg(rgb: UInt8[np.ndarray, "H W 3"], net) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
     """Label an image and say how sure the network is: the best class of each pixel, and its probability.
 
-    net: an engine of labkit.learning.engines, or any function from an RGB image to class probabilities (H, W, C).
+    net: a network, an engine or a function of the RGB image, as `labkit.learning.engines.open_engine` takes it.
 
     >>> labels, scores = semanticseg(np.zeros((1, 1, 3), np.uint8), lambda rgb: np.array([[[0.1, 0.7, 0.2]]]))
     >>> int(labels[0, 0]), float(scores[0, 0])
     (1, 0.7)
     """
-    p = check_shape("net", net(check_rgb("rgb", rgb)), (*rgb.shape[:2], None))
+    p = open_engine(net)(rgb)
     return p.argmax(axis=2).astype(np.uint8), p.max(axis=2)
 
 

@@ -18,7 +18,8 @@ from labkit.apps.cli import app
 from labkit.apps.own_data import PictureFolder
 from labkit.geometry import Plane, back_project_to_base, transform_points
 from labkit.labels import SURFACE, TARGET
-from labkit.learning.network import load_model, predict_probabilities, weights_path
+from labkit.learning.engines import open_engine
+from labkit.learning.network import load_model, weights_path
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 
@@ -203,7 +204,7 @@ def test_training_goes_on_with_ones_own_pictures(own, tmp_path):
     assert done.exit_code == 0, done.output
     frame, trained = PictureFolder(own)[0], load_model(tmp_path / "run" / "unet_rgbd.pt")
     before, after = (
-        np.mean(predict_probabilities(model, frame).argmax(axis=-1) == frame.labels)
+        np.mean(open_engine(model)(frame).argmax(axis=-1) == frame.labels)
         for model in (load_model(weights_path("unet_rgbd")), trained)
     )
     assert after > before

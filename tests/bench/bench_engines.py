@@ -28,7 +28,7 @@ def main() -> str:
             return plain(torch.from_numpy(rgb.transpose(2, 0, 1).astype(np.float32) / 255.0)[None])[0].numpy()
 
     runs = {"plain PyTorch (NCHW)": text}
-    runs |= {f'engine "{name}"': open_engine(name, model).logits for name in ENGINES}
+    runs |= {f'engine "{name}"': open_engine(model, name).logits for name in ENGINES}
     frames = [render(sample_scene(620_000 + i, "test"), (640, 480)).rgb for i in range(FRAMES)]
     apart = {name: max(float(np.abs(run(rgb) - text(rgb)).max()) for rgb in frames) for name, run in runs.items()}
     times = [in_turns({name: partial(run, rgb) for name, run in runs.items()}, ROUNDS) for rgb in frames]

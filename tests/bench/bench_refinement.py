@@ -16,7 +16,8 @@ from data_gen import render, sample_scene
 from labkit.apps.evaluation import BOUNDARY_WIDTH
 from labkit.crf import refine
 from labkit.labels import CLASSES, TARGET
-from labkit.learning.network import load_model, predict_probabilities, weights_path
+from labkit.learning.engines import open_engine
+from labkit.learning.network import load_model, weights_path
 from labkit.metrics import boundary_counts, confusion_matrix, iou, mean_iou
 from labkit.pipeline import most_probable
 
@@ -60,7 +61,7 @@ def score(model, seeds: Iterable[int], ways: dict[str, dict | None], method: str
     scores = {name: Score() for name in ways}
     for seed in seeds:
         frame = render(sample_scene(seed, "test"))
-        probabilities = predict_probabilities(model, frame.rgb, mirror=True)
+        probabilities = open_engine(model)(frame.rgb, mirror=True)
         for name, options in ways.items():
             start = time.process_time()
             if options is None:

@@ -17,7 +17,8 @@ import torch
 from torch import nn
 
 from labkit.frame import RGBDFrame
-from labkit.learning.network import SmallSegNet, UNet, predict_probabilities
+from labkit.learning.engines import open_engine
+from labkit.learning.network import SmallSegNet, UNet
 from labkit.learning.training import RECIPES, ImagesInMemory, TrainConfig, Trainer, bf16_is_native
 from tests.bench.measure import in_turns, table
 
@@ -108,8 +109,8 @@ def measure_inference() -> list[tuple]:
     small, unet = (model.to(memory_format=torch.channels_last) for model in (small, UNet().eval()))
     runs = {
         "the text's listing": lambda: text_inference(text, image),
-        "labkit, SmallSegNet": lambda: predict_probabilities(small, image),
-        "labkit, UNet": lambda: predict_probabilities(unet, image),
+        "labkit, SmallSegNet": lambda: open_engine(small)(image),
+        "labkit, UNet": lambda: open_engine(unet)(image),
     }
     np.testing.assert_allclose(runs["labkit, SmallSegNet"](), runs["the text's listing"](), atol=1e-5)
     return rows("one image", in_turns(runs, 5 * ROUNDS), {})

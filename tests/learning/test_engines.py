@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import data_gen
 from labkit.apps.cli import app
 from labkit.learning.engines import ENGINES, export, labels_of_scores, open_engine, segment_like_cpp
-from labkit.learning.network import UNetRGBD, load_model, predict_logits, weights_path
+from labkit.learning.network import UNetRGBD, load_model, weights_path
 from labkit.pipeline import Pipeline, segment_rgb_image
 
 FRAMES = 5
@@ -48,9 +48,9 @@ def frames():
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_the_shipped_network_gives_the_same_labels_and_grasps_in_every_engine(name, unet, frames, file):
-    engines = [open_engine(name, model) for model in [unet] + [file] * (name != "torch")]
+    engines = [open_engine(model, name) for model in [unet] + [file] * (name != "torch")]
     for frame in frames:
-        expected = predict_logits(unet, frame.rgb).numpy()
+        expected = open_engine(unet).logits(frame.rgb)
         for engine in engines:
             z = engine.logits(frame.rgb)
             assert np.abs(z - expected).max() < 1e-4
@@ -60,6 +60,16 @@ def test_the_shipped_network_gives_the_same_labels_and_grasps_in_every_engine(na
         p = Pipeline(model, engine=name).run(frames[1])
         assert np.mean(p.labels == expected.labels) >= 0.9999
         assert np.allclose(p.plan.grasps[0].T_base_grasp, expected.plan.grasps[0].T_base_grasp, atol=1e-3)
+
+
+def test_a_function_and_an_engine_are_engines_too(frames):
+    def thirds(rgb):
+        return np.stack([rgb[..., 0] / 255.0, 1.0 - rgb[..., 0] / 255.0, 0.0 * rgb[..., 0]], axis=-1)
+
+    engine, rgb = open_engine(thirds), frames[0].rgb
+    assert open_engine(engine) is engine
+    assert np.array_equal(engine(rgb), thirds(rgb)) and np.array_equal(engine(frames[0], mirror=True), thirds(rgb))
+    assert np.allclose(np.exp(engine.logits(rgb)), thirds(rgb).transpose(2, 0, 1), atol=1e-6)
 
 
 # ------------------------------------------------------------------------------------------------ the file
@@ -115,7 +125,7 @@ def test_debians_opencv_reads_the_file_and_agrees(file, unet, frames, tmp_path):
     files = [file, tmp_path / "image.png", tmp_path / "scores.npy"]
     done = subprocess.run([SYSTEM_PYTHON, "-I", "-c", code, *files], capture_output=True, text=True, check=True)
     scores = np.load(files[2])
-    expected = predict_logits(unet, rgb).numpy()
+    expected = open_engine(unet).logits(rgb)
     assert json.loads(done.stdout) != cv2.__version__
     assert np.abs(scores[0] - expected).max() < 1e-4
     assert np.mean(scores[0].argmax(axis=0) == expected.argmax(axis=0)) >= 0.9999
@@ -138,7 +148,7 @@ def test_the_flow_of_the_cpp_node(unet, frames):
     rows = np.arange(480) * 240 // 480
     columns = np.floor(np.arange(500) * 320 / 500).astype(int)
     for name in ENGINES:
-        mask = segment_like_cpp(open_engine(name, unet), bgr)
+        mask = segment_like_cpp(open_engine(unet, name), bgr)
         assert mask.dtype == np.uint8 and mask.shape == (480, 500)
         assert np.mean(mask == labels[rows][:, columns]) >= 0.9999
 
@@ -150,11 +160,11 @@ def test_the_flow_of_the_cpp_node(unet, frames):
 def test_a_file_that_is_no_export(name, tmp_path):
     file = tmp_path / "some.onnx"
     with pytest.raises(FileNotFoundError, match="some"):
-        open_engine(name, file)
+        open_engine(file, name)
     for data, says in ((b"no network at all", "expected an ONNX file"), (b"", "labkit export")):
         file.write_bytes(data)
         with pytest.raises(ValueError, match=f"model: .*{says}"):
-            open_engine(name, file)
+            open_engine(file, name)
 
 
 @pytest.mark.bad_input
@@ -163,19 +173,21 @@ def test_a_file_that_is_no_export(name, tmp_path):
     [
         (
             "engine: expected one of torch, opencv, onnxruntime, got 'abc'",
-            lambda net: open_engine("abc", None),
+            lambda net: open_engine(None, "abc"),
         ),
-        ("model: expected a PyTorch network, got 'unet.onnx'", lambda net: open_engine("torch", "unet.onnx")),
-        ("model: expected a PyTorch network", lambda net: open_engine("opencv", np.asarray)),
+        ("model: expected a PyTorch network, .* got 'unet.onnx'", lambda net: open_engine("unet.onnx")),
+        ("model: .* or a function of an RGB image, got int", lambda net: open_engine(5)),
+        ("probabilities: .* are they scores?", lambda net: open_engine(lambda rgb: rgb)(BGR + 1)),
+        ("model: expected a PyTorch network", lambda net: open_engine(np.asarray, "opencv")),
         ("bgr: expected shape", lambda net: segment_like_cpp(net, BGR[..., 0])),
-        (r"size: .*divisible by 16, got \(100, 80\)", lambda net: segment_like_cpp(net, BGR, (100, 80))),
         (
-            "engine: expected a network that takes images alone",
-            lambda net: segment_like_cpp(open_engine("torch", UNetRGBD()), BGR),
+            r"size: expected width and height of at least 1, got \(0, 80\)",
+            lambda net: segment_like_cpp(net, BGR, (0, 80)),
         ),
+        ("picture: expected an RGBDFrame", lambda net: segment_like_cpp(UNetRGBD(), BGR)),
         ("scores: expected shape", lambda net: labels_of_scores(np.zeros((4, 2, 3)))),
     ],
 )
 def test_what_does_not_fit_is_named(says, call, unet):
     with pytest.raises(ValueError, match=says):
-        call(open_engine("torch", unet))
+        call(open_engine(unet))

@@ -13,7 +13,7 @@ from labkit.frame import RGBDFrame
 from labkit.learning.channels import CHANNELS, geometry_channels
 from labkit.learning.engines import ENGINES, open_engine
 from labkit.learning.inference import NetworkInput
-from labkit.learning.network import SmallSegNet, TorchEngine, UNet, UNetRGBD, evaluating, predict_probabilities
+from labkit.learning.network import SmallSegNet, TorchEngine, UNet, UNetRGBD, evaluating
 from labkit.learning.training import ImagesInMemory, evaluate
 from labkit.pipeline import Pipeline
 
@@ -74,7 +74,7 @@ def plain(model: nn.Module, rgb: np.ndarray) -> np.ndarray:
 def test_any_network_and_size_gives_what_plain_pytorch_gives(kind, name):
     torch.manual_seed(0)
     model = kind()
-    engine = open_engine(name, model)
+    engine = open_engine(model, name)
     for size in ((37, 61), (96, 112), (33, 18)):
         rgb, order = random_image(*size), "F" if size[0] == 33 else "C"
         z, expected = engine.logits(np.array(rgb, order=order)), plain(model, rgb)
@@ -92,7 +92,7 @@ def test_a_sliver_of_an_image_is_seen_as_if_its_border_went_on(size, name):
     """OpenCV's engine pads to two cells of the network where one would do; see the comment there."""
     torch.manual_seed(0)
     model, rgb = UNet(), random_image(*size)
-    engine = open_engine(name, model)
+    engine = open_engine(model, name)
     wider = [(0, max(0, engine.padded_side(1) - side)) for side in size]
     expected = plain(model, np.pad(rgb, [*wider, (0, 0)], mode="edge"))[:, : size[0], : size[1]]
     assert np.abs(engine.logits(rgb) - expected).max() < 1e-4
@@ -124,7 +124,7 @@ def test_a_network_may_look_at_geometry(name):
     labels, _ = Pipeline(Tall(), table_z=0.18, engine=name, target_class=1).perceive(frame)
     assert not labels[:, :12].any() and labels[:, 12:].all(), "the pipeline's word for the table's height counts"
     with pytest.raises(ValueError, match="picture: expected an RGBDFrame"):
-        open_engine(name, Tall())(frame.rgb)
+        open_engine(Tall(), name)(frame.rgb)
 
 
 @pytest.mark.parametrize("name", ENGINES)
@@ -133,7 +133,7 @@ def test_the_kits_network_sees_the_frames_depth_in_every_engine(name, mirror):
     """RGB, then seven channels, padded by repeating the border; in a mirror the normal's sideways part is turned."""
     torch.manual_seed(0)
     model, frame = UNetRGBD().eval(), frame_of_steps()
-    engine = open_engine(name, model)
+    engine = open_engine(model, name)
     more = [(0, engine.padded_side(side) - side) for side in (10, 14)]
 
     def softmax(rgb, channels):
@@ -158,7 +158,7 @@ def test_networks_of_ones_own_are_evaluated():
     rgb, y = random_image(20, 26), np.random.default_rng(1).choice(np.array([0, 1, 2, 255], np.uint8), (20, 26))
     model = Mine()
     n = evaluate(model, ImagesInMemory([(rgb, y)] * 3, 3, progress=False), 3, batch=2)
-    predicted = predict_probabilities(model, rgb).argmax(axis=-1)
+    predicted = open_engine(model)(rgb).argmax(axis=-1)
     expected = [[3 * np.sum((y == i) & (predicted == j)) for j in range(3)] for i in range(3)]
     assert np.abs(n - expected).sum() <= 0.02 * n.sum()  # bfloat16 may turn a pixel whose logits nearly tie
 

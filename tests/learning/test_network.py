@@ -10,13 +10,13 @@ from scenes import random_image
 from torch.nn import functional as F
 
 from labkit.frame import RGBDFrame
+from labkit.learning.engines import open_engine
 from labkit.network import (
     ARCHITECTURES,
     SmallSegNet,
     UNet,
     UNetRGBD,
     load_model,
-    predict_probabilities,
     save_model,
 )
 
@@ -99,7 +99,7 @@ def test_kernels_stored_in_half_give_nearly_the_same_probabilities(tmp_path):
     save_model(model, tmp_path / "w.pt")
     loaded = load_model(tmp_path / "w.pt")
     assert type(loaded) is UNetRGBD and {w.dtype for w in loaded.parameters()} == {torch.float32}
-    p, q = (predict_probabilities(m, frame) for m in (model, loaded))
+    p, q = (open_engine(m)(frame) for m in (model, loaded))
     assert np.abs(p - q).max() < 1e-3
     torch.save(model.state_dict(), tmp_path / "bare.pt")
     assert type(load_model(tmp_path / "bare.pt")) is UNetRGBD
@@ -112,7 +112,7 @@ def test_saved_weights_load_and_predict_the_same(model, tmp_path):
     loaded = load_model(tmp_path / "sub" / "weights.pt", num_classes=3)
     assert type(loaded) is type(model) and not loaded.training
     image = random_image(20, 28)
-    np.testing.assert_allclose(predict_probabilities(loaded, image), predict_probabilities(model, image), atol=1e-6)
+    np.testing.assert_allclose(open_engine(loaded)(image), open_engine(model)(image), atol=1e-6)
     assert [file.name for file in (tmp_path / "sub").iterdir()] == ["weights.pt"]
     assert torch.load(tmp_path / "sub" / "weights.pt", weights_only=True)["meta"]["epoch"] == 3
     torch.save(model.state_dict(), tmp_path / "bare.pt")  # as the text saves and loads it

@@ -23,9 +23,10 @@ from labkit.learning.augment import (
     random_noise,
     random_sharpness,
 )
+from labkit.learning.engines import open_engine
 from labkit.learning.images import shared_map, table_height
 from labkit.learning.inference import NetworkInput
-from labkit.learning.network import SmallSegNet, load_model, predict_probabilities
+from labkit.learning.network import SmallSegNet, load_model
 from labkit.learning.training import (
     ImagesInMemory,
     TrainConfig,
@@ -246,7 +247,7 @@ def test_a_run_learns_and_writes_what_it_says(name, own, tmp_path):
     assert history[-1]["loss"] < 0.5 * history[0]["loss"]
     assert history[-1]["mean_iou"] > 0.6 and history[-1]["weights_undone"] == 0.0
     model = load_model(tmp_path / f"{name}.pt", model=own and own())
-    right = [predict_probabilities(model, rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in val]
+    right = [open_engine(model)(rgb).argmax(axis=-1)[y != 255] == y[y != 255] for rgb, y in val]
     assert np.concatenate(right).mean() > 0.8
     if own:
         with pytest.raises(ValueError, match=r"model: expected smallsegnet, .* or a network of your own, got 'mine'"):
@@ -261,8 +262,8 @@ def test_a_network_that_sees_depth_learns_what_colour_does_not_tell(tmp_path):
     assert min(history[-1]["iou"]) > 0.8
     model, frame = load_model(tmp_path / "unet_rgbd.pt"), val[0]
     frame = replace(frame, table_z=0.1)
-    right = predict_probabilities(model, frame).argmax(axis=-1) == frame.labels
-    blind = predict_probabilities(model, replace(frame, depth=0.0 * frame.depth)).argmax(axis=-1) == frame.labels
+    right = open_engine(model)(frame).argmax(axis=-1) == frame.labels
+    blind = open_engine(model)(replace(frame, depth=0.0 * frame.depth)).argmax(axis=-1) == frame.labels
     assert right.mean() > 0.9 and blind.mean() < 0.7
 
 

@@ -184,7 +184,7 @@ def test_the_small_fcn_is_the_listings_and_learns(frames):
 
 
 def test_labels_and_scores_of_an_engine(frames):
-    engine = open_engine("onnxruntime", SmallFCN())
+    engine = open_engine(SmallFCN(), "onnxruntime")
     labels, scores = semanticseg(frames[0].rgb, engine)
     p = engine(frames[0].rgb)
     assert np.array_equal(labels, np.argmax(p, axis=2)) and labels.dtype == np.uint8
@@ -252,7 +252,7 @@ def test_what_does_not_fit_is_named():
         (lambda: regions.measure(2 * (np.arange(20).reshape(4, 5) > 3)), "none of 1"),
         (lambda: regions.learn_typical([mask]), "masks: expected at least five"),
         (lambda: montage(rgb, mask[:, :3]), "mask: expected the size of rgb"),
-        (lambda: semanticseg(rgb, lambda rgb: rgb[0]), "net: expected shape"),
+        (lambda: semanticseg(rgb, lambda rgb: rgb[0]), "probabilities: expected shape"),
         (lambda: train_small_fcn([], []), "labels: expected one for each"),
         (lambda: train_small_fcn([rgb], [np.full((4, 5), 7)]), "labels: expected labels 0 to 3"),
         (lambda: diagram.run(b=1), "signals: expected a, got b"),

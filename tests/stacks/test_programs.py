@@ -55,7 +55,7 @@ def test_cpp_gives_the_mask_and_the_cloud_of_the_kit(network, frame, tmp_path):
     inputs = [tmp_path / name for name in ("image.png", "depth.png", "calibration.txt")]
     run(program, network, *inputs, *BLOB, TARGET, mask, cloud)
     found, bgr = read_image("mask", mask, np.uint8), cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR)
-    assert np.mean(found == segment_like_cpp(open_engine("opencv", network), bgr, BLOB)) >= 0.9999
+    assert np.mean(found == segment_like_cpp(open_engine(network, "opencv"), bgr, BLOB)) >= 0.9999
     expected = backproject_to_base(found, frame.depth, frame.K, frame.T_base_cam, TARGET)
     assert len(expected) > 100 and np.allclose(np.fromfile(cloud).reshape(-1, 3), expected, atol=1e-5)
 
@@ -68,13 +68,13 @@ def test_java_gives_the_colour_mask_and_the_labels_of_the_kit(network, frame, tm
     java = ["java", "-Djava.library.path=/usr/lib/jni", "-cp", f"{JAR}:{tmp_path}", "TableMask"]
     run(*java, tmp_path / "image.png", *colours.lower, *colours.upper, mask, network, labels)
     assert np.array_equal(read_image("mask", mask, np.uint8) > 0, hsv_mask(frame.rgb, colours))
-    expected = open_engine("onnxruntime", network).logits(frame.rgb).argmax(axis=0)
+    expected = open_engine(network, "onnxruntime").logits(frame.rgb).argmax(axis=0)
     assert np.mean(read_image("labels", labels, np.uint8) == expected) >= 0.9999
 
 
 @pytest.mark.debian("octave")
 def test_octave_gives_the_labels_scores_montage_and_cloud_of_the_kit(network, frame, tmp_path):
-    engine = open_engine("onnxruntime", network)
+    engine = open_engine(network, "onnxruntime")
     engine(frame.rgb).transpose(2, 0, 1).astype(np.float32).tofile(tmp_path / "probabilities.bin")
     run("octave-cli", "--norc", HERE / "target_cloud.m", tmp_path, TARGET)
     labels, scores = semanticseg(frame.rgb, engine)
