@@ -11,4 +11,5 @@ batch      a folder of submissions: what changed is graded
 outputs    grades.csv, results.json, and `feedback`, a page per student
 markdown   a stranger's Markdown, made harmless
 gradebook  nbgrader's database and the copies that formgrader shows
+refusal    why nbgrader's own Autograde does nothing
 """

@@ -31,7 +31,7 @@ SECRET_FILE = "secret_seed"
 class Record:
     """What is kept of a graded submission. reason: why it could not be graded, "" if it was.
 
-    key: of all that the results depend on; in_gradebook: whether nbgrader's database has them.
+    key: of all that the results depend on.
     """
 
     student: str
@@ -39,7 +39,6 @@ class Record:
     results: tuple[Result, ...]
     sandboxed: bool
     key: str
-    in_gradebook: bool = False
 
     @property
     def points(self) -> float:

@@ -15,7 +15,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import nbformat
-from nbgrader.api import Gradebook, MissingEntry
+from nbgrader.api import (
+    Assignment,
+    BaseCell,
+    Grade,
+    Gradebook,
+    MissingEntry,
+    SubmittedAssignment,
+    SubmittedNotebook,
+)
 from nbgrader.preprocessors import SaveCells
 from nbgrader.utils import parse_utc
 
@@ -23,6 +31,7 @@ from labkit.course.grading.batch import Record
 from labkit.course.grading.markdown import harmless_markdown
 from labkit.course.grading.outputs import lines_of
 from labkit.course.grading.reading import Lab, Submission, grade_id, source_of
+from labkit.course.grading.refusal import KERNEL
 from labkit.course.grading.sandbox import NO_SANDBOX
 from labkit.support.executors import inherited
 from labkit.support.files import write_atomically
@@ -33,26 +42,57 @@ def write_gradebook(
 ) -> dict[str, str]:
     """Write scores and comments into course/gradebook.db, and the copies; returns by student why that failed.
 
-    comments: an instructor's, by group of wrong answers.
-    Manual scores stay, and are marked for another look where the answer was graded again. Raises ValueError if the
+    comments: an instructor's, by group of wrong answers. What stands there as it should, scores, time and copy, is
+    left alone. Manual scores stay, and are marked for another look where something changed. Raises ValueError if the
     gradebook has a lab of that name with other questions.
     """
     course, failures = Path(course), {}
     register(course, lab)
     with opened(course) as gradebook:
+        kept = kept_scores(gradebook, lab)
         for record, submission in graded:
+            target = course / "autograded" / record.student / lab.topic / f"{lab.topic}.ipynb"
+            there = kept.get(record.student)
             try:
                 if record.reason:
-                    write_nothing(gradebook, lab, record)
+                    if there is not None and any(there.values()):
+                        write_nothing(gradebook, lab, record)
                 else:
+                    copied = copy_for_formgrader(lab, record, submission, comments)
+                    wanted = {f"check_{result.question}": result.points for result in record.results}
+                    wanted["timestamp"] = timestamp_of(submission)
+                    if there is not None and wanted.items() <= there.items() and is_file_of(target, copied):
+                        continue
                     write_scores(gradebook, lab, record, submission, comments)
-                    target = course / "autograded" / record.student / lab.topic / f"{lab.topic}.ipynb"
-                    write_atomically(target, copy_for_formgrader(lab, record, submission, comments))
+                    write_atomically(target, copied)
                 gradebook.db.commit()
             except Exception as error:  # of one student: the others' scores are written all the same
                 gradebook.db.rollback()
                 failures[record.student] = f"not in the gradebook: {type(error).__name__}"
     return failures
+
+
+def kept_scores(gradebook: Gradebook, lab: Lab) -> dict[str, dict[str, object]]:
+    """What the gradebook has of a lab: by student the score of each graded cell, and the "timestamp"."""
+    rows = (
+        gradebook.db.query(
+            SubmittedAssignment.student_id, SubmittedAssignment.timestamp, BaseCell.name, Grade.auto_score
+        )
+        .join(Assignment, Assignment.id == SubmittedAssignment.assignment_id)
+        .join(SubmittedNotebook, SubmittedNotebook.assignment_id == SubmittedAssignment.id)
+        .join(Grade, Grade.notebook_id == SubmittedNotebook.id)
+        .join(BaseCell, BaseCell.id == Grade.cell_id)
+        .filter(Assignment.name == lab.topic)
+    )
+    kept: dict[str, dict[str, object]] = {}
+    for student, timestamp, name, score in rows:
+        kept.setdefault(student, {"timestamp": timestamp})[name] = score
+    return kept
+
+
+def is_file_of(path: Path, content: bytes) -> bool:
+    """Whether there is a file of this content."""
+    return path.is_file() and path.read_bytes() == content
 
 
 @contextmanager
@@ -78,8 +118,10 @@ def register(course: Path, lab: Lab) -> None:
         except MissingEntry:
             gradebook.add_assignment(lab.topic)
     names = {"notebook": lab.topic, "assignment": lab.topic, "db_url": url_of(course)}
+    notebook = nbformat.from_dict(lab.notebook)
+    notebook.metadata["kernelspec"] = KERNEL
     try:
-        SaveCells().preprocess(nbformat.from_dict(lab.notebook), {"nbgrader": names})
+        SaveCells().preprocess(notebook, {"nbgrader": names})
     except RuntimeError as error:
         raise ValueError(f"{lab.topic}: the gradebook has it with other cells: {error}") from error
 

@@ -3,13 +3,13 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from labkit.course.grading.batch import Batch, Record, grade_batch, secret_for, write_record
+from labkit.course.grading.batch import Batch, Record, grade_batch, secret_for
 from labkit.course.grading.gradebook import write_gradebook
 from labkit.course.grading.outputs import write_outputs
-from labkit.course.grading.overview import add_comment, group_of, read_comments, standings
+from labkit.course.grading.overview import add_comment, read_comments, standings
 from labkit.course.grading.reading import Lab, read_lab, read_submissions
 from labkit.course.grading.sandbox import Limits
 
@@ -48,7 +48,7 @@ def grade_course(
 
     course: folder with labs/ and gradebook.db. submissions: course/submitted by default; out: course/grades/TOPIC.
     seed: the secret one; new_round: take another one, and grade everybody anew. comment: (group, text), for the pages
-    of all whose answers belong to that group of wrong ones. how: workers, dask, force, unsafe, as `Batch` has them.
+    of all whose answers belong to that group of wrong ones. how: workers, force, unsafe, as `Batch` has them.
     Raises ValueError for a topic, lab, folder or group that there is not, for another seed than the round's, and where
     no sandbox can be made.
     """
@@ -60,21 +60,12 @@ def grade_course(
         secret = secret_for(out, seed, new_round)
         batch = Batch(lab, read, out, secret, limits=limits or Limits(), **how)
         records, graded_now = grade_batch(batch, progress)
-        comments, commented = read_comments(out), ""
+        comments = read_comments(out)
         if comment is not None:
             groups = [group.name for standing in standings(lab, records) for group in standing.groups]
-            commented, text = comment
-            comments = add_comment(out, groups, commented, text)
+            comments = add_comment(out, groups, *comment)
         write_outputs(out, lab, records, comments)
-        news = [
-            (record, submission)
-            for record, submission in zip(records, read, strict=True)
-            if not record.in_gradebook or (commented and commented in map(group_of, record.results))
-        ]
-        failures = write_gradebook(course, lab, news, comments)
-        for record, _ in news:
-            if record.student not in failures:
-                write_record(out, replace(record, in_gradebook=True))
+        failures = write_gradebook(course, lab, zip(records, read, strict=True), comments)
         close_to_others(course, out)
     return Graded(lab, records, graded_now, failures)
 

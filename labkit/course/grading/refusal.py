@@ -1,0 +1,20 @@
+"""nbgrader's Autograde refuses: it would run students' code unprotected, and write its scores over the kit's.
+
+`nbgrader_config.py` names `GradedByLabkit`, so that the command and formgrader's button stop before they touch
+anything. For a course with another configuration the gradebook names `KERNEL`, which no machine has.
+"""
+
+from nbconvert.exporters import NotebookExporter
+from nbgrader.converters.base import NbGraderException
+
+SAYS = "this course is graded by `labkit grade LAB`; nbgrader's Autograde changed nothing"
+KERNEL = {"name": "graded-by-labkit-grade", "display_name": "graded by labkit grade", "language": "python"}
+
+
+class GradedByLabkit(NotebookExporter):
+    """What nbgrader's Autograde makes before it begins, and cannot."""
+
+    def __init__(self, **options):
+        super().__init__(**options)
+        self.log.error(SAYS)
+        raise NbGraderException(SAYS)

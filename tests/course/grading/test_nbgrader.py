@@ -1,0 +1,92 @@
+"""nbgrader's own autograder beside the kit's grades: it refuses, and what it or a hand changed is put right again."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import grading_course as kit
+import pytest
+import serving
+
+from labkit.course.grading.gradebook import opened
+from labkit.course.grading.refusal import SAYS
+from labkit.course.grading.run import grade_course
+from labkit.course.topics import of_topic
+
+ROOT = Path(__file__).parents[3]
+TOPIC = "04_iou"
+TOTAL = float(sum(question.points for question in of_topic(TOPIC).values()))
+POINTS = {"ada": TOTAL, "ben": TOTAL - of_topic(TOPIC)["iou"].points}
+
+
+@pytest.fixture
+def course(tmp_path):
+    """A right and a wrong answer to iou in the lab as it is released, graded."""
+    shutil.copytree(ROOT / "labs" / TOPIC, tmp_path / "labs" / TOPIC)
+    released = (tmp_path / "labs" / TOPIC / f"{TOPIC}.ipynb").read_text()
+    for student, answers in (("ada", {}), ("ben", {"iou": "def iou(n):\n    return n / 2\n"})):
+        notebook = json.loads(released)
+        answers = kit.right_answers(TOPIC) | answers
+        for cell in notebook["cells"]:
+            cell["source"] = answers.get(cell["metadata"].get("nbgrader", {}).get("grade_id"), cell["source"])
+        kit.submit(tmp_path, student, TOPIC, notebook)
+    shutil.copy(ROOT / "nbgrader_config.py", tmp_path)
+    grade(tmp_path)
+    return tmp_path
+
+
+def grade(course: Path):
+    return grade_course(TOPIC, course, seed="secret", progress=False)
+
+
+def autograde(course: Path) -> subprocess.CompletedProcess:
+    """Run nbgrader's own command, which executes what students wrote."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "nbgrader", "autograde", TOPIC, "--force"]
+    return subprocess.run(command, cwd=course, env=environment, capture_output=True, text=True)
+
+
+def scores(course: Path) -> dict[str, float]:
+    with opened(course) as book:
+        return {student: book.find_submission(TOPIC, student).score for student in POINTS}
+
+
+def copies(course: Path) -> dict[str, bytes]:
+    return {student: (course / f"autograded/{student}/{TOPIC}/{TOPIC}.ipynb").read_bytes() for student in POINTS}
+
+
+def test_autograde_refuses_in_one_sentence_and_touches_nothing(course):
+    before = copies(course)
+    done = autograde(course)
+    assert done.returncode == 1 and SAYS in done.stderr and "Traceback" not in done.stderr
+    assert scores(course) == POINTS and copies(course) == before
+
+
+def test_without_the_kits_configuration_no_score_changes_and_the_next_run_puts_the_copies_back(course):
+    before = copies(course)
+    (course / "nbgrader_config.py").unlink()
+    done = autograde(course)
+    assert done.returncode == 1 and "graded-by-labkit-grade" in done.stderr
+    assert scores(course) == POINTS
+    assert grade(course).graded_now == 0 and copies(course) == before
+
+
+def test_a_score_that_is_not_the_kits_is_put_right(course):
+    with opened(course) as book:
+        book.find_grade("check_iou", TOPIC, TOPIC, "ben").auto_score = 2.0
+        book.db.commit()
+    assert grade(course).graded_now == 0 and scores(course) == POINTS
+
+
+@pytest.mark.timeout(600)
+def test_formgraders_button_refuses_too(course, tmp_path_factory):
+    """What the bolt in formgrader's table asks its server for, whose log it then shows."""
+    with serving.jupyterlab(course, tmp_path_factory.mktemp("jupyter")) as url:
+        address = f"{url}/formgrader/api/submission/{TOPIC}/ben/autograde?token={serving.TOKEN}"
+        answer = json.loads(urllib.request.urlopen(urllib.request.Request(address, data=b"")).read())
+    assert not answer["success"] and SAYS in answer["log"]
+    assert scores(course) == POINTS
