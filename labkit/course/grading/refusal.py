@@ -4,8 +4,7 @@
 anything. For a course with another configuration the gradebook names `KERNEL`, which no machine has.
 """
 
-from nbconvert.exporters import NotebookExporter
-from nbgrader.converters.base import NbGraderException
+from nbgrader.converters.base import NbGraderException, NotebookExporter
 
 SAYS = "this course is graded by `labkit grade LAB`; nbgrader's Autograde changed nothing"
 KERNEL = {"name": "graded-by-labkit-grade", "display_name": "graded by labkit grade", "language": "python"}
