@@ -30,7 +30,7 @@ ROOMS = "support > labels > frame > geometry losses metrics crf > grasp learning
 ROOMS += "views > node > course > apps"
 BELOW = {room: set(re.split(r"\W+", ROOMS.split(layer)[0])) for layer in ROOMS.split(" > ") for room in layer.split()}
 # Rooms of the course that judge answers: beside labkit.support each enters only these.
-COURSE = {"checker": {"checker"}, "topics": {"topics", "checker"}}
+COURSE = {"checker": {"checker"}, "topics": {"topics", "checker"}, "grading": {"grading", "topics", "checker"}}
 
 
 def tracked(*patterns: str) -> list[Path]:

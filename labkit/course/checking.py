@@ -12,11 +12,10 @@ from collections.abc import Callable
 from labkit.course.checker.comparison import Problem
 from labkit.course.checker.judge import Verdict
 from labkit.course.checker.program import Cell, Program, program
-from labkit.course.checker.question import PACKAGES, Question
+from labkit.course.checker.question import PACKAGES, PUBLIC_SEED, Question
 from labkit.course.checker.run import MAX_PRINTED, Printed, define, judge
 from labkit.course.topics import find, of_topic
 
-PUBLIC_SEED = 0
 LIMIT_S = 10.0  # for all cases together; a right answer takes a small part of it
 COLOURS = {"✔": "#2e7d32", "✘": "#c62828", "○": "#b26a00"}
 

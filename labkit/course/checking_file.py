@@ -18,7 +18,7 @@ from labkit.course.checker.program import Cell, Parsed, cells_of, program
 from labkit.course.checker.question import PACKAGES, Question
 from labkit.course.checker.run import Printed
 from labkit.course.checking import describe, jupyter
-from labkit.course.grading.grade import Run, cases_of
+from labkit.course.grading.isolated import Run, cases_of
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import TOPICS, of_topic
 

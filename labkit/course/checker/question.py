@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 PACKAGES = ("numpy", "scipy", "torch")  # what an answer may import beside the standard library, unless it is forbidden
+PUBLIC_SEED = 0  # of the random cases that a check shows
 
 
 @dataclass(frozen=True)

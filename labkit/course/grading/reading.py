@@ -16,7 +16,7 @@ from pathlib import Path
 from labkit.course.checker.program import Cell, cells_of
 from labkit.course.topics import of_topic
 
-MOST_BYTES = 20 << 20
+LARGEST_NOTEBOOK = 20 << 20  # bytes
 MOST_VALUES = 1_000_000  # of JSON: a second of parsing and 100 MB of memory
 MOST_CELLS = 5_000
 MOST_SOURCE = 1_000_000  # characters of code
@@ -128,7 +128,7 @@ def read_submission(place: Path, lab: Lab) -> Submission | None:
         notebook = find_notebook(place, lab.topic)
         if notebook is None:
             return None
-        data = read_bytes(notebook, MOST_BYTES)
+        data = read_bytes(notebook, LARGEST_NOTEBOOK)
         digest = hashlib.sha256(data).hexdigest()
         content = parse(data)
         code, cells = pick_cells(content["cells"], lab)

@@ -27,7 +27,7 @@ from labkit.course.grading import bwrap, seccomp, shapes, worker
 from labkit.course.grading.channel import Worker, WorkerLost
 from labkit.support.packages import requirements
 
-PACKAGES = "/packages"
+SITE = "/packages"  # where a worker finds them
 LOADERS = ("/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1")
 FIRST_UID, UIDS, UIDS_OF_ONE = 61184, 4000, 50  # of systemd's range for short-lived users: never a person's
 ENVIRONMENT = {
@@ -67,7 +67,7 @@ def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
         {
             "first_uid": None if os.getuid() else FIRST_UID + next(counter) * UIDS_OF_ONE % UIDS,
             "uids": UIDS_OF_ONE,
-            "path": site_folders() if unsafe else [PACKAGES],
+            "path": site_folders() if unsafe else [SITE],
             "load": list(packages),
             "only": [name.partition(".")[0] for name in package_files(tuple(packages))] if unsafe else None,
             "memory": (limits.torch_memory_mb if "torch" in packages else limits.memory_mb) << 20,
@@ -271,7 +271,7 @@ def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | N
         if os.path.isfile(path) and not path.startswith(covered) and path != python:
             shown += [(name, path) for name in names_of(path)]
     shown += [(loader, os.path.realpath(loader)) for loader in LOADERS if os.path.exists(loader)]
-    shown += [(f"{PACKAGES}/{name}", str(path)) for name, path in sorted(tops.items())]
+    shown += [(f"{SITE}/{name}", str(path)) for name, path in sorted(tops.items())]
     shown += [(f"/dev/{name}", f"/dev/{name}") for name in ("null", "urandom", "zero")]
     programs = TOOLS | {"worker": os.path.abspath(worker.__file__)}
     return python, [*dict.fromkeys(shown), *((f"/{name}.py", path) for name, path in programs.items())]

@@ -12,7 +12,7 @@ import re
 import struct
 
 # audit number of the architecture; numbers of its system calls, x86-64 and arm64
-ARCHITECTURES = {"x86_64": (0xC000003E, 0), "aarch64": (0xC00000B7, 1)}
+MACHINES = {"x86_64": (0xC000003E, 0), "aarch64": (0xC00000B7, 1)}
 # By what they would let an answer do: name, then its numbers on the two architectures, 0 where there is none.
 REFUSED = """
 processes:   fork 57 0, vfork 58 0, kill 62 129, tkill 200 130, tgkill 234 131, rt_sigqueueinfo 129 138,
@@ -49,9 +49,9 @@ def program(machine: str | None = None) -> bytes:
     0
     """
     machine = platform.machine() if machine is None else machine
-    if machine not in ARCHITECTURES:
-        raise ValueError(f"machine: expected {' or '.join(ARCHITECTURES)} for the sandbox, got {machine}")
-    audit, column = ARCHITECTURES[machine]
+    if machine not in MACHINES:
+        raise ValueError(f"machine: expected {' or '.join(MACHINES)} for the sandbox, got {machine}")
+    audit, column = MACHINES[machine]
     lines = [(LOAD, 0, 0, ARCHITECTURE), (JUMP_IF_EQUAL, 1, 0, audit), (RETURN, 0, 0, KILL), (LOAD, 0, 0, NUMBER)]
     if machine == "x86_64":
         lines += [(JUMP_IF_GREATER_EQUAL, 0, 1, X32_CALLS), (RETURN, 0, 0, KILL)]

@@ -37,7 +37,7 @@ MOST_MESSAGE = 160  # characters of an exception's message
 ONE = 255  # the count of an output that is no tuple
 
 
-class Refused(Exception):
+class CannotBeSent(Exception):
     """A value that cannot be sent; carries the reply that says why."""
 
 
@@ -65,17 +65,17 @@ def encode(value: object) -> bytes:
 
 
 def as_array(value: object):
-    """Give a number, an array or a tensor as a plain little-endian array; raises Refused for anything else."""
+    """Give a number, an array or a tensor as a plain little-endian array; raises CannotBeSent for anything else."""
     import numpy as np
 
     cls, torch = type(value), sys.modules.get("torch")
     if torch is not None and issubclass(cls, torch.Tensor):
         value = value.detach().cpu().resolve_neg().numpy()
     elif not issubclass(cls, bool | int | float | complex | np.generic | np.ndarray):
-        raise Refused(b"K" + cls.__name__.encode()[:60])
+        raise CannotBeSent(b"K" + cls.__name__.encode()[:60])
     array = np.array(value, subok=False)
     if array.dtype.kind not in "biuf":
-        raise Refused(b"D" + array.dtype.kind.encode())
+        raise CannotBeSent(b"D" + array.dtype.kind.encode())
     if array.dtype.itemsize > 8:  # longdouble
         array = array.astype(np.float64)
     return array.astype(array.dtype.newbyteorder("<"))
@@ -91,7 +91,7 @@ class Session:
         """Do what a request asks for, and write the reply: its first word says which method, the rest its arguments."""
         try:
             return getattr(self, request[0])(*request[1:])
-        except Refused as refusal:
+        except CannotBeSent as refusal:
             return refusal.args[0]
         except ModuleNotFoundError as error:
             return b"M" + str(error.name).encode()[:60]

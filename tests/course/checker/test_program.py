@@ -6,12 +6,12 @@ from submissions import Honest, as_editors_save_it, honest
 
 from labkit.course.checker.judge import Problem
 from labkit.course.checker.program import Cell, cells_of, program
+from labkit.course.checker.question import PACKAGES
 from labkit.course.checker.run import define, judge
 from labkit.course.topics import find
 
 IOU = find("04_iou.iou")
 BLANKS = ("confusion_matrix", "iou", "precision_recall", "mean_iou", "boundary_band")
-PACKAGES = ("numpy", "scipy", "torch")
 HONEST = honest()
 
 

@@ -22,7 +22,7 @@ from labkit.course.checker.program import Program
 from labkit.course.grading import bwrap, gradebook, reading, run
 from labkit.course.grading import grade as grading
 from labkit.course.grading.batch import read_record, record_path, secret_for
-from labkit.course.grading.grade import Run, cases_of
+from labkit.course.grading.isolated import Run, cases_of
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import find, of_topic
@@ -395,7 +395,7 @@ def test_a_comparison_that_fails_is_a_wrong_answer_and_not_the_end(course, monke
     def broken(question, cases, outputs, altered):
         raise OverflowError("as if an output were too odd to compare")
 
-    monkeypatch.setattr(grading, "verdict", broken)
+    monkeypatch.setattr("labkit.course.grading.isolated.verdict", broken)
     graded = grade(course)
     assert [record.points for record in graded.records] == [0.0, 0.0, 0.0]
     assert "OverflowError" in graded.records[0].results[0].flag

@@ -291,7 +291,7 @@ def test_a_deadline_holds_for_cell_and_call():
         assert lost.value.problem.kind == "time" and time.monotonic() - begin < 20.0
 
 
-@pytest.mark.parametrize("machine", sorted(seccomp.ARCHITECTURES))
+@pytest.mark.parametrize("machine", sorted(seccomp.MACHINES))
 def test_every_jump_of_the_filter_stays_in_it(machine):
     """The kernel wants forward jumps within the program, and every path to end in an answer."""
     import struct
