@@ -93,18 +93,3 @@ def test_the_ellipse_lies_two_standard_deviations_out():
     widgets.draw_ellipse(axes, np.array([5.0, -1.0]), Sigma)
     off = axes.lines[0].get_xydata() - (5.0, -1.0)
     np.testing.assert_allclose(np.einsum("ni,ij,nj->n", off, np.linalg.inv(Sigma), off), 4.0)
-
-
-def test_the_noise_explorer_follows_its_sliders():
-    explorer = widgets.depth_noise(K, 48, 64)
-    moved = explorer.figure(u=10, d=2.0, sigma_pixel=2.0, sigma_depth=3.0)
-    std = 1000.0 * np.sqrt(np.diagonal(back_projection_noise(10.0, 24.0, 2.0, K, 2.0, 0.003)))
-    assert moved.axes[1].get_title() == f"std of x {std[0]:.1f} mm, of z {std[2]:.1f} mm"
-
-
-def test_the_names_of_all_five_bugs_fit_over_the_picture(frame):
-    figure = widgets.name_that_bug(frame).figure(**dict.fromkeys(widgets.BUGS, True), mystery=3)
-    figure.canvas.draw()
-    title = figure.get_suptitle()
-    (text,) = [text for text in figure.texts if text.get_text() == title]
-    assert figure.bbox.x0 <= text.get_window_extent().x0 and text.get_window_extent().x1 <= figure.bbox.x1

@@ -33,13 +33,6 @@ def test_a_heavier_class_moves_the_boundary_away_from_itself_and_pays_for_recall
     assert 0 < overlap.argmax() < overlap.size - 1
 
 
-def test_the_title_says_where_the_boundary_is():
-    explorer = class_weights.two_gaussians()
-    assert explorer.figure().axes[0].get_title() == "boundary at 2.95"
-    moved = explorer.figure(exponent=5.5, distance=3.0, share=0.1)
-    assert moved.axes[0].get_title() == "boundary at 0.96"
-
-
 @pytest.fixture
 def scenes():
     """Two frames with random probabilities, different in size."""
@@ -61,13 +54,6 @@ def test_weighing_a_networks_answers_only_adds_target_pixels(scenes):
         both = (mask & truth).sum()
         expected = both / mask.sum(), both / truth.sum(), both / (mask | truth).sum()
         assert class_weights.target_scores(frame.labels, p, exponent) == pytest.approx(expected)
-
-
-def test_the_titles_of_the_masks_say_weight_and_scores(scenes):
-    mask, scores = class_weights.trained_masks(scenes).figure(exponent=3.0).axes
-    assert mask.get_title().startswith("target weighs 8;")
-    precision, recall, overlap = class_weights.target_scores(scenes["first"][0].labels, scenes["first"][1], 3.0)
-    assert scores.get_title() == f"precision {precision:.2f}, recall {recall:.2f}, IoU {overlap:.2f}"
 
 
 @pytest.mark.bad_input

@@ -90,14 +90,6 @@ def test_a_change_of_any_control_draws_again():
     assert "application/vnd.jupyter.widget-view+json" in bundle
 
 
-def test_a_drawing_that_fails_says_so():
-    def draw(figure, x):
-        raise ValueError("x: too large")
-
-    with pytest.raises(ValueError, match="x: too large"):
-        Explorer(draw, {"x": ipywidgets.FloatSlider()})
-
-
 def test_stills_are_shown_where_no_widget_runs_and_leave_the_controls_alone():
     drawn = []
     slider = ipywidgets.FloatSlider(1.0, min=0, max=5)

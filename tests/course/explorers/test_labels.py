@@ -45,14 +45,6 @@ def test_ghosts_are_the_classes_that_no_neighbour_has():
     assert 0 < np.count_nonzero(ghost) < ghost.size
 
 
-def test_the_explorer_counts_the_ghosts_at_its_scale():
-    explorer = widgets.ghost_classes(scene())
-    assert explorer.figure().axes[2].get_title() != "0 pixels of a class that was not there"
-    _, after, haunted = explorer.figure(way="nearest", scale=0.5).axes
-    assert haunted.get_title() == "0 pixels of a class that was not there"
-    assert after.get_title().startswith("24 x 32, nearest")
-
-
 def test_the_bits_add_up_to_the_value():
     (axes,) = widgets.segmentation_bits().figure(body=37, link=8).axes
     bits = [text.get_text() for text in axes.texts if text.get_text() in "01"]

@@ -1,6 +1,5 @@
 """The explorers of topic 09: what the controls change, and that the pictures show what the numbers say."""
 
-import cv2
 import numpy as np
 import pytest
 from scenes import random_frame
@@ -38,15 +37,6 @@ def test_the_range_darkens_what_is_outside_and_scores_the_rest(frame, first, las
     assert picture.get_title().endswith(f"{np.sum(inside & table) / np.sum(inside | table):.3f}")
     marked = sum(patch.get_width() for patch in hues.patches)
     assert marked == (last - first + 1 if first <= last else 180 - first + last + 1)
-
-
-def test_the_hues_are_counted(frame):
-    rgb, masks = frame
-    table = masks["a"] == 1
-    _, hues = stacks.colour_range(rgb, table).figure().axes
-    hue = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[..., 0]
-    curve = hues.lines[0].get_ydata() ** 2
-    assert np.allclose(curve / curve.sum(), np.bincount(hue[table], minlength=180) / table.sum())
 
 
 def test_addresses_are_those_of_numpys_memory():
