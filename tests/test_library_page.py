@@ -31,13 +31,6 @@ def own_files(tmp_path_factory):
     return folder
 
 
-def test_every_section_has_its_twenty_lines():
-    assert list(BLOCKS) == [f"A {thing} of your own" for thing in ("scene", "frame", "model", "gripper", "loss")] + [
-        "Data of your own"
-    ]
-    assert all(sum(bool(line.strip()) for line in code.splitlines()) <= 24 for code in BLOCKS.values())
-
-
 @pytest.mark.parametrize(
     ("section", "prints"),
     [

@@ -97,19 +97,6 @@ def test_the_command_writes_the_file(tmp_path, file):
     assert path.read_bytes() == file.read_bytes()
 
 
-def test_a_file_that_cannot_be_written_leaves_the_old_one(unet, tmp_path, monkeypatch):
-    path = tmp_path / "unet.onnx"
-    path.write_bytes(b"old")
-
-    def fail(*arguments):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("labkit.support.files.os.replace", fail)
-    with pytest.raises(OSError, match=r"unet\.onnx"):
-        export(unet, path)
-    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
-
-
 @pytest.mark.debian("python3-opencv")
 def test_debians_opencv_reads_the_file_and_agrees(file, unet, frames, tmp_path):
     """OpenCV 4.6 in a process of the system's Python, which shares nothing with this one but files."""
