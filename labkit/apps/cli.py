@@ -336,6 +336,38 @@ def release(
     raise typer.Exit(1 if check and changed else 0)
 
 
+new = typer.Typer(help="Begin a question or a lab; `make test` then names each TODO of it.", no_args_is_help=True)
+app.add_typer(new, name="new")
+Checkout = Annotated[Path, typer.Option(help="The checkout to write into.")]
+
+
+@new.command("question")
+def new_question(
+    name: Annotated[str, typer.Argument(help="Topic and function, such as 04_iou.dice.")], course: Checkout = Path(".")
+) -> None:
+    """Write a question that works, right answers and wrong ones, and its cells in the topic's solution."""
+    from labkit.course import scaffold
+
+    tell_written(scaffold.new_question(course, name))
+
+
+@new.command("lab")
+def new_lab(
+    topic: Annotated[str, typer.Argument(help="Two digits and a name, such as 10_instances.")],
+    course: Checkout = Path("."),
+) -> None:
+    """Write a lab without questions: a topic, its solution, and a row in README."""
+    from labkit.course import scaffold
+
+    tell_written(scaffold.new_lab(course, topic))
+
+
+def tell_written(paths: list[Path]) -> None:
+    """Print which files were written."""
+    for path in paths:
+        typer.echo(f"wrote {path}")
+
+
 @app.command()
 def grade(
     topic: Annotated[str, typer.Argument(help="Which lab, such as 04_iou.")],

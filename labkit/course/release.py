@@ -11,6 +11,7 @@ import hashlib
 import io
 import logging
 import os
+import re
 import shutil
 import tempfile
 import zipfile
@@ -250,7 +251,8 @@ def mistakes(notebook: NotebookNode, topic: str) -> list[str]:
     """Say why a solution cannot be released and graded; an empty list if it can.
 
     An answer cell defines the function that its grade id names, holds a marked solution, and has one tests cell
-    `check_NAME`, worth the points of the question if the kit has one. A locked cell `setup` comes first of all.
+    `check_NAME`, worth the points of the question if the kit has one. A locked cell `setup` comes first of all. Each
+    question that a cell checks is one of the kit's.
     """
     graded = [(cell, cell.metadata["nbgrader"]) for cell in notebook.cells if "nbgrader" in cell.metadata]
     ids = [data["grade_id"] for _, data in graded]
@@ -269,15 +271,22 @@ def mistakes(notebook: NotebookNode, topic: str) -> list[str]:
         if f"check_{name}" not in tests:
             found.append(f"{name} has no tests cell check_{name}")
     found += [f"{name} tests no answer" for name in tests if name.removeprefix("check_") not in answers]
+    called = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
+    asked = dict.fromkeys(re.findall(r"\bcheck\(\s*[\"'](\w+\.\w+)[\"']", called))
     if topic in TOPICS:
         questions = of_topic(topic)
-        for name in answers:
-            if name not in questions:
-                found.append(f"there is no question {topic}.{name}")
-            elif tests.get(f"check_{name}") not in (None, questions[name].points):
+        asked |= dict.fromkeys(f"{topic}.{name}" for name in answers)
+        for name in answers.keys() & questions.keys():
+            if tests.get(f"check_{name}") not in (None, questions[name].points):
                 found.append(f"check_{name} has {tests[f'check_{name}']} points, its question {questions[name].points}")
         found += [f"no cell answers {topic}.{name}" for name in questions if name not in answers]
-    return found
+    return found + [f"there is no question {name}" for name in asked if not exists(name)]
+
+
+def exists(name: str) -> bool:
+    """Whether the kit has a question of this name, such as "04_iou.iou"."""
+    topic, _, function = name.partition(".")
+    return topic in TOPICS and function in of_topic(topic)
 
 
 def functions(source: str) -> set[str]:

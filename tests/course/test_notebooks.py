@@ -37,8 +37,7 @@ def tags(cell) -> set[str]:
 # ------------------------------------------------------------------------------------------ all notebooks
 
 
-def test_there_is_one_of_each_for_every_topic_and_none_besides():
-    assert {ROOT / "lessons" / f"{topic}.ipynb" for topic in TOPICS} <= {*LESSONS}
+def test_every_topic_has_a_lab_and_no_notebook_is_without_a_topic():
     found = {path for kind in ("lessons", "solutions", "labs") for path in (ROOT / kind).rglob("*.ipynb")}
     found = {path for path in found if ".ipynb_checkpoints" not in path.parts}
     assert found == {*LESSONS, *SOLUTIONS, *LABS}
@@ -128,7 +127,7 @@ def pictures(path: Path) -> list[bytes]:
 @each([*LESSONS, *SOLUTIONS])
 def test_pictures_are_there_and_small(path):
     found = pictures(path)
-    assert len(found) >= 2
+    assert len(found) >= (2 if path in LESSONS else 1)
     for picture in found:
         assert picture.startswith(b"\x89PNG") and len(picture) < MAX_PNG, f"{len(picture)} bytes"
 

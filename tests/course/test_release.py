@@ -272,6 +272,16 @@ def test_a_topic_of_the_kit_answers_all_its_questions_for_their_points():
     assert "there is no question 04_iou.double" in mistakes(solution_notebook(), "04_iou")
 
 
+def test_a_lab_that_checks_what_is_no_question_is_not_released(course):
+    """Whether its topic is one of the kit's or not; its students would be told that there is no such question."""
+    path = course / "solutions/91_two/91_two.ipynb"
+    spoil(path, "print(6)", "double = check('91_two.double', double)")
+    before = snapshot(course)
+    with pytest.raises(ValueError, match=r"expected an assignment, but there is no question 91_two\.double$"):
+        release(course)
+    assert snapshot(course) == before
+
+
 def test_the_command_runs_by_itself(course):
     done = subprocess.run(
         [sys.executable, "-m", "labkit.apps.cli", "release", "90_one"], cwd=course, capture_output=True

@@ -1,0 +1,157 @@
+"""`labkit new`: what it writes works at once and says what is left to do; a name that does not fit writes nothing."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import alternatives
+import nbformat
+import pytest
+from course.checker import test_questions
+
+from labkit.course import checking_file, release, scaffold, topics
+from labkit.course.checking_file import check_file
+from labkit.course.grading.run import grade_course
+
+ROOT = Path(__file__).parents[2]
+OF_LAB, OF_QUESTION = 9, 17  # TODOs that a new lab has, and a new question
+
+
+@pytest.mark.parametrize("what", scaffold.left_to_do(ROOT) or [""])
+def test_nothing_is_left_to_do(what):
+    assert not what
+
+
+@pytest.fixture
+def course(tmp_path):
+    """What `labkit new` looks for in a checkout: README and topic 04."""
+    for path in ("labkit/course/topics/t04_iou", "solutions/04_iou", "tests/alternatives"):
+        shutil.copytree(ROOT / path, tmp_path / path, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "README.md", tmp_path)
+    return tmp_path
+
+
+def snapshot(folder: Path) -> dict[Path, bytes]:
+    """All files of a folder."""
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def tenth(course, monkeypatch):
+    """A course with a tenth lab of one question, which the kit finds; returns the files written."""
+    written = scaffold.new_lab(course, "10_pieces") + scaffold.new_question(course, "10_pieces.rows")
+    for package, folder in ((topics, "labkit/course/topics"), (alternatives, "tests/alternatives")):
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(course / folder)])
+    for module in (topics, release, checking_file):
+        monkeypatch.setattr(module, "TOPICS", (*topics.TOPICS, "10_pieces") if module is topics else topics.TOPICS)
+    yield [path.relative_to(course).as_posix() for path in written]
+    for name in [name for name in sys.modules if "t10_pieces" in name]:
+        del sys.modules[name]
+
+
+def test_a_tenth_lab_is_released_checked_and_graded_as_it_is_written(course, tenth, capsys):
+    assert tenth == [
+        "labkit/course/topics/t10_pieces/__init__.py",
+        "solutions/10_pieces/10_pieces.ipynb",
+        "README.md",
+        "labkit/course/topics/t10_pieces/rows.py",
+        "tests/alternatives/t10_pieces.py",
+        "solutions/10_pieces/10_pieces.ipynb",
+    ]
+    assert "| 10 pieces | | [lab](labs/10_pieces/10_pieces.ipynb) |" in (course / "README.md").read_text()
+    assert len(scaffold.left_to_do(course)) == OF_LAB + OF_QUESTION
+    release.release(course, ["10_pieces"])
+    lab, solution = (course / folder / "10_pieces/10_pieces.ipynb" for folder in ("labs", "solutions"))
+    assert check_file(solution) and not check_file(lab)
+    for student, how in (("right", "values.sum(axis=1)"), ("wrong", "values.sum(axis=0)")):
+        handed_in = nbformat.read(lab, as_version=4)
+        (cell,) = [cell for cell in handed_in.cells if cell.id == "rows"]
+        cell.source = f"def rows(values):\n    return {how}\n"
+        folder = course / "submitted" / student / "10_pieces"
+        folder.mkdir(parents=True)
+        nbformat.write(handed_in, folder / "10_pieces.ipynb")
+    graded = grade_course("10_pieces", course, seed="a seed", workers=2, progress=False)
+    assert [[result.points for result in record.results] for record in graded.records] == [[2], [0]]
+
+
+def test_a_question_as_it_is_written_fulfils_the_rules_for_questions(tenth):
+    name = "10_pieces.rows"
+    test_questions.test_a_topic_has_questions_under_its_name("10_pieces")
+    test_questions.test_a_question_is_complete(name)
+    test_questions.test_a_reference_is_short_and_complete_in_itself(name)
+    test_questions.test_cases_are_the_seeds_and_hold_what_is_claimed(name)
+    test_questions.test_right_answers_pass(name)
+    test_questions.test_wrong_answers_lose(name)
+    test_questions.test_misconceptions_earn_their_own_hints(name)
+
+
+def test_what_is_written_is_free_of_lint(course, tenth):
+    scaffold.new_question(course, "04_iou.dice")
+    for command in (["check", "--ignore", "I"], ["format", "--check"]):
+        ruff = [sys.executable, "-m", "ruff", *command, "--no-cache", "--config", str(ROOT / "pyproject.toml")]
+        done = subprocess.run([*ruff, "."], cwd=course, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout
+
+
+def test_a_question_for_a_lab_that_there_is_comes_last_and_counts(course):
+    before = nbformat.read(ROOT / "solutions/04_iou/04_iou.ipynb", as_version=4)
+    scaffold.new_question(course, "04_iou.dice")
+    after = nbformat.read(course / "solutions/04_iou/04_iou.ipynb", as_version=4)
+    sources = [cell.source for cell in before.cells]
+    new = [cell for cell in after.cells[1:] if cell.source not in sources]
+    assert [cell.metadata.get("nbgrader", {}).get("grade_id") for cell in new] == [None, "dice", "check_dice", None]
+    assert new[0].source.startswith("## Task 7: ")
+    assert [cell.source for cell in after.cells[1:] if cell not in new] == sources[1:]
+    assert "\n| 6 | a written question | 15 |\n| 7 | `dice`: " in after.cells[0].source
+    assert "\n105 minutes in all." in after.cells[0].source and "\n95 minutes in all." in sources[0]
+    assert len(scaffold.left_to_do(course)) == OF_QUESTION
+    places = [todo.partition(": TODO")[0] for todo in scaffold.left_to_do(course)]
+    assert "labkit/course/topics/t04_iou/dice.py:9" in places and "solutions/04_iou/04_iou.ipynb, cell dice" in places
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("question 04_iou.iou", "name: expected a name that solutions/04_iou/04_iou.ipynb does not have already"),
+        ("question 04_iou.parts", "name: expected a name that labkit/course/topics/t04_iou/__init__.py does not have"),
+        ("question 04_iou.setup", "name: expected a name that solutions/04_iou/04_iou.ipynb does not have already"),
+        ("question 04_iou.2nd", "name: expected lower-case letters"),
+        ("question 04_iou.lambda", "name: expected lower-case letters"),
+        ("question 04_iou.iou__twice", "name: expected lower-case letters"),
+        ("question 04_iou", "name: expected lower-case letters"),
+        ("question 11_none.x", "`labkit new lab 11_none` begins a topic that is not there, got '11_none.x'"),
+        ("question ../t04_iou.x", "name: expected a topic and a function"),
+        ("lab 04_iou", "topic: expected a number that is free, not that of 04_iou, got '04_iou'"),
+        ("lab 04_other", "topic: expected a number that is free, not that of 04_iou, got '04_other'"),
+        ("lab pieces", "topic: expected two digits, _ and a name: 10_instances, got 'pieces'"),
+        ("lab 10_a/b", "topic: expected two digits"),
+    ],
+)
+def test_a_name_that_does_not_fit_is_refused_and_nothing_is_written(words, says, course, labkit, capsys):
+    before = snapshot(course)
+    assert labkit("new", *words.split(), "--course", course) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and says in said
+    assert snapshot(course) == before
+
+
+def test_a_failure_halfway_leaves_everything_as_it_was(course, monkeypatch):
+    before, plain = snapshot(course), scaffold.write_atomically
+
+    def disk_full(path, data):
+        if path.suffix == ".ipynb":
+            raise OSError(28, "No space left on device", str(path))
+        plain(path, data)
+
+    monkeypatch.setattr(scaffold, "write_atomically", disk_full)
+    for begin, name in ((scaffold.new_question, "04_iou.dice"), (scaffold.new_lab, "10_pieces")):
+        with pytest.raises(OSError, match="No space"):
+            begin(course, name)
+        assert snapshot(course) == before and not (course / "labkit/course/topics/t10_pieces").exists()
+
+
+def test_it_is_for_a_checkout_alone(tmp_path):
+    with pytest.raises(ValueError, match=r"course: expected a checkout, with .* without labkit/course/topics"):
+        scaffold.new_lab(tmp_path, "10_pieces")
+    assert not list(tmp_path.iterdir())
