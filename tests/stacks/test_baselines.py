@@ -12,7 +12,6 @@ from labkit.labels import OBSTACLE, SURFACE, TARGET
 from labkit.learning.engines import open_engine
 from labkit.pipeline import Pipeline
 from labkit.stacks import regions
-from labkit.stacks.blocks import Block, Diagram, perception_diagram
 from labkit.stacks.matlab import montage, semanticseg
 from labkit.stacks.small_fcn import SmallFCN, train_small_fcn
 from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, things_on_table
@@ -180,7 +179,7 @@ def test_the_small_fcn_is_the_listings_and_learns(frames):
     assert right > np.mean(Pipeline(SmallFCN(), mirror=False).run(frames[0]).labels == frames[0].labels)
 
 
-# ----------------------------------------------------------------------------- MATLAB and Simulink
+# ----------------------------------------------------------------------------- MATLAB
 
 
 def test_labels_and_scores_of_an_engine(frames):
@@ -198,47 +197,13 @@ def test_a_montage_is_the_image_beside_its_mask(frames):
     assert np.array_equal(both[:, 160:], 255 * np.repeat(mask[..., None], 3, axis=2).astype(np.uint8))
 
 
-def test_a_diagram_runs_its_blocks_in_the_order_of_their_signals():
-    order = []
-
-    def block(name, inputs, outputs, function):
-        return Block(name, lambda *x: (order.append(name), function(*x))[1], inputs, outputs)
-
-    late = block("late", ("c", "b"), ("d",), lambda c, b: c - b)
-    both = block("both", ("a",), ("b", "c"), lambda a: (a + 1, a * 10))
-    signals = Diagram([late, both], inputs=("a",)).run(a=3)
-    assert order == ["both", "late"] and signals == {"a": 3, "b": 4, "c": 30, "d": 26}
-
-
-def test_simulinks_diagram_does_what_the_pipeline_does():
-    spec = data_gen.sample_scene(600_002, "test")
-    frame = data_gen.render(spec)
-    pipeline = Pipeline(table_z=spec.table.z)
-    expected = pipeline.locate(frame, frame.labels)
-    diagram = perception_diagram(pipeline, lambda rgb: frame.labels, lambda plan, scene: len(plan.grasps))
-    camera = {name: getattr(frame, name) for name in ("rgb", "depth", "K", "T_base_cam")}
-    signals = diagram.run(**camera, table_z=spec.table.z)
-    assert signals["outcome"] > 0
-    assert np.array_equal(signals["points"], expected.points, equal_nan=True)
-    assert all(np.array_equal(a, b) for a, b in zip(signals["clouds"], expected.clouds, strict=True))
-    best, reference = signals["plan"].grasps[0], expected.plan.grasps[0]
-    assert np.allclose(best.T_base_grasp[:3, 3], reference.T_base_grasp[:3, 3], atol=0.01)
-
-
 # ----------------------------------------------------------------------------------------------- bad input
 
 
 @pytest.mark.bad_input
 def test_what_does_not_fit_is_named():
     rgb, mask = np.zeros((4, 5, 3), np.uint8), np.zeros((4, 5), bool)
-    diagram = Diagram([Block("p", lambda a: (a, a, a), ("a",), ("b", "c"))], inputs=("a",))
-    both = [Block("p", abs, ("a",), ("b",)), Block("q", abs, ("a",), ("b",))]
-    loop = [Block("p", max, ("a", "c"), ("b",)), Block("q", abs, ("b",), ("c",))]
     cases = [
-        (lambda: Diagram([Block("p", abs, ("x",), ("y",))], ("a",)), "nobody gives 'x', which 'p' needs"),
-        (lambda: Diagram(both, ("a",)), "one giver of the signal 'b'"),
-        (lambda: Diagram([Block("p", abs, ("a",), ("a",))], ("a",)), "one giver of the signal 'a'"),
-        (lambda: Diagram(loop, ("a",)), "no loop, got .*p.* -> "),
         (lambda: HSVRange((0, 0, 0), (180, 255, 255)), "upper: expected hue 0..179"),
         (lambda: HSVRange((0, 9, 0), (9, 8, 255)), "lower: expected saturation and value at most"),
         (lambda: hsv_mask(rgb.astype(float), BROWN), "rgb: expected uint8"),
@@ -255,8 +220,6 @@ def test_what_does_not_fit_is_named():
         (lambda: semanticseg(rgb, lambda rgb: rgb[0]), "probabilities: expected shape"),
         (lambda: train_small_fcn([], []), "labels: expected one for each"),
         (lambda: train_small_fcn([rgb], [np.full((4, 5), 7)]), "labels: expected labels 0 to 3"),
-        (lambda: diagram.run(b=1), "signals: expected a, got b"),
-        (lambda: diagram.run(a=1), "p: expected 2 outputs, got 3"),
     ]
     for call, says in cases:
         with pytest.raises(ValueError, match=says):
