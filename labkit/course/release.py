@@ -54,7 +54,8 @@ def release(course: Path, topics: Sequence[str] = (), check: bool = False) -> li
     changed = [path for path, data in tidied.items() if path.read_bytes() != data]
     drifted = {folder: differing(folder, files) for folder, files in made.items()}
     if not check:
-        replace_folders({folder: made[folder] for folder, differ in drifted.items() if differ})
+        for folder, wrong in drifted.items():
+            put_right(folder, made[folder], wrong)
         for path in changed:
             write_atomically(path, tidied[path])
     return [*changed, *(path for differ in drifted.values() for path in differ)]
@@ -176,32 +177,16 @@ def differing(folder: Path, files: dict[str, bytes]) -> list[Path]:
     return [folder / name for name in sorted(wrong | (there ^ files.keys()))]
 
 
-def replace_folders(made: dict[Path, dict[str, bytes]]) -> None:
-    """Put new folders in the place of old ones: all of them, or none when something fails; {} removes a folder."""
-    if not made:
-        return
-    labs = next(iter(made)).parent
-    labs.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=labs, prefix=".release-") as stage:
-        new, old = Path(stage) / "new", Path(stage) / "old"
-        for folder, files in made.items():
-            for name, data in files.items():
-                write_atomically(new / folder.name / name, data)
-        old.mkdir()
-        moved = []
-        try:
-            for folder, files in made.items():
-                if folder.exists():
-                    os.rename(folder, old / folder.name)
-                moved.append(folder)
-                if files:
-                    os.rename(new / folder.name, folder)
-        except BaseException:
-            for folder in moved:
-                shutil.rmtree(folder, ignore_errors=True)
-                if (old / folder.name).exists():
-                    os.rename(old / folder.name, folder)
-            raise
+def put_right(folder: Path, files: dict[str, bytes], wrong: Sequence[Path]) -> None:
+    """Write what should be in a folder in the place of its wrong files, and remove what should not; {} removes it."""
+    for path in wrong:
+        name = path.relative_to(folder).as_posix()
+        if name in files:
+            write_atomically(path, files[name])
+        else:
+            path.unlink()
+    if not files:
+        shutil.rmtree(folder)
 
 
 # ------------------------------------------------------------------------------------- what students get

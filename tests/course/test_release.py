@@ -10,7 +10,6 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from labkit.course import release as module
 from labkit.course.release import bundle, mistakes, read, release, tidy, to_bytes
 from labkit.course.topics import of_topic
 
@@ -212,25 +211,6 @@ def test_a_broken_solution_changes_nothing(course, spoilt, says):
     with pytest.raises(ValueError, match=says):
         release(course)
     assert snapshot(course) == before
-
-
-def test_a_failure_while_folders_are_replaced_puts_them_back(course, monkeypatch):
-    release(course)
-    for topic in ("90_one", "91_two"):
-        spoil(course / f"solutions/{topic}/{topic}.ipynb", "Twice", "Two times")
-    before = snapshot(course)
-    rename, done = os.rename, []
-
-    def fails_once(a, b):
-        done.append(b)
-        if len(done) == 4:
-            raise OSError(28, "No space left on device")
-        rename(a, b)
-
-    monkeypatch.setattr(module.os, "rename", fails_once)
-    with pytest.raises(OSError, match="No space"):
-        release(course)
-    assert snapshot(course) == before and len(done) > 4
 
 
 # ------------------------------------------------------------------------------- what an assignment must be
