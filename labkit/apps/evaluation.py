@@ -106,6 +106,14 @@ def lift(world, perception):
     return Panda(world).lift(perception.plan.grasps, perception.scene)
 
 
+def lift_anew(spec, perception):
+    """Let the arm try in a world that is built for this one try; a LiftResult."""
+    from labkit.sim.world import World
+
+    with World(spec) as world:
+        return lift(world, perception)
+
+
 @dataclass(frozen=True)
 class Report:
     """Scores pooled over trials; the fields are the keys of `labkit evaluate --json`.

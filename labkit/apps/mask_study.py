@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from labkit.apps import degrade, trials
-from labkit.apps.evaluation import lift
+from labkit.apps.evaluation import lift_anew
 from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
 from labkit.metrics import wilson_interval
@@ -86,13 +86,11 @@ def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None =
 
     kinds: pairs (kind, strength), default all. A lift is a success if it is this very target that comes up.
     """
-    from data_gen import sample_scene
-    from labkit.sim.world import World  # PyBullet stays out of this module's import
+    from data_gen import render, sample_scene
 
     kinds = [(kind, s) for kind, (strengths, _) in KINDS.items() for s in strengths] if kinds is None else kinds
     spec = sample_scene(seed, "test")
-    with World(spec) as world:
-        frame = world.render(SIZE)
+    frame = render(spec, SIZE)
     name, truth = target_mask(spec, frame)
     rows = []
     for kind, strength in kinds:
@@ -104,12 +102,7 @@ def trials_of_scene(seed: int, kinds: Iterable[tuple[str, int | float]] | None =
 
 def try_lift(spec, perception: Perception, name: str) -> tuple[bool, str]:
     """Let the arm try in a fresh world: whether the object of that name came up, and "lifted" or why not."""
-    from labkit.sim.world import World
-
-    if not perception.plan.grasps:
-        return False, perception.plan.reason
-    with World(spec) as world:
-        result = lift(world, perception)
+    result = lift_anew(spec, perception)
     if result.success and result.name != name:
         return False, "lifted another target"
     return result.success, result.reason

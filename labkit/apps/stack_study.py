@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from labkit.apps import trials
-from labkit.apps.evaluation import lift
+from labkit.apps.evaluation import lift_anew
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, SURFACE, TARGET
 from labkit.learning.engines import open_engine, segment_like_cpp
@@ -117,21 +117,17 @@ def target_masks(frames: Sequence[RGBDFrame]) -> list[np.ndarray]:
 
 def trials_of_scene(seed: int, ways: dict[str, Method]) -> list[Row]:
     """Render a scene once, label it by every method, and let the arm try by each of the masks, in a fresh world."""
-    from data_gen import sample_scene
-    from labkit.sim.world import World  # PyBullet stays out of this module's import
+    from data_gen import render, sample_scene
 
     spec = sample_scene(seed, "test")
-    with World(spec) as world:
-        frame = world.render(SIZE)
+    frame = render(spec, SIZE)
     rows, tried = [], {}
     for name, way in ways.items():
         start = time.perf_counter()
         labels = way(frame)
         milliseconds = round(1000.0 * (time.perf_counter() - start), 2)
         if labels.tobytes() not in tried:  # equal labels make the same lift: the simulator is deterministic
-            perception = Pipeline().locate(frame, labels)
-            with World(spec) as world:
-                tried[labels.tobytes()] = lift(world, perception)
+            tried[labels.tobytes()] = lift_anew(spec, Pipeline().locate(frame, labels))
         result = tried[labels.tobytes()]
         n = confusion_matrix(frame.labels, labels, len(CLASSES))
         both, either = n.diagonal(), n.sum(axis=0) + n.sum(axis=1) - n.diagonal()

@@ -1,16 +1,12 @@
 """A scene as plain data: what stands where, how it looks, and the camera that sees it (topic 07).
 
-Nothing here knows PyBullet. A SceneSpec can be written by hand, drawn by `data_gen.sample_scene`, kept as JSON, and
-loaded into a `World`, which drops the objects from their `position` and lets them come to rest. What does not make
-sense is refused at once, by a ValueError that names it. Metres, radians, base frame.
+Nothing here knows PyBullet. A SceneSpec can be written by hand, drawn by `data_gen.sample_scene`, and loaded into a
+`World`, which drops the objects from their `position` and lets them come to rest. What does not make sense is refused
+at once, by a ValueError that names it. Metres, radians, base frame.
 """
 
-import dataclasses
-import json
-import typing
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import UnionType
 
 import numpy as np
 from jaxtyping import Float
@@ -175,30 +171,3 @@ class SceneSpec:
     def class_counts(self) -> dict[str, int]:
         """How many objects there are of each class name."""
         return {CLASSES[c]: sum(thing.class_id == c for thing in self.objects) for c in (TARGET, OBSTACLE)}
-
-    def to_json(self) -> str:
-        """Write the scene as JSON; `from_json` gives an equal scene back."""
-        return json.dumps(dataclasses.asdict(self), sort_keys=True)
-
-    @classmethod
-    def from_json(cls, text: str) -> "SceneSpec":
-        """Read a scene written by `to_json`.
-
-        >>> spec = SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.0, 0.8))
-        >>> SceneSpec.from_json(spec.to_json()) == spec
-        True
-        """
-        return _build(cls, json.loads(text))
-
-
-def _build(kind, value):
-    """Turn parsed JSON back into the dataclass, tuple or plain value that the annotation `kind` asks for."""
-    if dataclasses.is_dataclass(kind):
-        hints = typing.get_type_hints(kind)
-        return kind(**{name: _build(hints[name], item) for name, item in value.items()})
-    if typing.get_origin(kind) is UnionType:
-        return value
-    if typing.get_origin(kind) is tuple:
-        inner = typing.get_args(kind)[0]
-        return tuple(_build(inner, item) for item in value)
-    return value

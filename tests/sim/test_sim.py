@@ -165,9 +165,8 @@ def test_worlds_do_not_disturb_one_another():
         assert [pose.tobytes() for pose in first.poses().values()] == later
 
 
-def test_a_scene_survives_json_and_its_objects_stand_at_rest_on_the_table_or_on_one_another():
+def test_objects_stand_at_rest_on_the_table_or_on_one_another():
     spec = sample_scene(5, "hard")
-    assert SceneSpec.from_json(spec.to_json()) == spec
     assert repr(spec) == f"SceneSpec(hard, seed 5: {', '.join(thing.name for thing in spec.objects)})"
     piled = scene(thing("low", position=(0.5, 0.0, 0.0201)), thing("high", position=(0.51, 0.0, 0.062)))
     with World(piled) as world:
