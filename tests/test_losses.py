@@ -8,7 +8,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from sklearn.utils.class_weight import compute_class_weight
 
 from labkit import losses
 
@@ -106,12 +105,6 @@ def test_weights_follow_their_scheme_with_a_mean_of_one_over_the_counted_pixels(
         w = losses.class_weights(n, scheme)
         np.testing.assert_allclose(w[present] * n[present] ** power, (w * n**power)[present][0])
         assert (w > 0).all() and (w[~present] == 1.0).all() and (n @ w) / n.sum() == pytest.approx(1.0)
-
-
-def test_inverse_weights_are_those_that_scikit_learn_calls_balanced():
-    y = np.random.default_rng(0).choice(4, size=5000, p=[0.6, 0.3, 0.01, 0.09])
-    peer = compute_class_weight("balanced", classes=np.arange(4), y=y)
-    np.testing.assert_allclose(losses.class_weights(np.bincount(y), "inverse"), peer)
 
 
 @untimed

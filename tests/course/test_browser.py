@@ -120,7 +120,7 @@ def test_a_slider_moved_in_lesson_02_changes_the_picture(jupyterlab, page, tmp_p
 
 def test_every_explorers_labels_are_read_in_full_and_pressed_pixels_have_the_things_colour(jupyterlab, page):
     """Run one cell that shows the explorers of all topics, as test_explorer.py makes them."""
-    places = [str(ROOT / "tests"), str(ROOT / "tests/course/widgets")]
+    places = [str(ROOT / "tests"), str(ROOT / "tests/course/explorers")]
     open_notebook(page, jupyterlab, "lessons/04_iou.ipynb")
     cell = page.locator(".jp-CodeCell").first
     cell.locator(".cm-content").click()

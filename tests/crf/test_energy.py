@@ -37,12 +37,6 @@ def test_energy_is_the_formula_of_the_text(connectivity, dtype, labels):
     assert crf.energy(y) == pytest.approx(energy_by_loop(unary, image, 1.7, 60.0, 1.3, connectivity, y), rel=1e-12)
 
 
-@pytest.mark.parametrize(("connectivity", "pairs"), [(4, 5 * 6 + 4 * 7), (8, 5 * 6 + 4 * 7 + 2 * 4 * 6)])
-def test_each_unordered_pair_counts_once(connectivity, pairs):
-    crf = PottsCRF.from_image(np.zeros((5, 7, 2)), np.zeros((5, 7)), 1.0, 1.0, 1.0, connectivity)
-    assert np.count_nonzero(crf.weights) == pairs
-
-
 def test_a_depth_edge_lowers_the_weight_and_a_missing_reading_does_not():
     image, depth = np.zeros((1, 4)), np.array([[1.0, 1.0, 1.1, np.nan]])
     w = PottsCRF.from_image(np.zeros((1, 4, 2)), image, 1.0, 1.0, extra=((depth, 0.05),)).weights[0, 0]

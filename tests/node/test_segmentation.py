@@ -121,15 +121,6 @@ def test_millimetres_of_16_bit_are_metres_inside(frame):
     assert np.allclose(found.mean(axis=0), exact.mean(axis=0), atol=5e-4)
 
 
-def test_the_newest_frame_wins_and_drops_are_counted_and_told(frame):
-    node, camera, out, _ = system(frame)
-    for stamp in range(5):
-        camera.publish(frame, stamp * 100 * MS)
-    assert node.spin_once() and not node.spin_once()
-    assert [mask.header.stamp for mask in out.mask] == [400 * MS]
-    assert out.diagnostics[-1].values["dropped"] == "4" and out.diagnostics[-1].values["answered"] == "1"
-
-
 def test_a_slow_node_answers_the_newest_of_a_fast_camera(frame):
     bus = Bus()
     entered, go_on = threading.Event(), threading.Event()
@@ -151,20 +142,6 @@ def test_a_slow_node_answers_the_newest_of_a_fast_camera(frame):
         wait_for(lambda: len(out.mask) == 2, "the second mask")
     assert [mask.header.stamp for mask in out.mask] == [0, 300 * MS]
     assert node.counts.dropped == 2 and node.counts.answered == 2
-
-
-def test_stamps_need_not_be_equal_and_order_does_not_matter(frame):
-    node, _, out, bus = system(frame, T_base_cam=frame.T_base_cam)
-    good = messages(frame)
-    for stamps, is_one_moment in (
-        ({"info": 1003, "rgb": 1000, "depth": 1012}, True),
-        ({"info": 2000, "rgb": 2000, "depth": 2050}, False),
-    ):
-        for stream, stamp in stamps.items():
-            header = Header(stamp * MS, "camera_optical_frame")
-            send(bus, {stream: dataclasses.replace(good[stream], header=header)})
-        assert node.spin_once() == is_one_moment
-    assert [mask.header.stamp for mask in out.mask] == [1000 * MS]
 
 
 def spoil(rng, good):

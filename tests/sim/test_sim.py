@@ -101,15 +101,6 @@ def test_rendered_points_lie_on_the_visual_mesh_at_its_true_pose(shown):
     assert closest_point_naive(object_mesh(shown), in_object_frame)[1].max() < 1e-3
 
 
-def test_points_on_the_table_lie_on_the_table():
-    table = Table(centre=(0.55, 0.1), size=(0.6, 0.8, 0.04), z=-0.02)
-    with World(scene(thing(position=(0.5, 0.0, 0.002)), table=table)) as world:
-        frame = world.render()
-    points = points_of(frame, frame.labels == SURFACE)
-    box = part_mesh(Part("box", table.size, (*table.centre, table.z - 0.02)))
-    assert closest_point_naive(box, points[::50])[1].max() < 1e-3
-
-
 def test_a_pose_is_of_the_mesh_not_of_the_centre_of_mass():
     uneven = thing(parts=(Part("box", (0.02, 0.02, 0.02)), Part("box", (0.06, 0.06, 0.02), (0.0, 0.0, -0.02))))
     lifted = dataclasses.replace(uneven, position=(0.5, 0.1, 0.3), orientation=(0.0, 0.0, 0.6, 0.8))
