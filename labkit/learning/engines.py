@@ -161,7 +161,8 @@ def _facts(onnx_file: bytes) -> tuple[NetworkInput, int]:
         arrays, classes = tuple(json.loads(facts["arrays"])), json.loads(facts["classes"])
     except (KeyError, ValueError) as error:
         raise ValueError(f"model: expected a file of `labkit export`, got one that states {sorted(facts)}") from error
-    return NetworkInput(arrays, *(tuple(x) if isinstance(x, list) else x for x in (mean, std)), divisor), classes
+    mean, std = (tuple(x) if isinstance(x, list) else x for x in (mean, std))
+    return NetworkInput(arrays, mean, std, divisor, json.loads(facts.get("pixel", "null"))), classes
 
 
 # ------------------------------------------------------------------------------------ the C++ listing

@@ -2,8 +2,9 @@
 
 A network states what it takes: which arrays, on what scale, of what sizes. All that lies between a picture and the
 probabilities is done here, once for every engine: the arrays are built and padded, the network's logits are cropped,
-softmax makes them probabilities, and those of the mirror image may be averaged in. Only the network's own run, from
-arrays to logits, is an engine's.
+softmax makes them probabilities, and those of the mirror image may be averaged in. A network that states the size of a
+pixel sees each frame's canonical view (`labkit.learning.view`). Only the network's own run, from arrays to logits, is
+an engine's.
 """
 
 from abc import ABC, abstractmethod
@@ -15,6 +16,7 @@ from jaxtyping import Float, Float32, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.learning.channels import geometry_channels, mirrored
+from labkit.learning.view import View, canonical_view
 from labkit.support.validation import check_finite, check_rgb, check_shape, require
 
 
@@ -26,8 +28,9 @@ class NetworkInput:
     with rgb in 0..255; mean and std are one number, or one for each of R, G and B; the default scales to 0..1. geometry
     is what depth, calibration and the table's height tell (`channels.geometry_channels`), seven channels in
     0..1, all 0.5 where the camera read no depth. divisor: what height and width must be divisible by; pictures of other
-    sizes are padded by repeating their border, and the logits are cropped. Raises ValueError for an argument that does
-    not fit.
+    sizes are padded by repeating their border, and the logits are cropped. pixel: metres that the median pixel of a
+    frame's canonical view covers, if the network knows such views; None if it takes pictures as they are. Raises
+    ValueError for an argument that does not fit.
 
     >>> NetworkInput(divisor=16).build(np.full((1, 1, 3), 51, np.uint8))[0].astype(float).round(3).tolist()
     [[[0.2, 0.2, 0.2]]]
@@ -37,6 +40,7 @@ class NetworkInput:
     mean: float | tuple[float, float, float] = 0.0
     std: float | tuple[float, float, float] = 255.0
     divisor: int = 1
+    pixel: float | None = None
 
     def __post_init__(self):
         if self.arrays not in (("image",), ("image", "geometry")):
@@ -45,6 +49,16 @@ class NetworkInput:
             require(name, np.shape(getattr(self, name)) in ((), (3,)), "one number or three", repr(getattr(self, name)))
         require("std", np.min(self.std) > 0.0, "numbers above 0", repr(self.std))
         require("divisor", self.divisor >= 1, "at least 1", repr(self.divisor))
+        require("pixel", self.pixel is None or self.pixel > 0.0, "metres above 0, or None", repr(self.pixel))
+
+    def view(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> View | None:
+        """The canonical view that the network gets to see; None if it sees the picture as it is.
+
+        That is so for a network that states no `pixel`, an RGB image, and a frame without any depth.
+        """
+        if self.pixel is None or not isinstance(picture, RGBDFrame):
+            return None
+        return canonical_view(picture, self.pixel)
 
     def build(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> list[Float32[np.ndarray, "H W _"]]:
         """Build the arrays for one picture: a frame, or an RGB image for a network that takes nothing else."""
@@ -83,16 +97,24 @@ class Engine(ABC):
         errors differ. Raises ValueError if the picture is not what the network takes, or the result is not finite (the
         weights may hold NaN).
         """
-        arrays = [array[None] for array in self.takes.build(picture)]
-        p = _softmax(self.padded(arrays)[0])
+        p = _softmax(self.logits(picture))
         if mirror:
-            q = _softmax(self.padded([mirrored(array) for array in arrays])[0])
-            p = 0.5 * (p + q[..., ::-1])
+            p = 0.5 * (p + _softmax(self.logits(picture, mirror=True)))
         return check_finite("probabilities", np.ascontiguousarray(p.transpose(1, 2, 0)))
 
-    def logits(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "C H W"]:
-        """Logits of one picture, of any height and width; raises ValueError if it is not what the network takes."""
-        return self.padded([array[None] for array in self.takes.build(picture)])[0]
+    def logits(
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+    ) -> Float32[np.ndarray, "C H W"]:
+        """Logits of one picture, of any height and width; raises ValueError if it is not what the network takes.
+
+        mirror: those of the mirrored picture, mirrored back. Logits of a canonical view are brought back to the
+        picture's own pixels.
+        """
+        view = self.takes.view(picture)
+        arrays = self.takes.build(picture if view is None else view.frame)
+        z = self.padded([(mirrored(array) if mirror else array)[None] for array in arrays])[0]
+        z = z[..., ::-1] if mirror else z
+        return z if view is None else view.back(z.transpose(1, 2, 0)).transpose(2, 0, 1)
 
     def padded(self, arrays: Sequence[Float32[np.ndarray, "N H W _"]]) -> Float32[np.ndarray, "N C H W"]:
         """Run the network on arrays of any height and width: pad them by repeating their border, crop the logits."""

@@ -20,6 +20,7 @@ from torch.nn import functional as F
 from labkit.labels import CLASSES
 from labkit.learning.channels import CHANNELS
 from labkit.learning.inference import Engine, NetworkInput
+from labkit.learning.view import PIXEL
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
 
@@ -136,7 +137,7 @@ class UNetRGBD(UNet):
     """A U-Net that also sees depth, as `labkit.learning.channels.geometry_channels`; 1.3 million weights.
 
     A shape is told by its heights and normals, which do not depend on colour, texture or viewpoint. One more block and
-    wider features at 1/16 cost little there. Topics 03 and 06.
+    wider features at 1/16 cost little there. It sees frames in their canonical view. Topics 03 and 06.
 
     >>> UNetRGBD().eval()(torch.zeros(1, 3, 37, 61), torch.full((1, 7, 37, 61), 0.5)).shape
     torch.Size([1, 4, 37, 61])
@@ -146,7 +147,7 @@ class UNetRGBD(UNet):
 
     def __init__(self, num_classes: int = len(CLASSES)):
         super().__init__(num_classes, (32, 64, 96, 128), (0, 1, 2, 2), 3 + len(CHANNELS))
-        self.takes = replace(self.takes, arrays=("image", "geometry"))
+        self.takes = replace(self.takes, arrays=("image", "geometry"), pixel=PIXEL)
 
     def forward(
         self, image: Float[torch.Tensor, "N 3 H W"], geometry: Float[torch.Tensor, "N 7 H W"]
@@ -167,9 +168,10 @@ def architecture_of(model: nn.Module) -> str:
 def save_model(model: nn.Module, path, **meta) -> None:
     """Write a model's weights, its architecture and plain facts about it (`meta`), atomically.
 
-    The file is a dict with keys architecture, num_classes, state_dict and meta, that `load_model` reads; `meta` holds
-    numbers, strings, lists and dicts. A model that states `half_kernels` gets the kernels of its convolutions stored in
-    16 bits, which halves the file and changes probabilities by less than a thousandth.
+    The file is a dict with keys architecture, num_classes, pixel (of the view that it knows), state_dict and meta, that
+    `load_model` reads; `meta` holds numbers, strings, lists and dicts. A model that states `half_kernels` gets the
+    kernels of its convolutions stored in 16 bits, which halves the file and changes probabilities by less than a
+    thousandth.
     """
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
     if getattr(model, "half_kernels", False):
@@ -177,6 +179,7 @@ def save_model(model: nn.Module, path, **meta) -> None:
     checkpoint = {
         "architecture": architecture_of(model),
         "num_classes": getattr(model, "num_classes", None),
+        "pixel": TorchEngine(model).takes.pixel,
         "state_dict": state,
         "meta": meta,
     }
@@ -217,7 +220,8 @@ def load_model(path, num_classes: int = len(CLASSES), model: nn.Module | None = 
     state = checkpoint.get("state_dict", checkpoint)
     if not isinstance(state, dict) or not all(isinstance(value, torch.Tensor) for value in state.values()):
         raise ValueError(f"path: expected weights by name in {path}, got other things")
-    if model is None:
+    kit_s_own = model is None
+    if kit_s_own:
         architecture = checkpoint.get("architecture") or told_by_weights(state)
         if architecture not in ARCHITECTURES:
             names = ", ".join(ARCHITECTURES)
@@ -237,6 +241,8 @@ def load_model(path, num_classes: int = len(CLASSES), model: nn.Module | None = 
             f"and {strange} of other names in {path}"
         )
     model.load_state_dict(state)
+    if kit_s_own:  # a file that does not state it is of a network that knows pictures as they are
+        model.takes = replace(model.takes, pixel=checkpoint.get("pixel"))
     return model.to(memory_format=torch.channels_last).eval()
 
 

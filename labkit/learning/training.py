@@ -211,11 +211,13 @@ class Trainer:
         config, (H, W) = self.config, self.data.y.shape[1:]
         whole, part = self.images_of_step(step)
         chosen = whole[part.start : part.stop] or [whole[part.start]]  # to have shapes; it is cut off again
+        views = [(picture, self.takes.view(picture)) for picture in self.data.pictures(chosen)]
+        seen = [picture if view is None else view.frame for picture, view in views]
         if config.augment:
             size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
             generator = generator_for(config.seed, 1, step)
             if self.data.depth is not None:
-                *arrays, y = augment_frames(self.data.pictures(chosen), size, generator, part.start, len(whole))
+                *arrays, y = augment_frames(seen, size, generator, part.start, len(whole))
             else:
                 *arrays, y = augment(
                     self.data.rgb[chosen], self.data.y[chosen], size, generator, part.start, len(whole)
@@ -223,9 +225,9 @@ class Trainer:
             mean, std = (torch.tensor(value).float().reshape(-1, 1, 1) for value in (self.takes.mean, self.takes.std))
             arrays[0] = arrays[0] * (255.0 / std) - mean / std
         else:
-            built = [self.takes.build(picture) for picture in self.data.pictures(chosen)]
-            arrays = [torch.from_numpy(np.stack(array)).permute(0, 3, 1, 2) for array in zip(*built, strict=True)]
-            y = self.data.y[chosen]
+            built = [self.takes.build(picture) for picture in seen]
+            arrays = [stacked(array).permute(0, 3, 1, 2) for array in zip(*built, strict=True)]
+            y = self.data.y[chosen] if self.takes.pixel is None else stacked([p.labels for p in seen], IGNORE)
         arrays, y = [array[: len(part)] for array in arrays], y[: len(part)]
         edges = (0, -y.shape[2] % self.takes.divisor, 0, -y.shape[1] % self.takes.divisor)
         if not any(edges):
@@ -295,15 +297,22 @@ class Trainer:
         require("out", together, "a checkpoint that every process reads, or none", f"step {self.done} here alone")
 
 
-def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int, batch: int = 8) -> np.ndarray:
+def stacked(images: Sequence[np.ndarray], beyond: int | None = None) -> torch.Tensor:
+    """Images as one tensor: smaller ones get the value `beyond` at their right and lower edge, None repeats theirs."""
+    H, W = np.max([image.shape[:2] for image in images], axis=0)
+    how = {"mode": "edge"} if beyond is None else {"constant_values": beyond}
+    edges = [[(0, H - x.shape[0]), (0, W - x.shape[1]), (0, 0)][: x.ndim] for x in images]
+    return torch.from_numpy(np.stack([np.pad(x, edge, **how) for x, edge in zip(images, edges, strict=True)]))
+
+
+def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int) -> np.ndarray:
     """Pool one confusion matrix (C, C) over all images of `data`, whole, with the model in eval mode."""
     engine, n = TorchEngine(model), np.zeros((num_classes, num_classes), np.int64)
     device, (rank, count) = engine.weight().device, ranks.place()
     with torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
-        for first in range(batch * rank, len(data), batch * count):
-            built = [engine.takes.build(p) for p in data.pictures(range(first, min(first + batch, len(data))))]
-            z = engine.padded([np.stack(array) for array in zip(*built, strict=True)])
-            n += confusion_matrix(data.y[first : first + batch].numpy(), z.argmax(axis=1), num_classes)
+        for i in range(rank, len(data), count):
+            z = engine.logits(data.pictures([i])[0])
+            n += confusion_matrix(data.y[i].numpy(), z.argmax(axis=0), num_classes)
     return ranks.total(torch.from_numpy(n)).numpy()
 
 
@@ -394,7 +403,7 @@ def write_state(trainer: Trainer, checkpoint: Path) -> None:
 def finish_run(trainer: Trainer, val_data: ImagesInMemory, out: Path) -> None:
     """Take the class weights back out of a trained network as far as validation likes it, and save it for good."""
     config, model = trainer.config, copy.deepcopy(trainer.model)
-    share, n = undo_weights(model, trainer.weights, val_data, config.num_classes, config.batch)
+    share, n = undo_weights(model, trainer.weights, val_data, config.num_classes)
     trainer.history[-1] |= {"mean_iou": mean_iou(n), "iou": iou(n).tolist(), "weights_undone": share}
     save_weights(model, trainer, out)
 
@@ -409,7 +418,7 @@ def save_weights(model: nn.Module, trainer: Trainer, out: Path) -> None:
 
 
 def undo_weights(
-    model: nn.Module, weights: torch.Tensor, val_data: ImagesInMemory, num_classes: int, batch: int = 8
+    model: nn.Module, weights: torch.Tensor, val_data: ImagesInMemory, num_classes: int
 ) -> tuple[float, np.ndarray]:
     """Lower each class's last bias by share * log w, with the share in 0..1 that gives the best mean IoU on val_data.
 
@@ -420,13 +429,13 @@ def undo_weights(
     """
     bias = getattr(getattr(model, "logits", None), "bias", None)
     if bias is None or (weights == weights[0]).all():
-        return 0.0, evaluate(model, val_data, num_classes, batch)
+        return 0.0, evaluate(model, val_data, num_classes)
     trained = bias.detach().clone()
     log_w = torch.log(weights.to(bias))
     best = None
     for share in (0.0, 0.25, 0.5, 0.75, 1.0):
         bias.data.copy_(trained - share * log_w)
-        n = evaluate(model, val_data, num_classes, batch)
+        n = evaluate(model, val_data, num_classes)
         if best is None or mean_iou(n) > mean_iou(best[1]):
             best = share, n
     bias.data.copy_(trained - best[0] * log_w)
@@ -452,7 +461,7 @@ def finish_epoch(trainer: Trainer, val_data: ImagesInMemory | None, out: Path) -
     trainer.losses = []
     last = trainer.done == trainer.total
     if val_data is not None and (epoch % config.val_every == 0 or last):
-        n = evaluate(trainer.model, val_data, config.num_classes, config.batch)
+        n = evaluate(trainer.model, val_data, config.num_classes)
         row |= {"mean_iou": mean_iou(n), "iou": iou(n).tolist()}
     trainer.history.append(row)
     save_weights(trainer.model, trainer, out)

@@ -85,6 +85,7 @@ def test_the_file_stands_alone_and_says_what_it_is(file):
         "divisor": "16",
         "arrays": '["image"]',
         "mean": "0.0",
+        "pixel": "null",
         "std": "255.0",
     }
     assert not {node.op_type for node in proto.graph.node} & {"Shape", "Gather", "Slice", "Pad"}, "a plain graph"

@@ -15,6 +15,7 @@ from labkit.learning.engines import ENGINES, open_engine
 from labkit.learning.inference import NetworkInput
 from labkit.learning.network import SmallSegNet, TorchEngine, UNet, UNetRGBD, evaluating
 from labkit.learning.training import ImagesInMemory, evaluate
+from labkit.learning.view import PIXEL, canonical_view
 from labkit.pipeline import Pipeline
 
 
@@ -133,6 +134,7 @@ def test_the_kits_network_sees_the_frames_depth_in_every_engine(name, mirror):
     """RGB, then seven channels, padded by repeating the border; in a mirror the normal's sideways part is turned."""
     torch.manual_seed(0)
     model, frame = UNetRGBD().eval(), frame_of_steps()
+    model.takes = replace(model.takes, pixel=None)  # pictures as they are
     engine = open_engine(model, name)
     more = [(0, engine.padded_side(side) - side) for side in (10, 14)]
 
@@ -154,10 +156,23 @@ def test_the_kits_network_sees_the_frames_depth_in_every_engine(name, mirror):
         assert np.abs(engine(seen, mirror) - expected).max() < 1e-5
 
 
+@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize("mirror", [False, True])
+def test_a_network_that_states_a_pixel_sees_the_canonical_view(name, mirror):
+    torch.manual_seed(0)
+    model, frame = UNetRGBD().eval(), frame_of_steps()
+    p = open_engine(model, name)(frame, mirror)
+    model.takes = replace(model.takes, pixel=None)
+    as_it_is = open_engine(model, name)
+    view = canonical_view(frame, PIXEL)
+    z = [view.back(as_it_is.logits(view.frame, each).transpose(1, 2, 0)) for each in (False, True)[: 1 + mirror]]
+    np.testing.assert_allclose(p, np.mean([F.softmax(torch.from_numpy(each), -1).numpy() for each in z], 0), atol=1e-5)
+
+
 def test_networks_of_ones_own_are_evaluated():
     rgb, y = random_image(20, 26), np.random.default_rng(1).choice(np.array([0, 1, 2, 255], np.uint8), (20, 26))
     model = Mine()
-    n = evaluate(model, ImagesInMemory([(rgb, y)] * 3, 3, progress=False), 3, batch=2)
+    n = evaluate(model, ImagesInMemory([(rgb, y)] * 3, 3, progress=False), 3)
     predicted = open_engine(model)(rgb).argmax(axis=-1)
     expected = [[3 * np.sum((y == i) & (predicted == j)) for j in range(3)] for i in range(3)]
     assert np.abs(n - expected).sum() <= 0.02 * n.sum()  # bfloat16 may turn a pixel whose logits nearly tie

@@ -2,6 +2,7 @@
 
 import io
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from torch.nn import functional as F
 
 from labkit.frame import RGBDFrame
 from labkit.learning.engines import open_engine
+from labkit.learning.view import PIXEL
 from labkit.network import (
     ARCHITECTURES,
     SmallSegNet,
@@ -18,6 +20,7 @@ from labkit.network import (
     UNetRGBD,
     load_model,
     save_model,
+    weights_path,
 )
 
 
@@ -96,6 +99,20 @@ def test_kernels_stored_in_half_give_nearly_the_same_probabilities(tmp_path):
     assert np.abs(p - q).max() < 1e-3
     torch.save(model.state_dict(), tmp_path / "bare.pt")
     assert type(load_model(tmp_path / "bare.pt")) is UNetRGBD
+
+
+def test_weights_keep_the_view_that_they_were_trained_in(tmp_path):
+    model = UNetRGBD()
+    for pixel in (0.004, None):
+        model.takes = replace(model.takes, pixel=pixel)
+        save_model(model, tmp_path / "w.pt")
+        assert load_model(tmp_path / "w.pt").takes == model.takes
+    old = torch.load(tmp_path / "w.pt", weights_only=True)
+    del old["pixel"]
+    torch.save(old, tmp_path / "old.pt")
+    assert load_model(tmp_path / "old.pt").takes.pixel is None, "there were no views when it was trained"
+    assert load_model(weights_path("unet_rgbd")).takes.pixel == PIXEL
+    assert load_model(weights_path("unet")).takes.pixel is None, "colours alone gain nothing by it"
 
 
 @pytest.mark.parametrize("model", [UNet(3), SmallSegNet(3)], ids=["unet", "smallsegnet"])
