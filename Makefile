@@ -11,7 +11,6 @@
 #   make test-site  its links, its words for figures, and what axe-core says of it
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make evidence write docs/evidence.md, README's promises and what shows them, from results that are there
-#   make mutants how many wrong answers that nobody wrote down a check can name, by lab (a quarter of an hour)
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
 #   make everywhere  the same on two Debians, with Python 3.11 and 3.13; what both make of fixed seeds is compared
 #   make clean   remove what can be made again in seconds; environments and data/ stay
@@ -21,7 +20,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench evidence mutants fresh everywhere clean site test-site
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site test-site
 
 BIN := .venv/bin
 ARGS ?=
@@ -56,9 +55,6 @@ bench: .venv-bench/installed
 
 evidence: .venv/installed
 	$(BIN)/python tests/evidence.py
-
-mutants: .venv/installed
-	PYTHONPATH=. $(BIN)/python tests/measure_diagnosis.py $(ARGS)
 
 fresh: .venv/installed
 	$(BIN)/python tests/fresh/run $(ARGS)

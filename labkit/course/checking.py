@@ -5,18 +5,25 @@ In Jupyter a check runs the program that the grader will run: the cell of the an
 """
 
 import html
+import inspect
+import itertools
 import os
 import sys
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
+from labkit.course.checker.child import findings
 from labkit.course.checker.comparison import Problem
 from labkit.course.checker.judge import Verdict
 from labkit.course.checker.program import Cell, Program, program
 from labkit.course.checker.question import PACKAGES, PUBLIC_SEED, Question
 from labkit.course.checker.run import MAX_PRINTED, Printed, define, judge
+from labkit.course.checker.wording import Marked
 from labkit.course.topics import find, of_topic
 
 LIMIT_S = 10.0  # for all cases together; a right answer takes a small part of it
+LOOKING = "Looking for the place in your program: a moment ..."
 COLOURS = {"✔": "#2e7d32", "✘": "#c62828", "○": "#b26a00"}
 
 
@@ -25,22 +32,34 @@ class CheckFailed(AssertionError):
 
 
 class Shown:
-    """What a check shows: a mark and lines of text; in colour in Jupyter, plain anywhere else."""
+    """What a check shows: a mark and lines, of text or of the student's program; in colour in Jupyter, else plain."""
 
-    def __init__(self, mark: str, *lines: str):
+    def __init__(self, mark: str, *lines: str | Marked):
         self.mark, self.lines = mark, lines
 
     def __repr__(self) -> str:
-        return "\n  ".join((f"{self.mark} {self.lines[0]}", *self.lines[1:]))
+        plain = [part for line in self.lines for part in (line.plain() if isinstance(line, Marked) else (line,))]
+        return "\n  ".join((f"{self.mark} {plain[0]}", *plain[1:]))
 
     def _repr_html_(self) -> str:
         colour = COLOURS[self.mark]
-        first, *rest = (html.escape(line) for line in self.lines)
+        first, *rest = (in_colour(line) if isinstance(line, Marked) else html.escape(line) for line in self.lines)
         rest = "".join(f"<br><span style='white-space:pre-wrap'>{line}</span>" for line in rest)
         return (
             f"<div style='border-left:4px solid {colour};padding:2px 10px'>"
             f"<b style='color:{colour}'>{self.mark}</b> <b>{first}</b>{rest}</div>"
         )
+
+
+def in_colour(line: Marked) -> str:
+    """A student's line in HTML, with its marked parts."""
+    edges = sorted({0, len(line.text), *(min(edge, len(line.text)) for part in line.parts for edge in part)})
+    text = ""
+    for a, b in itertools.pairwise(edges):
+        inside = any(first <= a and b <= last for first, last in line.parts)
+        piece = html.escape(line.text[a:b])
+        text += f"<mark>{piece}</mark>" if inside else piece
+    return f"Look at line {line.number}:  <code>{text}</code>"
 
 
 def check(name: str, answer: object) -> Callable:
@@ -64,12 +83,18 @@ def check(name: str, answer: object) -> Callable:
         return conclude(shown, question.reference, passed=False)
     printed = Printed()
     verdict = judged(question, answer, printed)
-    shown = describe(question, verdict, printed)
+    notes = ()
     if jupyter() is not None and not is_of_the_notebook(question, answer):
-        shown.lines += (f"This is another function than {question.function} of your notebook, which will be graded.",)
+        notes += (f"This is another function than {question.function} of your notebook, which will be graded.",)
     if verdict.problem is not None and verdict.problem.kind == "unanswered":
-        shown.lines += ("The kit's function takes its place below.",)
-    return conclude(shown, answer if verdict.passed else question.reference, verdict.passed)
+        notes += ("The kit's function takes its place below.",)
+    page = Page()
+    if verdict.needs_a_look and verdict.pieces:
+        if jupyter() is not None:
+            page.show(describe(question, verdict, printed, notes, LOOKING))
+        verdict = replace(verdict, findings=findings(question, verdict.pieces, PUBLIC_SEED))
+    shown = describe(question, verdict, printed, notes)
+    return conclude(shown, answer if verdict.passed else question.reference, verdict.passed, page)
 
 
 def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:
@@ -77,13 +102,24 @@ def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:
     cut = program_here(question) if is_of_the_notebook(question, answer) else None
     if cut is not None and cut.refused:
         return Verdict(Problem("refused", cut.refused), None, "")
+    pieces = written_alone(answer) if cut is None else cut.pieces
     if cut is not None:
         answer = define(cut, question.function, LIMIT_S, printed)
     if isinstance(answer, Problem):
         return Verdict(answer, None, "before it is called")
     if not callable(answer):
         return Verdict(Problem("kind", f"its cell makes it a {type(answer).__name__}, not a function"), None, "")
-    return judge(question, answer, PUBLIC_SEED, LIMIT_S, printed)
+    return replace(judge(question, answer, PUBLIC_SEED, LIMIT_S, printed), pieces=pieces)
+
+
+def written_alone(answer: Callable) -> tuple[tuple[str, str], ...]:
+    """The program of a function outside of a notebook: its own text, nothing if it has none or needs a closure."""
+    if not inspect.isfunction(answer) or answer.__closure__:
+        return ()
+    try:
+        return ("quiet", "import numpy as np"), (answer.__name__, textwrap.dedent(inspect.getsource(answer)))
+    except (OSError, TypeError):
+        return ()
 
 
 def is_of_the_notebook(question: Question, answer: Callable) -> bool:
@@ -112,31 +148,51 @@ def jupyter() -> object | None:
     return None if ipython is None else ipython.get_ipython()
 
 
-def conclude(shown: Shown, function: Callable, passed: bool) -> Callable:
+class Page:
+    """Where a check shows its result; in Jupyter a later one takes the place of the first."""
+
+    def __init__(self):
+        self.handle = None
+
+    def show(self, shown: Shown) -> None:
+        """Show a result."""
+        if jupyter() is None:
+            print(shown)
+        elif self.handle is None:
+            self.handle = sys.modules["IPython"].display.display(shown, display_id=True)
+        else:
+            self.handle.update(shown)
+
+
+def conclude(shown: Shown, function: Callable, passed: bool, page: Page | None = None) -> Callable:
     """Show a result; return the function, or raise if failing is to stop the notebook."""
     if not passed and os.environ.get("LABKIT_STRICT") == "1":
         raise CheckFailed(repr(shown))
-    if jupyter() is not None:
-        sys.modules["IPython"].display.display(shown)
-    else:
-        print(shown)
+    (page or Page()).show(shown)
     return function
 
 
-def describe(question: Question, verdict: Verdict, printed: Printed) -> Shown:
-    """Put a verdict on public cases in words."""
+def describe(
+    question: Question, verdict: Verdict, printed: Printed, notes: Sequence[str] = (), looking: str = ""
+) -> Shown:
+    """Put a verdict on public cases in words. looking: what stands in the place of the hint while it is looked for."""
     name, problem = question.function, verdict.problem
     said = [f"It prints: {line}" for line in printed.text.splitlines()[:3]]
     said += ["..."] if printed.length > MAX_PRINTED or printed.text.count("\n") > 3 else []
     if problem is None:
         by_hand = len(question.by_hand)
         tried = ([f"{by_hand} by hand"] if by_hand else []) + [f"{question.random_cases} random"]
-        return Shown("✔", f"{name} is right", f"Cases tried: {', '.join(tried)}.", *said)
+        return Shown("✔", f"{name} is right", f"Cases tried: {', '.join(tried)}.", *said, *notes)
     if problem.kind == "unanswered":
-        return Shown("○", f"{name}: not answered yet")
+        return Shown("○", f"{name}: not answered yet", *notes)
     if problem.kind == "refused":
-        return Shown("✘", f"{name} cannot be graded: {problem.says}", "The grader would refuse it in these words.")
-    lines = [f"line {number}:  {text}" for number, text in problem.lines]
+        refused = f"{name} cannot be graded: {problem.says}"
+        return Shown("✘", refused, "The grader would refuse it in these words.", *notes)
+    lines: list[str | Marked] = [f"line {number}:  {text}" for number, text in problem.lines]
     lines += [f"In {verdict.where}:", *(f"    {line}" for line in verdict.shown)] if verdict.shown else []
-    lines += [f"Hint: {verdict.hint}"] if verdict.hint else []
-    return Shown("✘", f"{name}: {problem.says}", *lines, *(f"Note: {note}." for note in verdict.notes), *said)
+    sentence = None if looking else verdict.sentence
+    if sentence is not None and sentence.marked:
+        lines += sentence.marked
+    lines += [looking] if looking else [f"Hint: {sentence.says}"] if sentence else []
+    lines += [f"Note: {note}." for note in verdict.notes]
+    return Shown("✘", f"{name}: {problem.says}", *lines, *said, *notes)

@@ -82,13 +82,13 @@ CASES = [
            "      returns   [[0.25, 0.75]]\n      expected  [[0.98127, 1.4813]]\n  Hint: Do all of them sum to one?"),
     (transposed, "✘ share: expected shape (1, 2), got (2, 1)\n" + HERE +
            "      returns   [[0.25], [0.75]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Hint: Along axis 0 your output is as long as the number of columns of n, which is wrong there."),
+           "  Look at line 2:  return right(n).T\n"  "PLACEHOLDER"),
     (lambda n: n + 9, "✘ share: 2 of 2 values are not right\n" + HERE +
            "      returns   [[10, 12]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Hint: It should hold, but does not: shares are not over two."),
-    (lambda n: n > 0, "✘ share: expected real numbers, got dtype bool\n" + HERE +
+           "  Hint: A right answer has a property that yours lacks: shares are not over two."),
+    (lambda n: n > 0, "✘ share: expected real numbers, got dtype bool: write .astype(float) or .astype(int)\n" + HERE +
            "      returns   [[True, True]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Hint: You return truth values, and numbers with a fraction are asked for; the values are others, too."),
+           "  Hint: No case is right. Do the one above by hand, and print what each of your lines gives."),
     (alters, "✘ share: it changes its argument n: work on a copy; what calls it still needs the old values"),
     (loud, "✔ share is right\n  Cases tried: 1 by hand, 4 random.\n"
            "  It prints: hello\n  It prints: hello\n  It prints: hello\n  ..."),

@@ -76,8 +76,8 @@ def trusted(function: Callable, args: tuple) -> object:
 def plain(got: object) -> object:
     """Give an output as NumPy: a scalar or an array, or a tuple of these, all copied; or the Problem that it is not.
 
-    Tensors of torch are converted; subclasses of arrays lose what they add. Lists stand for tuples. Nothing of an
-    object of any other class is called, not even its repr.
+    Tensors of torch are converted; subclasses of arrays lose what they add. A list of numbers, or of lists of them, is
+    an array, any other list a tuple. Nothing of an object of any other class is called, not even its repr.
 
     >>> plain((1, np.ones(2, np.float32)))
     (np.int64(1), array([1., 1.], dtype=float32))
@@ -86,10 +86,28 @@ def plain(got: object) -> object:
     """
     if not issubclass(type(got), tuple | list):
         return plain_array(got)
+    if issubclass(type(got), list) and (array := array_of_list(got)) is not None:
+        return array
     if len(got) > LONGEST_TUPLE:
         return Problem("kind", f"expected an array or a number, got a {kind_name(got)} of {len(got)}")
     parts = tuple(plain_array(part) for part in got)
     return next((part for part in parts if isinstance(part, Problem)), parts)
+
+
+def array_of_list(got: list) -> np.ndarray | None:
+    """The array that a list of numbers stands for; None if its rows differ in length, or hold anything else."""
+    waiting = [got]
+    while waiting:
+        for part in waiting.pop():
+            if issubclass(type(part), list):
+                waiting.append(part)
+            elif not issubclass(type(part), bool | int | float | np.generic | np.ndarray):
+                return None
+    try:
+        array = np.array(got)
+    except (ValueError, OverflowError):
+        return None
+    return array if got and array.dtype.kind in "biuf" else None
 
 
 def plain_array(got: object) -> object:
@@ -123,10 +141,13 @@ def compare(question: Question, expected: object, got: object) -> Problem | None
     """Say what is wrong with an output, None if nothing is.
 
     expected: from a Case. got: any object. In this order: kind, length of a tuple, dtype, shape, values that are not
-    finite where they should be, values. Floating-point outputs may come in any real dtype but bool; integers must be
-    integers, of any width, and truth values must be bool. NaN is right where the reference gives NaN.
+    finite where they should be, values. Floating-point outputs may come in any real dtype but bool; integers may be
+    whole floats, unless the question asks for the dtype, and truth values must be bool. An array counts as a tuple of
+    its rows where a tuple is expected. NaN is right where the reference gives NaN.
     """
     got = plain(got)
+    if isinstance(expected, tuple) and isinstance(got, np.ndarray) and got.ndim and len(got) == len(expected):
+        got = tuple(row[()] for row in got)
     if isinstance(got, Problem):
         return got
     return wrong_form(question, expected, got) or wrong_values(question, expected, got)
@@ -157,14 +178,16 @@ def parts(output: object) -> tuple:
 
 
 def wrong_dtype(expected, got) -> Problem | None:
-    """Integers for integers, truth values for truth values, and any real numbers for real numbers."""
-    allowed, wanted = {
-        "b": ("b", "bool"),
-        "i": ("iu", "an integer dtype"),
-        "u": ("iu", "an integer dtype"),
-        "f": ("fiu", "real numbers"),
-    }[expected.dtype.kind]
-    return None if got.dtype.kind in allowed else Problem("dtype", f"expected {wanted}, got dtype {got.dtype}")
+    """Whole numbers for integers, truth values for truth values, and any real numbers for real numbers."""
+    wanted, came = expected.dtype.kind, got.dtype.kind
+    if wanted == "b" and came != "b":
+        return Problem("dtype", f"expected bool, got dtype {got.dtype}: write a comparison, or .astype(bool)")
+    if wanted != "b" and came == "b":
+        numbers = "real numbers" if wanted == "f" else "whole numbers"
+        return Problem("dtype", f"expected {numbers}, got dtype bool: write .astype(float) or .astype(int)")
+    if wanted in "iu" and came == "f" and not (np.mod(got, 1.0) == 0.0).all():
+        return Problem("dtype", f"expected whole numbers, got fractions or NaN in an array of {got.dtype}")
+    return None
 
 
 def wrong_shape(expected, got) -> Problem | None:
@@ -215,7 +238,7 @@ def different(question: Question, expected: np.ndarray, got: np.ndarray) -> np.n
     """Where two arrays differ: numbers by the question's tolerance, integers and truth values exactly."""
     if expected.shape != got.shape:
         return np.ones(1, bool)
-    if expected.dtype.kind != "f" and got.dtype.kind != "f":
+    if expected.dtype.kind != "f":
         return expected != got
     with np.errstate(all="ignore"):
         return ~np.isclose(got, expected.astype(np.float64), question.rtol, question.atol, equal_nan=True)

@@ -10,14 +10,18 @@ Explanation = Callable[[re.Match, dict], str]
 EXPLAINED: list[tuple[re.Pattern, Explanation]] = []
 
 
-def explain(text: str, args: dict) -> str:
+def explain(text: str, args: dict, line: str = "") -> str:
     """One sentence about an exception, "" if there is none.
 
-    text: "IndexError: index 255 is out of bounds ...". args: the arguments of the call, by their names.
+    text: "IndexError: index 255 is out of bounds ...". args: the arguments of the call, by their names. line: the
+    student's line that raised it, if it is known.
 
     >>> explain("ZeroDivisionError: division by zero", {"n": 1})
     'Something that you divide by is 0 in this case.'
     """
+    unbracketed = re.search(r"[&|]", line) and re.search(r"[<>=!]=|[<>]", line)
+    if unbracketed and re.match(r"ValueError: The truth value|TypeError: (?:ufunc 'bitwise|unsupported operand)", text):
+        return "& and | bind closer than comparisons: put each comparison into brackets, as in (a > 0) & (b > 0)."
     for pattern, function in EXPLAINED:
         if (found := pattern.match(text)) and (said := function(found, args)):
             return said
@@ -204,6 +208,9 @@ TABLE = {
         "The parts of the array have different lengths: which of them is a list or an array by mistake?"
     ),
     r"ZeroDivisionError": "Something that you divide by is 0 in this case.",
+    r"OverflowError: Python integer (-?\d+) out of bounds for (\w+)": (
+        "{1} does not fit into {2}: make the array wider before, with .astype(int) or .astype(float)."
+    ),
     r"OverflowError|FloatingPointError": "A number grows too large: which exponential, power or cast is it?",
     r"(?:(?:numpy\.linalg\.)?LinAlgError|an exception): Singular matrix": (
         "This matrix has no inverse: is it the one that you mean, and are all its rows filled?"

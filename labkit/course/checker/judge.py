@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from labkit.course.checker.comparison import Case, Problem, compare, expected_cases, parts, plain, trusted
-from labkit.course.checker.diagnosis import Sentence, diagnose
+from labkit.course.checker.diagnosis import Sentence, at_once, diagnose
+from labkit.course.checker.finding import Finding
 from labkit.course.checker.question import Question
 from labkit.course.checker.showing import shown_case
 
@@ -27,7 +28,8 @@ class Verdict:
     """The result of all cases of a question.
 
     problem: None if the answer passes; case: the number of the case that has it, from 0, and `where` says it in words.
-    question, notes: what is no reason to fail, but should be said. cases, outputs: what it was made of.
+    question, notes: what is no reason to fail, but should be said. cases, outputs: what it was made of. pieces: the
+    program, and findings: what instruments and repair know about it, once somebody has looked.
     """
 
     problem: Problem | None
@@ -37,6 +39,8 @@ class Verdict:
     notes: tuple[str, ...] = ()
     cases: Sequence[Case] = ()
     outputs: Sequence[object] = ()
+    pieces: Sequence[tuple[str, str]] = ()
+    findings: Sequence[Finding] = ()
 
     @property
     def passed(self) -> bool:
@@ -45,10 +49,17 @@ class Verdict:
 
     @cached_property
     def sentence(self) -> Sentence | None:
-        """The most specific thing that is true of a wrong answer; looked for when it is asked for."""
-        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "altered"):
+        """The surest thing that is true of a wrong answer; looked for when it is asked for."""
+        if self.problem is None or self.question is None or self.problem.kind == "unanswered":
             return None
-        return diagnose(self.question, self.cases, self.outputs)
+        return diagnose(self.question, self.cases, self.outputs, self.pieces, self.findings)
+
+    @property
+    def needs_a_look(self) -> bool:
+        """Whether a wrong answer runs, and no sentence names its mistake without a look at its program."""
+        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "time"):
+            return False
+        return at_once(self.question, self.cases, self.outputs) is None
 
     @property
     def hint(self) -> str | None:

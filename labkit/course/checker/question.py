@@ -40,8 +40,7 @@ class Question:
     asymmetric so that swaps show. by_hand: arguments of cases small enough to do by hand; each is always tried.
     random_cases: how many cases are drawn. rtol, atol: what counts as equal. same_dtype: whether
     the dtype is asked for, too. points: what the blank is worth.
-    properties: what the check may say about a wrong output before it compares. misconceptions: filled by `wrong`. ways:
-    right answers written otherwise, in whose steps mistakes are looked for, too; filled by `way`.
+    properties: what the check may say about a wrong output before it compares. misconceptions: filled by `wrong`.
     canonical: maps an output to the one form of those that are equally right (the sign of an axis, say). forbidden:
     modules that would do the work; they do not exist where answers are graded.
     """
@@ -57,7 +56,6 @@ class Question:
     points: int = 2
     properties: tuple[Property, ...] = ()
     misconceptions: list[Misconception] = field(default_factory=list)
-    ways: list[Callable] = field(default_factory=list)
     canonical: Callable = lambda output: output
     forbidden: tuple[str, ...] = ()
 
@@ -95,16 +93,6 @@ def wrong(question: Question, hint: str) -> Callable[[Callable], Callable]:
 
     def add(answer: Callable) -> Callable:
         question.misconceptions.append(Misconception(answer, hint))
-        return answer
-
-    return add
-
-
-def way(question: Question) -> Callable[[Callable], Callable]:
-    """Decorate a right answer to a question that is written otherwise than the reference."""
-
-    def add(answer: Callable) -> Callable:
-        question.ways.append(answer)
         return answer
 
     return add

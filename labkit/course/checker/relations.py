@@ -1,13 +1,11 @@
-"""What wrong outputs have to do with the right ones: transposed, doubled, shifted by one, minus the right ones ...
+"""What wrong outputs have to do with the right ones, where a student sees it at once: transposed, a factor, a sign.
 
 Each relation is one small function of a `View`, which holds the expected and the returned array of every case. It gives
-one sentence for the student, "" if it does not hold; it holds only if it does so in every case that can show it.
-ARRANGED are relations of whole arrays; NUMBERS are relations number by number, which can also be asked of some places
-alone (`places`); COMBINED are those with the arguments and steps; LOOSE are true of more answers, so they come late.
+one sentence, "" if it does not hold; it holds only if it does so in every case that can show it.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +19,7 @@ Array = np.ndarray | np.generic
 class View:
     """The expected and the returned array of each case, with the case's arguments and their names.
 
-    rtol, atol: what counts as equal. steps: what the reference computes on the way, see `steps`.
+    rtol, atol: what counts as equal.
     """
 
     expected: tuple[np.ndarray, ...]
@@ -30,7 +28,6 @@ class View:
     names: tuple[str, ...]
     rtol: float
     atol: float
-    steps: tuple[tuple[str, list], ...] = ()
 
     def different(self, a: Array, b: Array) -> np.ndarray:
         """Where two arrays of one shape differ; truth values are no numbers."""
@@ -46,21 +43,18 @@ class View:
         """Whether two arrays are equal within the tolerance."""
         return a.shape == b.shape and not self.different(a, b).any()
 
-    def is_(self, predicted: Sequence[np.ndarray | None]) -> bool:
-        """Whether these are the returned arrays, and not all the expected ones; None counts as the expected one.
+    def gives(self, change: Callable) -> bool:
+        """Whether a change of the expected arrays makes them the returned ones, and not all of them as they were.
 
         Zeros show nothing: too many things are zero.
         """
         shows = 0
-        for e, g, p in zip(self.expected, self.got, predicted, strict=True):
+        for e, g in zip(self.expected, self.got, strict=True):
+            p = attempt(change, e)
             if not self.same(e if p is None else p, g):
                 return False
             shows += p is not None and not self.same(e, p) and not (np.abs(np.asarray(p, float)) <= self.atol).all()
         return shows > 0
-
-    def gives(self, change: Callable) -> bool:
-        """Whether a change of the expected arrays makes them the returned ones."""
-        return self.is_([attempt(change, e) for e in self.expected])
 
     @property
     def shaped(self) -> bool:
@@ -71,32 +65,32 @@ class View:
         """Where the arrays differ, if they have their right shapes."""
         return [self.different(e, g) for e, g in zip(self.expected, self.got, strict=True)]
 
-    def at(self, masks: Sequence[np.ndarray]) -> "View":
-        """The numbers at some places alone."""
-        expected = tuple(e[mask] for e, mask in zip(self.expected, masks, strict=True))
-        return replace(self, expected=expected, got=tuple(g[mask] for g, mask in zip(self.got, masks, strict=True)))
-
-    def numbers(self) -> tuple[np.ndarray, np.ndarray, list[int]]:
-        """All expected and returned numbers in a row, as floats, and how many belong to each case."""
+    def numbers(self) -> tuple[np.ndarray, np.ndarray]:
+        """All expected and all returned numbers in a row, as floats."""
         e, g = (np.concatenate([np.ravel(a).astype(float) for a in arrays]) for arrays in (self.expected, self.got))
-        return e, g, [np.size(a) for a in self.expected]
+        return e, g
 
 
 Relation = Callable[[View], str]
-ARRANGED: list[Relation] = []
-NUMBERS: list[Relation] = []
-COMBINED: list[Relation] = []
-LOOSE: list[Relation] = []
+RELATIONS: list[Relation] = []
 
 
-def relation(entries: list[Relation]) -> Callable[[Relation], Relation]:
-    """Enter a relation in a list."""
+def relation(function: Relation) -> Relation:
+    """Enter a relation; they are asked in the order of this page."""
+    RELATIONS.append(function)
+    return function
 
-    def enter(function: Relation) -> Relation:
-        entries.append(function)
-        return function
 
-    return enter
+def related(view: View) -> Iterator[str]:
+    """The sentences of all relations that hold."""
+    for function in RELATIONS:
+        with quiet():
+            try:
+                said = function(view)
+            except Exception:  # the oddest outputs may break a relation: then it does not hold
+                continue
+        if said:
+            yield said
 
 
 def attempt(change: Callable, *arguments) -> np.ndarray | None:
@@ -114,60 +108,64 @@ def axes(view: View) -> range:
     return range(min(e.ndim for e in view.expected))
 
 
-def ordinal(axis: int, view: View) -> str:
+def along(axis: int, view: View) -> str:
     """The name of an axis."""
     if all(e.ndim == 2 for e in view.expected):
         return ("from row to row", "from column to column")[axis]
-    return f"along axis {axis}" if axis >= 0 else "along the last axis"
+    return "" if all(e.ndim == 1 for e in view.expected) else f"along axis {axis}"
+
+
+def one(view: View) -> str:
+    """What stands along the first axis, in the singular."""
+    return "entry" if all(e.ndim == 1 for e in view.expected) else "row"
 
 
 # ------------------------------------------------------------------------------------------- whole arrays
 
 
-@relation(ARRANGED)
+@relation
 def transposed(view: View) -> str:
     """Rows and columns exchanged."""
     if view.gives(lambda e: np.swapaxes(e, 0, 1)):
-        return "Rows and columns are exchanged: your output is the transpose of the right one."
+        return "Your values are right, but rows and columns are exchanged. Which index comes first?"
     return ""
 
 
-@relation(ARRANGED)
+@relation
 def axes_in_another_order(view: View) -> str:
     """Of three or four axes."""
     for order in itertools.permutations(axes(view)) if 3 <= len(axes(view)) <= 4 else ():
         if view.gives(lambda e, order=order: np.transpose(e, order)):
-            return f"The values are right; your axes are the right ones in the order {', '.join(map(str, order))}."
+            return "Your values are right, but the axes stand in another order. Compare the two shapes, axis by axis."
     return ""
 
 
-@relation(ARRANGED)
+@relation
 def another_shape(view: View) -> str:
     """The right values in reading order."""
     if view.shaped or not all(view.same(e.ravel(), g.ravel()) for e, g in zip(view.expected, view.got, strict=True)):
         return ""
-    return (
-        "The values are right and in the right order, only the shape is another: is there an axis too many or too few?"
-    )
+    return "Your values are right, only the shape is not. Is an axis missing, or is there one too many?"
 
 
-@relation(ARRANGED)
+@relation
 def reversed_along_an_axis(view: View) -> str:
     """The last one first."""
     for axis in axes(view):
         if view.gives(lambda e, axis=axis: np.flip(e, axis)):
-            return f"The order {ordinal(axis, view)} is reversed: the last one comes first."
+            return f"Your values are right, but they stand in reverse order {along(axis, view)}".rstrip() + "."
     return ""
 
 
-@relation(ARRANGED)
+@relation
 def two_exchanged(view: View) -> str:
-    """Two of a few rows or columns."""
+    """Two of a few rows, columns or entries."""
     for axis in (-1, 0) if len(axes(view)) > 1 else (0,) if axes(view) else ():
         length = min(e.shape[axis] for e in view.expected)
-        for i, j in itertools.combinations(range(length), 2) if length <= 6 else ():
+        what = one(view) if axis == 0 else "column"
+        for i, j in itertools.combinations(range(length), 2) if 2 < length <= 6 else ():
             if view.gives(lambda e, i=i, j=j, axis=axis: exchanged(e, i, j, axis)):
-                return f"Numbers {i} and {j} {ordinal(axis, view)} are exchanged (counted from 0)."
+                return f"Your {what} {i} holds what belongs into {what} {j}, and the other way round (counted from 0)."
     return ""
 
 
@@ -178,17 +176,20 @@ def exchanged(e: np.ndarray, i: int, j: int, axis: int) -> np.ndarray:
     return np.take(e, order, axis)
 
 
-@relation(ARRANGED)
+@relation
 def shifted_by_one(view: View) -> str:
     """Along an axis; what comes in at the end is not looked at."""
     if not view.shaped or not any(wrong.any() for wrong in view.wrong()):
         return ""
-    for axis, (step, words) in itertools.product(axes(view), ((1, "forward"), (-1, "back"))):
+    for axis, step in itertools.product(axes(view), (1, -1)):
         inner = (slice(None),) * axis
         to, back = (slice(1, None), slice(None, -1))[::step]
         pairs = [(e[(*inner, back)], g[(*inner, to)]) for e, g in zip(view.expected, view.got, strict=True)]
         if all(view.same(e, g) for e, g in pairs) and sum(e.size for e, _ in pairs) > 3 and varies(view, axis):
-            return f"Everything is shifted by one {ordinal(axis, view)}, {words}."
+            where = "after" if step == 1 else "before"
+            return (
+                f"Your values are right, but each stands one place {where} its own {along(axis, view)}".rstrip() + "."
+            )
     return ""
 
 
@@ -197,80 +198,138 @@ def varies(view: View, axis: int) -> bool:
     return any(np.size(e) and not view.same(e, np.roll(e, 1, axis)) for e in view.expected)
 
 
-@relation(ARRANGED)
+@relation
 def one_too_few(view: View) -> str:
-    """The first or last along an axis left out."""
-    for axis in axes(view):
-        inner = (slice(None),) * axis
-        for name, kept in (("last", slice(None, -1)), ("first", slice(1, None))):
-            if view.gives(lambda e, inner=inner, kept=kept: e[(*inner, kept)]):
-                return f"The {name} one {ordinal(axis, view)} is missing; all others are right."
-    return ""
-
-
-@relation(ARRANGED)
-def one_too_many(view: View) -> str:
-    """One more along an axis."""
+    """The first or last along an axis left out, or one too many there."""
     turned = replace(view, expected=view.got, got=view.expected)
-    if one_too_few(turned):
-        return f"There is one too many: {one_too_few(turned).partition(' is missing')[0].lower()} should not be there."
+    for axis, name in itertools.product(axes(view), ("first", "last")):
+        kept = (*((slice(None),) * axis), slice(1, None) if name == "first" else slice(None, -1))
+        what = one(view) if axis == 0 else "column" if axis == 1 else f"entry along axis {axis}"
+        if view.gives(lambda e, kept=kept: e[kept]):
+            return f"The {name} {what} is missing; all others are right."
+        if turned.gives(lambda e, kept=kept: e[kept]):
+            return f"Your {name} {what} is one too many; all others are right."
     return ""
 
 
-@relation(ARRANGED)
-def right_values_elsewhere(view: View) -> str:
-    """The same numbers in another order."""
-    big = [np.size(e) > 2 and np.unique(e).size > 2 for e in view.expected]
-    if not any(big):
+# ------------------------------------------------------------------------------------------ number by number
+
+FUNCTIONS = {
+    "Each of your numbers has the wrong sign.": np.negative,
+    "The signs are lost: yours are the absolute values.": np.abs,
+    "Each of your numbers is 1 minus the right one. Whose share is asked for?": lambda e: 1.0 - e,
+    "Each of your numbers is 1 over the right one. What is divided by what?": lambda e: 1.0 / e,
+    "Each of your numbers is the square of the right one: is a root missing?": np.square,
+    "Each of your numbers is the root of the right one. Is it the square that is asked for?": np.sqrt,
+    "Each of your numbers is the logarithm of the right one.": np.log,
+    "Each of your numbers is minus the logarithm of the right one.": lambda e: -np.log(e),
+    "Each of your numbers is the exponential of the right one: a logarithm is missing.": np.exp,
+    "Your numbers are the right ones without their fractions. Where do they become whole numbers?": np.trunc,
+    "Your numbers are the right ones, rounded. Where do they become whole numbers?": np.round,
+    "Your numbers begin again at 256: somewhere they are bytes (uint8).": lambda e: np.mod(e, 256),
+    "Yours is true exactly where the right one is false.": lambda e: ~e if e.dtype.kind == "b" else None,
+}
+
+
+@relation
+def function_of_the_right_value(view: View) -> str:
+    """A function of the right value, one of FUNCTIONS."""
+    if view.shaped and np.unique(view.numbers()[0]).size < 2:  # one number: any function of it would do
         return ""
-    sort = [(np.sort(e, axis=None), np.sort(g, axis=None)) for e, g in zip(view.expected, view.got, strict=True)]
-    return "All the right values are there, but at other places." if all(view.same(e, g) for e, g in sort) else ""
+    return next((says for says, function in FUNCTIONS.items() if view.gives(function)), "")
 
 
-@relation(ARRANGED)
-def one_row_for_all(view: View) -> str:
-    """Every row is the right first, or last, one; the same for columns."""
-    for axis, (name, at) in itertools.product(axes(view), (("first", 0), ("last", -1))):
-        if view.gives(lambda e, axis=axis, at=at: np.broadcast_to(np.take(e, [at], axis), e.shape)):
-            return f"All are alike {ordinal(axis, view)}: everywhere stands what is right for the {name} one."
-    return ""
+CONSTANTS = {
+    2.0: "2",
+    3.0: "3",
+    4.0: "4",
+    180.0 / np.pi: "180 / pi (degrees, radians)",
+    np.pi: "pi",
+    2.0 * np.pi: "2 pi",
+    255.0: "255 (bytes, numbers from 0 to 1)",
+    256.0: "256",
+    1000.0: "1000 (millimetres, metres)",
+    1e6: "a million",
+    1e9: "1e9 (nanoseconds, seconds)",
+    1.0 / np.log(2.0): "log 2 (another base of the logarithm)",
+    np.log(10.0): "log 10 (another base of the logarithm)",
+    np.sqrt(2.0): "the root of 2",
+}
 
 
-@relation(ARRANGED)
-def summed_up(view: View) -> str:
-    """Sums from the beginning on, in place of the numbers; or differences."""
-    for axis in axes(view):
-        if view.gives(lambda e, axis=axis: np.cumsum(e, axis)):
-            return f"Your values add up {ordinal(axis, view)}: each holds the sum of those before it, too."
-    return ""
-
-
-@relation(COMBINED)
-def scaled_line_by_line(view: View) -> str:
-    """A factor for each row, column or pixel: normalised along the wrong axis, or not at all."""
-    if not view.shaped or len(axes(view)) < 2:
+@relation
+def factor(view: View) -> str:
+    """One factor in all cases that has a name."""
+    e, g = view.numbers() if view.shaped else (np.zeros(0), np.zeros(0))
+    use = np.isfinite(e) & (e != 0.0)
+    if np.unique(e[use]).size < 2:
         return ""
-    for axis in axes(view):
-        if not all(factors_along(view, e, g, axis) for e, g in zip(view.expected, view.got, strict=True)):
-            continue
-        if not all(np.allclose(e.sum(axis), 1.0) for e in view.expected):
-            return f"Yours are the right values times a number that stays the same {ordinal(axis, view)}, and is not 1."
-        for other in axes(view):
-            if other != axis and all(np.allclose(g.sum(other), 1.0) for g in view.got):
-                return f"Your values sum to 1 {ordinal(other, view)}; they should sum to 1 {ordinal(axis, view)}."
-        return f"Your values should sum to 1 {ordinal(axis, view)} and do not: divide by what they sum to."
+    k = abs(float(np.median(g[use] / e[use])))
+    for value, name in CONSTANTS.items():
+        for size, words in ((value, "large"), (1.0 / value, "small")):
+            for sign in (1.0, -1.0):
+                if np.isclose(k, size, rtol=1e-3, atol=0.0) and view.gives(lambda e, s=sign * size: s * e):
+                    too = ", and they have the wrong sign" if sign < 0 else ""
+                    return f"Your numbers are too {words} by a factor of {name}{too}."
     return ""
 
 
-def factors_along(view: View, e: np.ndarray, g: np.ndarray, axis: int) -> bool:
-    """Whether g is e times factors that are constant along one axis, along which there is more than one number each."""
-    if e.shape[axis] < 2 or e.dtype.kind == "b" or g.dtype.kind == "b":
-        return view.same(e, g)
-    with np.errstate(all="ignore"):
-        factor = np.sum(g * e, axis, keepdims=True, dtype=float) / np.sum(
-            np.square(e, dtype=float), axis, keepdims=True
-        )
-    if not np.isfinite(factor).all() or (factor == 0).any() or not view.same(e * factor, g):
-        return False
-    scaled = ~np.isclose(factor, 1.0, rtol=view.rtol, atol=0.0)
-    return bool((np.count_nonzero(e, axis=axis, keepdims=True)[scaled] > 1).all())
+# --------------------------------------------------------------------------------------------------- places
+
+
+@relation
+def only_at_a_place(view: View) -> str:
+    """Where it is wrong, if that has a name, and all else is right."""
+    if not view.shaped:
+        return ""
+    wrong = view.wrong()
+    for name, masks in places(view):
+        inside = all(not (w & ~m).any() for w, m in zip(wrong, masks, strict=True))
+        others = any((~m).any() for w, m in zip(wrong, masks, strict=True) if w.any())
+        if inside and others:
+            return f"It is wrong only {name}; all else is right."
+    return ""
+
+
+def places(view: View) -> Iterator[tuple[str, Sequence[np.ndarray]]]:
+    """Places that a student knows by name, with masks for every case."""
+    for i, name in enumerate(view.names):
+        values = [np.asarray(args[i]) for args in view.args]
+        for says, number in (("is 255", 255), ("is NaN", np.nan), ("is 0", 0)):
+            pairs = list(zip(view.expected, values, strict=True))
+            if not all(v.ndim and v.dtype.kind in "iuf" and v.shape == e.shape[: v.ndim] for e, v in pairs):
+                continue
+            if number == 255 and not all(v.dtype == np.uint8 for v in values):
+                continue
+            masks = [np.isnan(v.astype(float)) if number != number else v == number for v in values]
+            yield f"where {name} {says}", [spread(m, e) for m, e in zip(masks, view.expected, strict=True)]
+    yield "where NaN is expected", [np.isnan(e.astype(float)) for e in view.expected]
+    if all(e.ndim == 2 for e in view.expected):
+        for name, index in (
+            ("first row", (0,)),
+            ("last row", (-1,)),
+            ("first column", (..., 0)),
+            ("last column", (..., -1)),
+        ):
+            yield f"in the {name}", [at(e, index) for e in view.expected]
+        yield "at the border", [border(e) for e in view.expected]
+
+
+def spread(mask: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """A mask of pixels for an array that has more axes."""
+    return np.broadcast_to(mask.reshape(mask.shape + (1,) * (e.ndim - mask.ndim)), e.shape)
+
+
+def at(e: np.ndarray, index: tuple) -> np.ndarray:
+    """A mask of an index."""
+    mask = np.zeros(e.shape, bool)
+    if e.size:
+        mask[index] = True
+    return mask
+
+
+def border(e: np.ndarray) -> np.ndarray:
+    """A mask of the first and last rows and columns."""
+    mask = np.ones(e.shape, bool)
+    mask[1:-1, 1:-1] = False
+    return mask

@@ -26,7 +26,6 @@ LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should lo
 ONLY_HIDDEN = (
     "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
 )
-NAMES_THE_MISTAKE = ("misconception", "exception", "relation", "input", "step", "slip")  # kinds of hints
 WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 
 
@@ -123,7 +122,7 @@ class Grading:
             return replace(base, says=problem.says, behaviour="")
         says = f"{problem.says} ({public.where})"
         shown = "\n".join(public.shown)
-        named = public.sentence is not None and public.sentence.kind in NAMES_THE_MISTAKE
+        named = public.sentence is not None and public.sentence.names_the_mistake
         return replace(
             base, says=says, hint=public.hint or "", shown=shown, behaviour="" if named else behaviour_of(outputs)
         )

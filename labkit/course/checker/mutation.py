@@ -1,0 +1,737 @@
+"""Mutations of a program: each changes one place, as a student would who has found the mistake (used by `repair`).
+
+    for mutation in mutations(function): with mutation.applied(): compile it
+
+A mutation is a recipe, such as "another axis" or "minus in place of plus", and the places where it is applied: one,
+each occurrence of the same expression, or the same spot in parallel lines. None of them brings in what the student's
+function does not know: beside NumPy's own names there are only those that it uses itself. The module needs the standard
+library alone, so that it also runs in the grader's sandbox.
+"""
+
+import ast
+import contextlib
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from labkit.course.checker.finding import Span
+
+MOST_TERMS = 10  # names and short expressions of the function that are tried as a missing term
+SHORT = 6  # nodes of an expression that counts as short
+LONGEST_GROUP = 6  # places that one recipe is applied to together
+# Functions of one family: a student may have taken the wrong one.
+FAMILIES = (
+    "sum mean prod max min median any all std var",
+    "argmax argmin argsort",
+    "floor ceil round rint trunc",
+    "maximum minimum fmax fmin hypot add subtract multiply",
+    "zeros ones empty",
+    "zeros_like ones_like empty_like",
+    "sin cos tan",
+    "arcsin arccos arctan",
+    "arctan2 hypot",
+    "exp log log2 log10 log1p expm1 sqrt square abs",
+    "vstack hstack concatenate stack column_stack dstack",
+    "repeat tile",
+    "dot outer cross inner matmul",
+    "cumsum cumprod",
+    "argsort sort",
+    "inv pinv",
+    "isnan isfinite isinf",
+    "logical_and logical_or logical_xor",
+    "diag diagonal trace",
+    "triu tril",
+    "eye ones zeros",
+    "append extend",
+    "searchsorted digitize",
+    "flip fliplr flipud",
+    "ravel flatten",
+)
+RELATED = {name: [n for n in family.split() if n != name] for family in FAMILIES for name in family.split()}
+AXES = ("0", "1", "2", "-1", "-2", "None", "(0, 1)")
+TAKES_AXIS = {"sum", "mean", "prod", "max", "min", "argmax", "argmin", "any", "all", "cumsum", "cumprod", "sort"}
+TAKES_AXIS |= {"median", "std", "var", "norm", "argsort", "stack", "concatenate", "diff", "flip", "repeat", "amax"}
+ARITHMETIC = (ast.Add, ast.Sub, ast.Mult, ast.Div)
+OPERATORS = {
+    **dict.fromkeys(ARITHMETIC, ARITHMETIC),
+    ast.Div: (*ARITHMETIC, ast.FloorDiv),
+    ast.FloorDiv: (ast.Div, ast.Mod),
+    ast.Mult: (*ARITHMETIC, ast.MatMult, ast.Pow),
+    ast.MatMult: (ast.Mult,),
+    ast.Pow: (ast.Mult,),
+    ast.Mod: (ast.FloorDiv, ast.Div),
+    ast.BitAnd: (ast.BitOr, ast.BitXor),
+    ast.BitOr: (ast.BitAnd, ast.BitXor),
+    ast.BitXor: (ast.BitAnd, ast.BitOr),
+    ast.LShift: (ast.RShift,),
+    ast.RShift: (ast.LShift,),
+}
+COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
+# What may be missing around an expression `_`: the kind of the mistake, how many nodes it adds, and the texts.
+AROUND = (
+    ("transpose", 1, "_.T | np.swapaxes(_, -1, -2)"),
+    ("sign", 1, "-_ | np.abs(_)"),
+    ("not", 1, "~_ | not _"),
+    ("power", 1, "np.sqrt(_) | _ ** 2"),
+    ("logarithm", 1, "np.log(_) | np.log2(_) | np.log10(_)"),
+    ("exponential", 1, "np.exp(_)"),
+    ("cast", 1, "_.astype(float) | _.astype(int) | float(_) | int(_) | np.int64(_)"),
+    ("rounding", 1, "np.round(_) | np.floor(_) | np.ceil(_)"),
+    ("copy", 1, "_.copy()"),
+    ("off by one", 2, "_ + 1 | _ - 1 | _ + 0.5 | _ - 0.5"),
+    ("factor", 2, "2 * _ | _ / 2 | _ * 1000 | _ / 1000 | _ * 255 | _ / 255 | _ * 256"),
+    ("complement", 2, "1 - _"),
+    ("reciprocal", 2, "1 / _"),
+    ("new axis", 2, "_[None] | _[:, None] | _[..., None] | _[:, None, None] | _[:, :, None]"),
+    ("reversed", 2, "_[::-1] | _[:, ::-1] | _[..., ::-1]"),
+    ("slice", 2, "_[1:] | _[:-1] | _[0] | _[-1] | _[:, 0] | _[:, -1] | _[..., 0] | _[:3] | _[:3, :3] | _[..., :3]"),
+    ("bound", 2, "np.maximum(_, 0) | np.maximum(_, 1) | np.minimum(_, 1) | np.clip(_, 0, 1)"),
+    ("period", 2, "_ % np.pi | _ % (2 * np.pi) | _ % 256"),
+    (
+        "sum",
+        2,
+        "_.sum() | _.sum(axis=0) | _.sum(axis=1) | _.sum(axis=-1) | _.mean() | _.mean(axis=0) | _.max() | _.min()",
+    ),
+    ("sum", 3, "_.sum(axis=-1, keepdims=True) | _.mean(axis=-1, keepdims=True)"),
+    ("shift", 3, "_ - _.max() | _ - _.min() | _ - _.mean() | _ - _.mean(axis=0) | _ - _.max(axis=-1, keepdims=True)"),
+    ("divided", 3, "_ / _.sum() | _ / len(_) | _ / _.sum(axis=-1, keepdims=True) | _ / _.sum(axis=0)"),
+    ("divided", 3, "_ / np.linalg.norm(_)"),
+)
+ROUND_A_CONDITION = " | ".join(f"_ & ({{}} {test})" for test in ("!= 255", "> 0", ">= 0", "== 0"))
+
+
+@dataclass(frozen=True)
+class Place:
+    """A node of a syntax tree, or a list of statements (index None), in its parent."""
+
+    parent: ast.AST
+    field: str
+    index: int | None = None
+
+    @property
+    def node(self):
+        """What stands there."""
+        value = getattr(self.parent, self.field)
+        return value if self.index is None else value[self.index]
+
+    def put(self, node) -> None:
+        """Put another node there."""
+        if self.index is None:
+            setattr(self.parent, self.field, node)
+        else:
+            getattr(self.parent, self.field)[self.index] = node
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a node is replaced. key: the same for recipes that do the same to other nodes; cost: nodes that change."""
+
+    kind: str
+    key: str
+    cost: float
+    make: Callable
+    mark: tuple[ast.AST | Span, ...] = ()  # what is shown, if not the whole node
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """A recipe at one place, or at several that count as one."""
+
+    kind: str
+    cost: float
+    places: tuple[Place, ...]
+    makes: tuple[Callable, ...]
+    spans: tuple[Span, ...]
+
+    @contextlib.contextmanager
+    def applied(self) -> Iterator[None]:
+        """The tree is changed inside of the block."""
+        before = [place.node for place in self.places]
+        for place, make, node in zip(self.places, self.makes, before, strict=True):
+            place.put(make(node))
+        try:
+            yield
+        finally:
+            for place, node in zip(self.places, before, strict=True):
+                place.put(node)
+
+
+def mutations(function: ast.stmt) -> list[Mutation]:
+    """All mutations of a function, those that change least first; equal ones in the order of the text."""
+    scope = Scope(function)
+    found = [*of_expressions(function, scope), *of_statements(function)]
+    return sorted(found, key=lambda mutation: mutation.cost)  # stable
+
+
+# --------------------------------------------------------------------------------------- the student's own names
+
+
+class Scope:
+    """What a function knows: its names, and short expressions that it forms of them."""
+
+    def __init__(self, function: ast.stmt):
+        self.names: dict[str, None] = {}
+        short: dict[str, ast.expr] = {}
+        inside = [node for node in ast.walk(function) if node is not function]
+        for node in inside:
+            if isinstance(node, ast.arg):
+                self.names[node.arg] = None
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                self.names[node.id] = None
+        for node in inside:
+            if not isinstance(node, ast.Attribute | ast.Subscript | ast.Call) or size(node) > SHORT:
+                continue
+            used = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+            if used & self.names.keys() and isinstance(getattr(node, "ctx", ast.Load()), ast.Load):
+                short.setdefault(ast.unparse(node), node)
+        self.terms = [*self.names, *sorted(short, key=len)][:MOST_TERMS]
+
+
+def size(node: ast.AST) -> int:
+    """The number of nodes of an expression, without contexts and operators."""
+    return sum(isinstance(part, ast.expr | ast.keyword) for part in ast.walk(node))
+
+
+def expressions(root: ast.AST) -> Iterator[Place]:
+    """The places of all expressions that are read, in the order of the text; not annotations and defaults."""
+    for field, value in ast.iter_fields(root):
+        if field in ("annotation", "returns", "decorator_list", "args") and not isinstance(root, ast.Call):
+            continue
+        if isinstance(root, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.Assert):
+            return
+        for index, child in enumerate(value) if isinstance(value, list) else ((None, value),):
+            if not isinstance(child, ast.AST):
+                continue
+            called = isinstance(root, ast.Call) and field == "func"
+            is_read = isinstance(child, ast.expr) and isinstance(getattr(child, "ctx", ast.Load()), ast.Load)
+            if is_read and not called:
+                yield Place(root, field, index)
+            yield from expressions(child)
+
+
+# ------------------------------------------------------------------------------------------------- expressions
+
+
+def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
+    """Recipes at single places, at each occurrence of an expression, and in parallel lines."""
+    places = list(expressions(function))
+    recipes = {place: {r.key: r for r in recipes_for(place, scope)} for place in places}
+    for place in places:
+        for recipe in recipes[place].values():
+            yield at([place], [recipe])
+    seen = set()
+    for group in (*equal_places(places), *parallel_places(function)):
+        identity = tuple(id(place.node) for place in group)
+        if identity in seen or any(place not in recipes for place in group):
+            continue
+        seen.add(identity)
+        for key in recipes[group[0]]:
+            if all(key in recipes[place] for place in group):
+                yield at(group, [recipes[place][key] for place in group])
+    yield from exchanged_names(function, scope, places)
+
+
+def at(places: Sequence[Place], recipes: Sequence[Recipe]) -> Mutation:
+    """A mutation of some recipes at their places."""
+    marks = [mark for p, recipe in zip(places, recipes, strict=True) for mark in recipe.mark or (p.node,)]
+    cost = recipes[0].cost + (0.5 if len(places) > 1 else 0.0)
+    makes = tuple(recipe.make for recipe in recipes)
+    return Mutation(recipes[0].kind, cost, tuple(places), makes, tuple(map(span_of, marks)))
+
+
+def between(left: ast.expr, right: ast.expr) -> Span:
+    """The place between two operands, where the operator stands."""
+    return Span(left.end_lineno, left.end_col_offset, right.lineno, right.col_offset)
+
+
+def span_of(node: ast.AST | Span) -> Span:
+    """Where a node stands."""
+    if isinstance(node, Span):
+        return node
+    return Span(node.lineno, node.col_offset, node.end_lineno, node.end_col_offset)
+
+
+def equal_places(places: Sequence[Place]) -> Iterator[list[Place]]:
+    """Places of the same expression, where there are several."""
+    same: dict[str, list[Place]] = {}
+    for place in places:
+        same.setdefault(ast.dump(place.node), []).append(place)
+    yield from (group for group in same.values() if 1 < len(group) <= LONGEST_GROUP)
+
+
+def parallel_places(function: ast.stmt) -> Iterator[list[Place]]:
+    """The same spot of statements, or of entries of a tuple or call, that are alike but for names and numbers."""
+    for node in ast.walk(function):
+        for field in ("body", "orelse", "elts", "args"):
+            children = getattr(node, field, None)
+            if not isinstance(children, list) or len(children) < 2:
+                continue
+            alike = itertools.groupby(enumerate(children), key=lambda entry: skeleton(entry[1]))
+            for _, group in alike:
+                members = list(group)
+                if 1 < len(members) <= LONGEST_GROUP:
+                    inside = [list(expressions(child)) for _, child in members]
+                    if isinstance(members[0][1], ast.expr):
+                        inside = [[Place(node, field, i), *rest] for (i, _), rest in zip(members, inside, strict=True)]
+                    yield from (list(group) for group in zip(*inside, strict=True))
+
+
+def skeleton(node: ast.AST) -> str:
+    """A node's form without its names and numbers; one of its own for what has none to compare."""
+    if isinstance(node, ast.Name | ast.Constant):
+        return f"{type(node).__name__} at {id(node)}"
+    parts = []
+    for part in ast.walk(node):
+        parts.append(type(part).__name__)
+        if isinstance(part, ast.Attribute):
+            parts.append(part.attr)
+    return " ".join(parts)
+
+
+def exchanged_names(function: ast.stmt, scope: Scope, places: Sequence[Place]) -> Iterator[Mutation]:
+    """Two names exchanged wherever they are read, in one statement or in the whole function."""
+    bodies = [node for node in ast.walk(function) if isinstance(node, ast.stmt) and not hasattr(node, "body")]
+    for where in (function, *bodies):
+        read = list(places) if where is function else list(expressions(where))
+        named = [place for place in read if isinstance(place.node, ast.Name) and place.node.id in scope.names]
+        for a, b in itertools.combinations(dict.fromkeys(place.node.id for place in named), 2):
+            both = [place for place in named if place.node.id in (a, b)]
+            other = {a: b, b: a}
+            makes = tuple((lambda n, to=other[place.node.id]: name(n, to)) for place in both)
+            spans = tuple(span_of(place.node) for place in both)
+            if len(both) <= LONGEST_GROUP:
+                yield Mutation("names exchanged", 2.0, tuple(both), makes, spans)
+
+
+def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
+    """All recipes for an expression at its place."""
+    node, parent = place.node, place.parent
+    if isinstance(node, ast.Slice):
+        yield from slices(node)
+        return
+    for family in (operators, comparisons, conditions, calls, constants, names, attributes, subscripts, branches):
+        yield from family(node, scope)
+    if isinstance(node, ast.Constant | ast.Tuple | ast.List | ast.Starred | ast.Lambda):
+        return
+    if isinstance(parent, ast.keyword) and parent.arg in ("dtype", "axis", "mode"):
+        return
+    if isinstance(node, ast.Name) and node.id not in scope.names:  # np, range, float ...
+        return
+    yield from missing_around(node)
+    yield from missing_terms(node, scope)
+
+
+def like(old: ast.AST, new: ast.AST) -> ast.AST:
+    """A new node with places in the text, those of the old one where it has none."""
+    for part in ast.walk(new):
+        if isinstance(part, ast.expr | ast.keyword) and not hasattr(part, "lineno"):
+            ast.copy_location(part, old)
+    return new
+
+
+def name(old: ast.AST, text: str) -> ast.expr:
+    """A name in the place of a node."""
+    return ast.copy_location(ast.Name(text, ast.Load()), old)
+
+
+def operators(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """Another operator, another order, other brackets, one operand too many, or a sign."""
+    if isinstance(node, ast.UnaryOp):
+        kind = "sign" if isinstance(node.op, ast.USub) else "not"
+        yield Recipe(kind, "without the sign", 1, lambda n: n.operand)
+        return
+    if not isinstance(node, ast.BinOp):
+        return
+    for op in OPERATORS.get(type(node.op), ()):
+        if not isinstance(node.op, op):
+            make = lambda n, op=op: ast.copy_location(ast.BinOp(n.left, op(), n.right), n)  # noqa: E731
+            yield Recipe("operator", op.__name__, 1, make, (between(node.left, node.right),))
+    yield Recipe("too much", "without the right", 1, lambda n: n.left, (node.right,))
+    yield Recipe("too much", "without the left", 1, lambda n: n.right, (node.left,))
+    if not isinstance(node.op, ast.Add | ast.Mult | ast.BitAnd | ast.BitOr):
+        yield Recipe("order", "sides", 1, lambda n: ast.copy_location(ast.BinOp(n.right, n.op, n.left), n))
+    if isinstance(node.left, ast.BinOp):
+
+        def to_the_right(n):
+            inner = ast.copy_location(ast.BinOp(n.left.right, n.op, n.right), n)
+            return ast.copy_location(ast.BinOp(n.left.left, n.left.op, inner), n)
+
+        yield Recipe("brackets", "right", 1, to_the_right)
+    if isinstance(node.right, ast.BinOp):
+
+        def to_the_left(n):
+            inner = ast.copy_location(ast.BinOp(n.left, n.op, n.right.left), n)
+            return ast.copy_location(ast.BinOp(inner, n.right.op, n.right.right), n)
+
+        yield Recipe("brackets", "left", 1, to_the_left)
+
+
+def comparisons(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """Another comparison."""
+    if not isinstance(node, ast.Compare):
+        return
+    sides = [node.left, *node.comparators]
+    for i, op in enumerate(node.ops):
+        for other in COMPARISONS if isinstance(op, COMPARISONS) else ():
+            if not isinstance(op, other):
+
+                def make(n, i=i, other=other):
+                    return ast.copy_location(
+                        ast.Compare(n.left, [*n.ops[:i], other(), *n.ops[i + 1 :]], n.comparators), n
+                    )
+
+                yield Recipe("comparison", f"{i} {other.__name__}", 1, make, (between(*sides[i : i + 2]),))
+
+
+def conditions(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """`and` for `or`, one condition too many, and one that is missing."""
+    if isinstance(node, ast.BoolOp):
+        other = ast.Or if isinstance(node.op, ast.And) else ast.And
+        yield Recipe("condition", "and, or", 1, lambda n: ast.copy_location(ast.BoolOp(other(), n.values), n))
+        for i, value in enumerate(node.values):
+
+            def make(n, i=i):
+                rest = n.values[:i] + n.values[i + 1 :]
+                return rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(n.op, rest), n)
+
+            yield Recipe("condition", f"without {i}", 1, make, (value,))
+    masks = ast.BitAnd | ast.BitOr | ast.Invert
+    if isinstance(node, ast.Compare) or isinstance(getattr(node, "op", None), masks):
+        for term in scope.names:
+            for text in ROUND_A_CONDITION.format(*[term] * 4).split(" | "):
+                yield Recipe("condition", text, 3, template(text))
+
+
+def calls(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """Another function of the family, arguments in another order, another axis or option, or the call left out."""
+    if not isinstance(node, ast.Call):
+        return
+    called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    for other in RELATED.get(called, ()):
+
+        def make(n, other=other):
+            function = ast.copy_location(
+                ast.Attribute(n.func.value, other, ast.Load())
+                if isinstance(n.func, ast.Attribute)
+                else ast.Name(other, ast.Load()),
+                n.func,
+            )
+            return ast.copy_location(ast.Call(function, n.args, n.keywords), n)
+
+        yield Recipe("function", other, 1, make, (node.func,))
+    for i, j in itertools.combinations(range(len(node.args)), 2):
+
+        def make(n, i=i, j=j):
+            args = list(n.args)
+            args[i], args[j] = args[j], args[i]
+            return ast.copy_location(ast.Call(n.func, args, n.keywords), n)
+
+        yield Recipe("order", f"arguments {i} {j}", 1, make, (node.args[i], node.args[j]))
+    method = isinstance(node.func, ast.Attribute) and not is_module(node.func.value, scope)
+    if method:
+        yield Recipe("call too many", "method", 1, lambda n: n.func.value)
+    elif node.args and not isinstance(node.args[0], ast.Starred):
+        yield Recipe("call too many", "function", 1, lambda n: n.args[0])
+    for i, keyword in enumerate(node.keywords):
+        kind = keyword.arg if keyword.arg in ("axis", "keepdims") else "option"
+        without = lambda n, i=i: ast.copy_location(ast.Call(n.func, n.args, n.keywords[:i] + n.keywords[i + 1 :]), n)  # noqa: E731
+        yield Recipe(kind, f"without {keyword.arg}", 1, without, (keyword,))
+        if keyword.arg == "axis":
+            for axis in AXES:
+                yield Recipe("axis", f"axis={axis}", 1, with_option("axis", axis), (keyword,))
+    if called in TAKES_AXIS:
+        given = {keyword.arg for keyword in node.keywords}
+        if "axis" not in given and len(node.args) < (1 if method else 2):
+            for axis in AXES:
+                yield Recipe("axis", f"axis={axis}", 1.5, with_option("axis", axis))
+        if "keepdims" not in given:
+            yield Recipe("keepdims", "keepdims", 1.5, with_option("keepdims", "True"))
+
+
+def is_module(node: ast.expr, scope: Scope) -> bool:
+    """Whether an expression is np, np.linalg and such: a name that the function does not give a value."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return isinstance(node, ast.Name) and node.id not in scope.names
+
+
+def with_option(option: str, value: str) -> Callable:
+    """Set an option of a call."""
+    parsed = ast.parse(value, mode="eval").body
+
+    def make(n):
+        kept = [keyword for keyword in n.keywords if keyword.arg != option]
+        return like(n, ast.Call(n.func, n.args, [*kept, ast.keyword(option, copied(parsed))]))
+
+    return make
+
+
+def constants(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """Another number, truth value, or type."""
+    if not isinstance(node, ast.Constant):
+        return
+    value = node.value
+    if isinstance(value, bool):
+        others = [not value]
+    elif isinstance(value, int | float):
+        others = [
+            value + 1,
+            value - 1,
+            -value,
+            2 * value,
+            value / 2,
+            0,
+            1,
+            2,
+            255,
+            1000,
+            value**2,
+            1 / value if value else 0,
+        ]
+        others += [float("nan")] if value in (0, 1) else [0.5, value * 1000, value / 1000]
+    elif isinstance(value, str):
+        others = [o for pair in STRINGS if value in pair for o in pair]
+    else:
+        others = []
+    for other in dict.fromkeys(map(repr, others)):
+        if other != repr(value):
+            number = float("nan") if other == "nan" else ast.literal_eval(other)
+            make = lambda n, number=number: ast.copy_location(ast.Constant(number), n)  # noqa: E731
+            yield Recipe("constant", other, 1, make)
+
+
+STRINGS = (
+    ("<f4", ">f4", "<f8", "f4"),
+    ("<u2", ">u2"),
+    ("<i4", ">i4", "<f4"),
+    ("C", "F"),
+    ("ij", "xy"),
+    ("left", "right"),
+)
+STRINGS += (("little", "big"), ("edge", "constant", "reflect", "symmetric", "wrap"), ("<", ">", "="))
+TYPES = ("int", "float", "bool", "np.uint8", "np.uint16", "np.uint32", "np.int16", "np.int32", "np.int64", "np.float32")
+TYPES += ("np.float64", "complex")
+
+
+def names(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """Another name of the function's own, or another type."""
+    if isinstance(node, ast.Name) and node.id in scope.names:
+        for other in scope.names:
+            if other != node.id:
+                yield Recipe("name", other, 1, lambda n, other=other: name(n, other))
+    text = ast.unparse(node) if isinstance(node, ast.Name | ast.Attribute) else ""
+    if text in TYPES:
+        for other in ("float", "int", "np.int64", "np.uint8", "np.float32", "bool"):
+            if other != text:
+                yield Recipe("type", other, 1, template(other))
+
+
+def attributes(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """A transpose too many, another entry of a shape."""
+    if isinstance(node, ast.Attribute) and node.attr == "T":
+        yield Recipe("transpose", "without T", 1, lambda n: n.value)
+    if isinstance(node, ast.Attribute) and node.attr in ("size", "shape") and not is_module(node, scope):
+        yield Recipe("size", "len", 1, lambda n: like(n, ast.Call(ast.Name("len", ast.Load()), [n.value], [])))
+    if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "len" and node.args:
+        yield Recipe("size", "size", 1, lambda n: ast.copy_location(ast.Attribute(n.args[0], "size", ast.Load()), n))
+        yield Recipe("size", "columns", 1, template("_.shape[1]", lambda n: n.args[0]))
+
+
+def subscripts(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """Indices in another order, or one that is too much."""
+    if isinstance(node, ast.Subscript):
+        yield Recipe("index too many", "without the index", 1, lambda n: n.value, (node.slice,))
+        if isinstance(node.slice, ast.Name | ast.Constant | ast.BinOp):
+            yield Recipe("index", "column", 1.5, with_index(lambda i: [ast.Slice(), i]), (node.slice,))
+            yield Recipe("index", "last axis", 1.5, with_index(lambda i: [ast.Constant(...), i]), (node.slice,))
+    if isinstance(node, ast.Tuple | ast.List) and 2 <= len(node.elts) <= 4:
+        for i, j in itertools.combinations(range(len(node.elts)), 2):
+
+            def make(n, i=i, j=j):
+                elts = list(n.elts)
+                elts[i], elts[j] = elts[j], elts[i]
+                return ast.copy_location(type(n)(elts, ast.Load()), n)
+
+            yield Recipe("order", f"entries {i} {j}", 1, make, (node.elts[i], node.elts[j]))
+
+
+def with_index(make_index: Callable) -> Callable:
+    """Replace an index by several."""
+
+    def make(n):
+        return like(n, ast.Subscript(n.value, ast.Tuple(make_index(n.slice), ast.Load()), ast.Load()))
+
+    return make
+
+
+def slices(node: ast.Slice) -> Iterator[Recipe]:
+    """Another bound or step of a slice."""
+    for field in ("lower", "upper", "step"):
+        bound = getattr(node, field)
+        if bound is not None:
+            yield Recipe("slice", f"without {field}", 1, lambda n, field=field: sliced(n, field, None))
+            if field != "step":
+                for text in ("_ + 1", "_ - 1"):
+                    fill = template(text)
+                    yield Recipe(
+                        "slice", f"{field} {text}", 2, lambda n, f=field, t=fill: sliced(n, f, t(getattr(n, f)))
+                    )
+        else:
+            for text in {"lower": ("1",), "upper": ("-1",), "step": ("-1",)}[field]:
+                value = ast.parse(text, mode="eval").body
+                yield Recipe("slice", f"{field} {text}", 1.5, lambda n, f=field, v=value: sliced(n, f, copied(v)))
+
+
+def sliced(node: ast.Slice, field: str, value: ast.expr | None) -> ast.Slice:
+    """A slice with another bound."""
+    new = ast.Slice(node.lower, node.upper, node.step)
+    setattr(new, field, value)
+    return like(node, new)
+
+
+def branches(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """The branches of a conditional expression exchanged, or one of them alone."""
+    if isinstance(node, ast.IfExp):
+        exchanged = lambda n: ast.copy_location(ast.IfExp(n.test, n.orelse, n.body), n)  # noqa: E731
+        yield Recipe("branch", "exchanged", 1, exchanged)
+        yield Recipe("branch", "first", 1, lambda n: n.body)
+        yield Recipe("branch", "second", 1, lambda n: n.orelse)
+
+
+def missing_around(node: ast.expr) -> Iterator[Recipe]:
+    """What may be missing around an expression."""
+    for kind, cost, texts in AROUND:
+        for text in texts.split(" | "):
+            yield Recipe(kind, text, cost, template(text))
+
+
+def missing_terms(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """A term or factor of the function's own names that is missing, or an index."""
+    own = ast.unparse(node)
+    for term in scope.terms:
+        if term == own:
+            continue
+        for op in ("+", "-", "*", "/"):
+            yield Recipe("term", f"{op} {term}", 2, template(f"_ {op} ({term})"))
+        if term in scope.names:
+            yield Recipe("index missing", term, 2, template(f"_[{term}]"))
+            yield Recipe("term", f"@ {term}", 2.5, template(f"_ @ {term}"))
+            yield Recipe("term", f"& {term}", 2.5, template(f"_ & {term}"))
+
+
+TEMPLATES: dict[str, ast.expr] = {}
+
+
+def template(text: str, inner: Callable = lambda node: node) -> Callable:
+    """A recipe's function that puts a node into the place of `_` in a text."""
+    if text not in TEMPLATES:
+        TEMPLATES[text] = ast.parse(text, mode="eval").body
+    parsed = TEMPLATES[text]
+    return lambda node: copied(parsed, inner(node), node)
+
+
+def copied(part, hole: ast.AST | None = None, old: ast.AST | None = None):
+    """Copy a template, with a node in its hole, and an old node's place in the text."""
+    if isinstance(part, list):
+        return [copied(each, hole, old) for each in part]
+    if not isinstance(part, ast.AST):
+        return part
+    if hole is not None and isinstance(part, ast.Name) and part.id == "_":
+        return hole
+    new = type(part)(**{field: copied(value, hole, old) for field, value in ast.iter_fields(part)})
+    if old is not None and isinstance(new, ast.expr | ast.keyword):
+        ast.copy_location(new, old)
+    return new
+
+
+# --------------------------------------------------------------------------------------------------- statements
+
+
+def of_statements(function: ast.stmt) -> Iterator[Mutation]:
+    """A line left out, two lines exchanged, one moved into or out of a block, another assignment."""
+    for node in ast.walk(function):
+        for field in ("body", "orelse"):
+            block = getattr(node, field, None)
+            if isinstance(block, list) and block and isinstance(block[0], ast.stmt):
+                yield from of_block(Place(node, field))
+        if isinstance(node, ast.AugAssign):
+            yield from augmented(node)
+
+
+def of_block(place: Place) -> Iterator[Mutation]:
+    """Mutations of a list of statements."""
+    block = place.node
+
+    def mutation(kind: str, cost: float, make: Callable, *marked: ast.stmt) -> Mutation:
+        return Mutation(kind, cost, (place,), (make,), tuple(map(first_line, marked)))
+
+    for i, statement in enumerate(block):
+        if len(block) > 1 and not is_docstring(statement):
+            yield mutation("line too many", 1.5, lambda b, i=i: b[:i] + b[i + 1 :], statement)
+        if i + 1 < len(block):
+            swapped = lambda b, i=i: [*b[:i], b[i + 1], b[i], *b[i + 2 :]]  # noqa: E731
+            yield mutation("lines exchanged", 2, swapped, statement, block[i + 1])
+        inner = getattr(statement, "body", None)
+        if not isinstance(inner, list) or isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            continue
+
+        def out(b, i=i):
+            copy = shallow(b[i], b[i].body[:-1])
+            return [*b[:i], copy, b[i].body[-1], *b[i + 1 :]]
+
+        def into(b, i=i):
+            copy = shallow(b[i], [*b[i].body, b[i + 1]])
+            return [*b[:i], copy, *b[i + 2 :]]
+
+        def before(b, i=i):
+            return [*b[:i], b[i].body[0], shallow(b[i], b[i].body[1:]), *b[i + 1 :]]
+
+        def first_in(b, i=i):
+            return [*b[: i - 1], shallow(b[i], [b[i - 1], *b[i].body]), *b[i + 1 :]]
+
+        if len(inner) > 1:
+            yield mutation("moved", 2, out, inner[-1])
+            yield mutation("moved", 2, before, inner[0])
+        if i + 1 < len(block):
+            yield mutation("moved", 2, into, block[i + 1])
+        if i > 0:
+            yield mutation("moved", 2, first_in, block[i - 1])
+        if isinstance(statement, ast.If):
+            yield mutation("branch", 1.5, lambda b, i=i: [*b[:i], *b[i].body, *b[i + 1 :]], statement)
+            if statement.orelse:
+                turned = lambda b, i=i: [*b[:i], shallow(b[i], b[i].orelse, b[i].body), *b[i + 1 :]]  # noqa: E731
+                yield mutation("branch", 1.5, turned, statement)
+
+
+def shallow(node: ast.stmt, body: list[ast.stmt], orelse: list[ast.stmt] | None = None) -> ast.stmt:
+    """A copy of a block with another body."""
+    fields = dict(ast.iter_fields(node))
+    fields["body"] = body
+    if orelse is not None:
+        fields["orelse"] = orelse
+    return ast.copy_location(type(node)(**fields), node)
+
+
+def is_docstring(statement: ast.stmt) -> bool:
+    """Whether a statement is a text alone."""
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+
+
+def first_line(statement: ast.stmt) -> Span:
+    """The part of a statement's first line that belongs to it: up to the block that it opens."""
+    body = getattr(statement, "body", None)
+    if not isinstance(body, list):
+        return span_of(statement)
+    ends = [n for n in ast.iter_child_nodes(statement) if isinstance(n, ast.expr)]
+    last = max(ends, key=lambda n: (n.end_lineno, n.end_col_offset), default=None)
+    if last is None:
+        return Span(statement.lineno, statement.col_offset, statement.lineno, statement.col_offset + 4)
+    return Span(statement.lineno, statement.col_offset, last.end_lineno, last.end_col_offset)
+
+
+def augmented(node: ast.AugAssign) -> Iterator[Mutation]:
+    """Another operator of `+=`; `|=` for `&=`."""
+    for op in OPERATORS.get(type(node.op), ()):
+        if not isinstance(node.op, op):
+            place = Place(node, "op")
+            yield Mutation("operator", 1, (place,), (lambda n, op=op: op(),), (span_of(node),))
