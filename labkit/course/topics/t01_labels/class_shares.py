@@ -12,15 +12,21 @@ def class_shares(y, C):
     return np.bincount(judged, minlength=C) / judged.size
 
 
+def _many_labels(rng):
+    y, C = labels_and_classes(rng)
+    return np.tile(y, (5, 5)), C  # more pixels of a class than a byte counts
+
+
 QUESTION = Question(
     name="01_labels.class_shares",
     reference=class_shares,
-    inputs=labels_and_classes,
+    inputs=_many_labels,
     by_hand=(
         (np.array([[1, 1], [0, 3]], np.uint8), 5),
         (np.array([[1, 255, 255], [1, 1, 0]], np.uint8), 3),
         (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (25, 4)), 4),  # more pixels of a class than a byte counts
     ),
+    random_cases=6,
     points=1,
     properties=(Property("the shares add up to 1", lambda arguments, shares: np.isclose(np.sum(shares), 1.0)),),
 )
@@ -65,6 +71,23 @@ def inverse_shares(y, C):
 def up_to_the_largest_label(y, C):
     n = np.bincount(y[y != 255])
     return n / n.sum()
+
+
+@wrong(QUESTION, "np.histogram spreads its bins from the least value to the largest: where does that of class 1 begin?")
+def bins_between_the_extremes(y, C):
+    n, _ = np.histogram(y[y != 255], bins=C)
+    return n / n.sum()
+
+
+@wrong(QUESTION, "A byte ends at 255. How many pixels of one class can an image have?")
+def counted_in_bytes(y, C):
+    n = counts(y, C).astype(np.uint8)
+    return n / n.sum()
+
+
+@wrong(QUESTION, "Clipping 255 to the largest class makes votes for that class of pixels that nobody judged.")
+def unjudged_as_the_last_class(y, C):
+    return np.bincount(np.minimum(y, C - 1).ravel(), minlength=C) / y.size
 
 
 @wrong(QUESTION, "np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")

@@ -12,7 +12,7 @@ def labels_from_colours(rgb, palette):
 
 
 def _picture(rng):
-    """Draw a palette whose colours share channels and brightness, and a picture with pixels between two colours."""
+    """Draw a palette whose colours share channels and brightness, and a picture with colours that nearly are of it."""
     a, b, c = (int(value) for value in rng.choice(np.arange(20, 240, 10), 3, replace=False))
     palette = np.array([[a, b, c], [c, a, b], [b, c, a], [a, c, b], [c, b, a]], np.uint8)
     y = rng.integers(0, 5, (int(rng.integers(4, 7)), int(rng.integers(8, 11))))
@@ -20,6 +20,8 @@ def _picture(rng):
     between = rng.random(y.shape) < 0.25
     between[0, 0] = True
     rgb[between] = (3 * rgb[between] + palette[(y[between] + 1) % 5]) // 4
+    rgb[1, 0] += rng.permutation([1, -1, 0])  # as bright as a known colour
+    rgb[1, 1] += rng.permutation([16, 0, 0])  # its square is 0 in a byte
     return rgb.astype(np.uint8), palette
 
 
@@ -121,6 +123,16 @@ def squares_of_bytes(rgb, palette):
 @wrong(QUESTION, "Each turn of your loop undoes the one before: a pixel without this class's colour keeps what it has.")
 def last_class_alone(rgb, palette):
     return np.where((rgb == palette[-1]).all(axis=-1), len(palette) - 1, 255)
+
+
+@wrong(QUESTION, "Several classes may have the same red: which channels does your comparison leave out?")
+def red_alone(rgb, palette):
+    return last_of(matches(rgb, palette)[..., 0])
+
+
+@wrong(QUESTION, "np.isin asks whether a number stands anywhere in the colour: is [0, 0, 255] the same as [255, 0, 0]?")
+def channels_in_any_order(rgb, palette):
+    return last_of((rgb[:, :, None, :, None] == palette[:, None, :]).any(axis=-1).all(axis=-1))
 
 
 @wrong(QUESTION, "Which channel comes first in an RGB image?")

@@ -14,12 +14,16 @@ def labels_from_segmentation(segmentation, class_of_body):
 
 
 def _raw_mask(rng):
-    """Draw bodies with links -1 to 11, and nothing in a fifth of the pixels; the first and last body have a class."""
-    bodies = int(rng.integers(5, 9))
+    """Draw bodies with links -1 to 11, and nothing in a fifth of the pixels; the first and last body have a class.
+
+    Most tables are so long that 16 bits do not hold the number of a body.
+    """
+    bodies = int(rng.integers(5, 9)) + 65536 * int(rng.random() < 0.8)
     class_of_body = rng.permutation(np.arange(bodies) % 4).astype(np.uint8)
     class_of_body[[0, -1]] = rng.integers(1, 4, 2)
     shape = (int(rng.integers(6, 9)), int(rng.integers(10, 14)))
     body, link = rng.integers(0, bodies, shape), rng.integers(-1, 12, shape)
+    body[:, ::3] = bodies - rng.integers(1, 5, body[:, ::3].shape)
     raw = body + ((link + 1) << 24)
     raw[rng.random(shape) < 0.2] = -1
     return raw.astype(np.int32), class_of_body
@@ -72,7 +76,7 @@ def nothing_is_the_last_body(segmentation, class_of_body):
 
 @wrong(QUESTION, "You keep the upper bits, which are the link: which bits hold the body?")
 def link_for_body(segmentation, class_of_body):
-    link = np.minimum(segmentation >> 24, len(class_of_body) - 1)
+    link = (segmentation >> 24) % len(class_of_body)
     return np.where(segmentation >= 0, class_of_body[link], 0)
 
 

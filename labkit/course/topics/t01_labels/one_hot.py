@@ -16,6 +16,7 @@ QUESTION = Question(
     reference=one_hot,
     inputs=labels_and_classes,
     by_hand=((np.array([[0, 2]], np.uint8), 3), (np.array([[1, 255], [0, 3], [2, 2]], np.uint8), 5)),
+    random_cases=6,
     rtol=0.0,
     atol=0.0,
     points=1,
@@ -39,3 +40,10 @@ def ignored_as_last_class(y, C):
 @wrong(QUESTION, "A class that is not in this image has a plane too, of zeros: there are always C of them.")
 def classes_that_occur(y, C):
     return (y[..., None] == np.unique(y[y != 255])).astype(np.uint8)
+
+
+@wrong(QUESTION, "Add up the entries of a pixel that nobody judged, 255: what should come out, and what does in yours?")
+def ignored_is_shared_out(y, C):
+    Y = (y[..., None] == np.arange(C)).astype(float)
+    Y[y == 255] = 1 / C
+    return Y

@@ -15,15 +15,17 @@ def resize_labels(y, height, width):
 
 
 def _labels_and_size(rng):
-    """Draw labels, and a size that is larger in one direction and smaller in the other, or larger in both.
+    """Draw labels, and a size that is halved in one direction, and smaller or larger in the other.
 
-    The old sides are odd: then no new centre falls between two old pixels, where rounding would decide.
+    Where 8 pixels become 4, or 4 become 2, new centres fall exactly between old pixels, in whatever order one
+    multiplies and divides. The other side is odd, so that none does.
     """
-    y = labels(rng, 4)
-    y = y[: y.shape[0] // 2 * 2 - 1, : y.shape[1] // 2 * 2 - 1]
-    H, W = y.shape
-    height, width = (int(rng.integers(3, H)), int(rng.integers(W + 3, 2 * W)))
-    return (y, height, width) if rng.random() < 0.5 else (y, int(rng.integers(H + 2, 3 * H)), width)
+    halved = int(rng.choice([2, 4]))
+    y = labels(rng, 4)[:, : 2 * halved]
+    y = y[: y.shape[0] // 2 * 2 - 1]
+    H = len(y)
+    other = int(rng.integers(3, H) if rng.random() < 0.5 else rng.integers(H + 2, 3 * H))
+    return (y, other, halved) if rng.random() < 0.5 else (y.T.copy(), halved, other)
 
 
 _ALL_DIFFERENT = np.random.default_rng(1).permutation(24).astype(np.uint8).reshape(4, 6)
@@ -115,6 +117,20 @@ def rounded(y, height, width):
 def rounded_up(y, height, width):
     """IndexError, where the last centre is rounded to the number of pixels."""
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n))
+
+
+@wrong(QUESTION, "A new pixel copies the one old pixel under its centre: how many old pixels does yours ask?")
+def voted(y, height, width):
+    """The most frequent label of the old pixels that a new one covers."""
+
+    def span(i, n, old):
+        return slice(i * old // n, max((i + 1) * old // n, i * old // n + 1))
+
+    out = np.zeros((height, width), np.uint8)
+    for i, j in np.ndindex(height, width):
+        block = y[span(i, height, y.shape[0]), span(j, width, y.shape[1])]
+        out[i, j] = np.bincount(block.ravel()).argmax()
+    return out
 
 
 @wrong(QUESTION, "Columns are counted along W and rows along H: you take H for both.")
