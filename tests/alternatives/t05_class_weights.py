@@ -46,11 +46,6 @@ def change_prior__float32(z, w, shares, new_shares):
     return change_prior__loops(z.astype(np.float32), w.astype(np.float32), shares, new_shares)
 
 
-def change_prior__of_probabilities(z, w, shares, new_shares):
-    p = np.exp(z - z.max(axis=-1, keepdims=True)) / w / shares * new_shares
-    return np.log(p / p.sum(axis=-1, keepdims=True))
-
-
 def class_weights__einsum(counts, power):
     share = counts / counts.sum()
     raw = np.where(share > 0, np.power(np.where(share > 0, share, 1.0), -power), 0.0)

@@ -135,3 +135,32 @@ def pairs_of_the_last_row_and_column_skipped(y, psi, weights):
 @wrong(QUESTION, "A loop that leaves out the border loses its pairs: ask each neighbour whether it is in the image.")
 def pairs_of_the_border_skipped(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, 1:-1].sum()
+
+
+@wrong(QUESTION, "A pair that disagrees pays its own weight: what does each of them pay in yours?")
+def disagreements_counted(y, psi, weights):
+    return unary_part(y, psi) + np.count_nonzero((weights > 0.0) & disagreeing(y))
+
+
+@wrong(QUESTION, "A pixel pays for one class, its label's: how many entries of psi[v, u] does yours add up?")
+def costs_of_all_classes(y, psi, weights):
+    return psi.sum() + (weights * disagreeing(y)).sum()
+
+
+ORDER = "weights holds the kinds right, below, below right, below left: do your steps stand in this order?"
+
+
+@wrong(QUESTION, ORDER)
+def diagonals_exchanged(y, psi, weights):
+    """In loops, which leave out the pairs that would end outside."""
+    inside = weights.copy()
+    inside[2, :, 0] = inside[3, :, -1] = 0.0
+    return unary_part(y, psi) + (inside * disagreeing(y, [PAIRS[d] for d in (0, 1, 3, 2)])).sum()
+
+
+@wrong(QUESTION, ORDER)
+def right_and_below_exchanged(y, psi, weights):
+    """In loops, which leave out the pairs that would end outside."""
+    inside = weights.copy()
+    inside[0, -1] = inside[1, :, -1] = 0.0
+    return unary_part(y, psi) + (inside * disagreeing(y, [PAIRS[d] for d in (1, 0, 2, 3)])).sum()

@@ -193,3 +193,33 @@ def negated_without_a_sign(image, lam, sigma_I, sigma_p):
     with np.errstate(over="ignore"):
         weights = gaussian(-(-(byte**2).sum(axis=3)).astype(float), lam, sigma_I, sigma_p, ring=True)
     return np.where(inside(image.shape[:2]), weights, 0.0)
+
+
+@wrong(QUESTION, "In a grey image, red and green of one brightness are alike: how many channels has your difference?")
+def grey_image(image, lam, sigma_I, sigma_p):
+    return gaussian(differences(image).mean(axis=3) ** 2, lam, sigma_I, sigma_p)
+
+
+@wrong(QUESTION, "np.uint8(5) - np.uint8(10) is 251 already: turn the image into floats before you subtract.")
+def converted_late_the_other_way_round(image, lam, sigma_I, sigma_p):
+    """The pixel subtracted from its neighbour, in bytes."""
+    return gaussian(((-differences(image) % 256) ** 2).sum(axis=3), lam, sigma_I, sigma_p)
+
+
+@wrong(QUESTION, "weights[3] stands at the upper pixel of its pair: at which of the two does yours stand?")
+def kept_at_the_lower_pixel(image, lam, sigma_I, sigma_p):
+    """The fourth kind of pair from each pixel to the one above it on the right."""
+    w = gaussian(squares(image), lam, sigma_I, sigma_p)
+    return np.concatenate([w[:3], np.roll(w[3:], (1, -1), axis=(1, 2))])
+
+
+@wrong(QUESTION, "Two times sigma squared: what is squared in your denominator?")
+def the_2_squared_too(image, lam, sigma_I, sigma_p):
+    return gaussian(squares(image), lam, sigma_I * np.sqrt(2.0), sigma_p * np.sqrt(2.0))
+
+
+@wrong(QUESTION, "Neighbours touch at corners, too: which of the four kinds of pairs are 0 everywhere in yours?")
+def without_diagonals(image, lam, sigma_I, sigma_p):
+    w = gaussian(squares(image), lam, sigma_I, sigma_p)
+    w[2:] = 0.0
+    return w

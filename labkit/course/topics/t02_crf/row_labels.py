@@ -25,10 +25,18 @@ def cost(psi, w, labels):
     return psi[np.arange(len(psi)), labels].sum() + w[labels[1:] != labels[:-1]].sum()
 
 
+def _row(rng):
+    """Draw a row of five classes whose ends hold to their neighbours, so that neither end decides by itself."""
+    psi, w = rng.normal(1.0, 1.0, (7, 5)), rng.uniform(0.1, 1.6, 6)
+    psi[[0, -1]] *= 0.3
+    w[[0, -1]] = rng.uniform(1.0, 2.0, 2)
+    return psi, w
+
+
 QUESTION = Question(
     name="02_crf.row_labels",
     reference=row_labels,
-    inputs=lambda rng: (rng.normal(1.0, 1.0, (9, 3)), rng.uniform(0.1, 1.6, 8)),
+    inputs=_row,
     by_hand=(
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
@@ -36,6 +44,7 @@ QUESTION = Question(
         (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
         (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
     ),
+    random_cases=10,
     points=3,
     properties=(
         Property(
@@ -148,3 +157,24 @@ def first_pixel_not_reached(psi, w):
 @wrong(QUESTION, "The first pixel's own cheapest class need not lie on the best way: its label is traced back as well.")
 def first_pixel_on_its_own(psi, w):
     return np.array([psi[0].argmin(), *row_labels(psi, w)[1:]])
+
+
+@wrong(QUESTION, "That is what the best labels cost. Which labels are they?")
+def least_cost(psi, w):
+    return walk(psi, w)[-1].min()
+
+
+@wrong(QUESTION, "Each of your steps changes one pixel, and can end where two pixels would have to change at once.")
+def pixel_after_pixel_again(psi, w):
+    """ICM on the row."""
+    y = psi.argmin(axis=1)
+    for _ in range(20):
+        for u in range(len(psi)):
+            near = [(w[i], y[j]) for i, j in ((u - 1, u - 1), (u, u + 1)) if 0 <= j < len(y)]
+            y[u] = (psi[u] + sum(weight * (np.arange(psi.shape[1]) != c) for weight, c in near)).argmin()
+    return y
+
+
+@wrong(QUESTION, "Both walks end at pixel u, and both hold psi[u]: how often is it in their sum?")
+def own_cost_twice(psi, w):
+    return (walk(psi, w) + walk(psi[::-1], w[::-1])[::-1]).argmin(axis=1)

@@ -66,3 +66,23 @@ def negative_costs_clipped(psi):
 def whole_costs_kept(psi):
     dearer = np.where(psi > psi.min(axis=2, keepdims=True), psi, 0.0)
     return terminals(dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum())
+
+
+@wrong(QUESTION, "The constant adds up what was taken from psi, and yours is 0: of which array is it the minimum?")
+def minimum_of_what_is_left(psi):
+    lowest = psi.min(axis=2)
+    return terminals(psi[..., 1] - lowest, psi[..., 0] - lowest, 0.0)
+
+
+@wrong(
+    QUESTION,
+    "Each pixel has one arc of capacity 0: which label cuts the arc from the source, the dearer one?",
+)
+def difference_in_both_arcs(psi):
+    difference = np.abs(psi[..., 1] - psi[..., 0])
+    return terminals(difference, difference, psi.min(axis=2).sum())
+
+
+@wrong(QUESTION, "A pixel pays its smaller cost in any case, whatever its sign: did you take it from both arcs?")
+def only_negative_costs_taken(psi):
+    return terminals(np.maximum(psi[..., 1], 0.0), np.maximum(psi[..., 0], 0.0), np.minimum(psi, 0.0).sum())

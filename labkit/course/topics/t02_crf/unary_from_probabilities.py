@@ -73,3 +73,24 @@ def zeros_lifted(p, floor):
 @wrong(QUESTION, "The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
 def costs_lifted(p, floor):
     return np.maximum(-np.log(p), floor)
+
+
+@wrong(QUESTION, "A class costs -log p: where does the factor before your logarithm come from?")
+def entropies(p, floor):
+    return -np.maximum(p, floor) * np.log(np.maximum(p, floor))
+
+
+@wrong(QUESTION, "Does the cheapest class of a pixel have to cost 0? -log p is asked for as it is.")
+def cheapest_made_free(p, floor):
+    psi = -np.log(np.maximum(p, floor))
+    return psi - psi.min(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "np.log undoes np.exp: to which base is your logarithm?")
+def logarithm_to_base_10(p, floor):
+    return -np.log10(np.maximum(p, floor))
+
+
+@wrong(QUESTION, "np.log undoes np.exp: to which base is your logarithm?")
+def logarithm_to_base_2(p, floor):
+    return -np.log2(np.maximum(p, floor))

@@ -4,17 +4,25 @@ import numpy as np
 
 
 def random_logits(rng: np.random.Generator) -> np.ndarray:
-    """Draw logits (H, W, C) of three unequal lengths, up to a few units apart."""
+    """Draw logits (H, W, C) of three unequal lengths, a few units apart; one pixel's are near 1000, another's -1000.
+
+    In most draws a class of pixel (1, 3), not the last one, is so sure that the others' probabilities round to 0.
+    """
     shape = (int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8)))
-    return 2.0 * rng.normal(size=shape) + rng.normal()
+    z = 2.0 * rng.normal(size=shape) + rng.normal()
+    z[0, 1] += 1000.0
+    z[1, 2] -= 1000.0
+    z[1, 3, rng.integers(shape[2] - 1)] += 800.0 * (rng.random() < 0.7)
+    return z
 
 
 def random_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Draw logits (H, W, C) and labels (H, W), at least one of them ignored."""
+    """Draw logits (H, W, C) and labels (H, W), at least one of them ignored; the surest pixel is wrong."""
     z = random_logits(rng)
     y = rng.integers(0, z.shape[-1], z.shape[:-1]).astype(np.uint8)
     y[rng.random(y.shape) < 0.2] = 255
-    y[0, 0], y[1, 1] = 255, z.shape[-1] - 1
+    y[0, 0], y[1, 3] = 255, z.shape[-1] - 1
+    y[0, 1], y[1, 2] = rng.integers(0, z.shape[-1], 2)
     return z, y
 
 

@@ -25,6 +25,7 @@ QUESTION = Question(
         (SURE, TRUE_CLASSES),
         (SURE, np.array([255, 255], np.uint8)),
     ),
+    random_cases=6,
     properties=(Property("a loss is never negative", lambda arguments, out: bool(out >= -1e-6)),),
     forbidden=("scipy", "torch"),
 )
@@ -40,10 +41,15 @@ def true_log_probabilities(z, y):
     return log_p[np.arange(len(y)), y]
 
 
-@wrong(QUESTION, "log(p + epsilon) can never exceed 16 or so, however wrong the pixel: write log p without p.")
-def cross_entropy_epsilon(z, y):
-    p = np.exp(true_log_probabilities(z, y))
-    return float(-np.log(p + 1e-7).sum())
+for _digits in (6, 7, 8, 9, 10, 12, 15, 16):
+
+    def cross_entropy_with_epsilon(z, y, epsilon=10.0**-_digits):
+        return float(-np.log(np.exp(true_log_probabilities(z, y)) + epsilon).sum())
+
+    cross_entropy_with_epsilon.__name__ += f"_of_1e-{_digits}"
+    wrong(QUESTION, "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?")(
+        cross_entropy_with_epsilon
+    )
 
 
 @wrong(QUESTION, "What range enters the loss? Logits are normalised once, inside it.")
@@ -96,3 +102,37 @@ def cross_entropy_of_all_pixels_classes(z, y):
     counted = y != 255
     z, y = z[counted], y[counted]
     return float((np.logaddexp.reduce(z, axis=-1) - z[:, y]).sum())
+
+
+@wrong(QUESTION, "lse minus a logit: do you take off the largest one, or the true class's?")
+def cross_entropy_of_the_surest_class(z, y):
+    counted = y != 255
+    return float((np.logaddexp.reduce(z[counted], axis=-1) - z[counted].max(axis=-1)).sum())
+
+
+@wrong(QUESTION, "z holds logits, some of them negative: what makes probabilities of them?")
+def cross_entropy_of_logits(z, y):
+    counted = y != 255
+    return -float(np.log(np.take_along_axis(z[counted], y[counted][:, None], -1)).sum())
+
+
+@wrong(QUESTION, "You give the pixels of 255 to the last class: how much should they add to the loss?")
+def cross_entropy_with_ignored_as_last_class(z, y):
+    return cross_entropy(z, np.minimum(y, z.shape[-1] - 1))
+
+
+@wrong(QUESTION, "(1 - p) squared is another loss. How large is it at most, and how large may a cross-entropy be?")
+def cross_entropy_as_squared_error(z, y):
+    return float(((1.0 - np.exp(true_log_probabilities(z, y))) ** 2).sum())
+
+
+@wrong(QUESTION, "Yours asks yes or no for each class on its own. Which function lets the classes share 1 among them?")
+def cross_entropy_of_sigmoids(z, y):
+    counted = y != 255
+    signs = np.where(y[counted][:, None] == np.arange(z.shape[-1]), -1.0, 1.0)
+    return float(np.logaddexp(0.0, signs * z[counted]).sum())
+
+
+@wrong(QUESTION, "To which base is your logarithm, and to which is that of the loss?")
+def cross_entropy_in_bits(z, y):
+    return cross_entropy(z, y) / np.log(2.0)

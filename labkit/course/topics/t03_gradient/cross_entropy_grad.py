@@ -24,6 +24,7 @@ QUESTION = Question(
         (TOY[None], np.array([0], np.uint8)),
         (SURE, np.array([0, 2], np.uint8)),  # the darker pixel counts: one maximum for both is not enough
     ),
+    random_cases=6,
     points=2,
     properties=(
         Property(
@@ -78,3 +79,50 @@ def grad_without_the_one_hot(z, y):
 @wrong(QUESTION, "The other classes move, too: where c is not the true class the slope is p[c], not 0.")
 def grad_of_the_true_class_alone(z, y):
     return (softmax(z) - 1.0) * one_hot(z, y)
+
+
+def one_hot_of_the_surest(z):
+    return (z.argmax(axis=-1)[..., None] == np.arange(z.shape[-1])).astype(float)
+
+
+@wrong(QUESTION, "1 is taken off at one class of each pixel: at the one of the largest logit, or at the true one?")
+def grad_at_the_surest_class(z, y):
+    return (softmax(z) - one_hot_of_the_surest(z)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "All of yours are -1, 0 or 1: is it the class of the largest logit that enters, or the probabilities?")
+def grad_of_a_perceptron(z, y):
+    return (one_hot_of_the_surest(z) - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "The gradient has a number for each logit of each pixel: over what did you add up?")
+def grad_summed_over_pixels(z, y):
+    return cross_entropy_grad(z, y).reshape(-1, z.shape[-1]).sum(axis=0)
+
+
+@wrong(QUESTION, "A pixel of 255 adds nothing to the loss, however its logits move: what slope is that?")
+def grad_nan_where_ignored(z, y):
+    return np.where(y[..., None] == 255, np.nan, cross_entropy_grad(z, y))
+
+
+@wrong(QUESTION, "The gradient has the shape of z: what stands in it at the pixels of 255?")
+def grad_of_counted_pixels_alone(z, y):
+    return cross_entropy_grad(z, y)[y != 255]
+
+
+@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+def grad_that_overflows(z, y):
+    p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
+    return (p - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "Each pixel has probabilities of its own: how many numbers does your sum add up?")
+def grad_of_a_softmax_over_everything(z, y):
+    e = np.exp(z - z.max())
+    return (e / e.sum() - one_hot(z, y)) * (y != 255)[..., None]
+
+
+@wrong(QUESTION, "p (1 - p) is the slope of a sigmoid: does it still stand there after the logarithm's slope, 1 / p?")
+def grad_times_the_slope_of_a_sigmoid(z, y):
+    p = softmax(z)
+    return cross_entropy_grad(z, y) * p * (1.0 - p)

@@ -15,11 +15,11 @@ def input_window(kernels, strides, paddings, u):
 
 
 def draw_layers(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Draw kernels, strides and paddings of four to six layers, and an output pixel."""
+    """Draw kernels, strides and paddings of four to six layers, and an output pixel, the first one in most draws."""
     n = int(rng.integers(4, 7))
     kernels, strides, paddings = rng.integers(2, 8, n), rng.integers(1, 4, n), rng.integers(0, 4, n)
     strides[:2], paddings[:2] = (3, 2), (1, 3)
-    return kernels, strides, paddings, int(rng.integers(3, 30))
+    return kernels, strides, paddings, int(rng.integers(3, 30)) * int(rng.random() < 0.4)
 
 
 QUESTION = Question(
@@ -33,6 +33,7 @@ QUESTION = Question(
         (np.array([7, 1, 5]), np.array([2, 3, 1]), np.array([3, 0, 0]), 4),
         (np.array([3, 5]), np.array([1, 2]), np.array([1, 2]), 0),  # it begins outside the image
     ),
+    random_cases=8,
     points=3,
     properties=(Property("the first pixel is not behind the last", lambda given, out: bool(out[0] <= out[1])),),
     forbidden=("scipy", "torch"),
@@ -108,3 +109,32 @@ def centred(kernels, strides, paddings, u):
     first, last = back(kernels, strides, paddings, u)
     middle = u * int(np.prod(strides))
     return middle - (last - first + 1) // 2, middle + (last - first + 1) // 2
+
+
+@wrong(QUESTION, "You go on from an input pixel to the outputs that read it. Which input pixels does output u read?")
+def outputs_of_a_pixel(kernels, strides, paddings, u):
+    first = last = int(u)
+    for kernel, stride, padding in np.transpose([kernels, strides, paddings]).tolist():
+        first, last = (first + padding - kernel + 1) // stride, (last + padding) // stride
+    return first, last
+
+
+@wrong(QUESTION, "A layer may have more or less padding than half its kernel: which argument says how much?")
+def padded_by_half_a_kernel(kernels, strides, paddings, u):
+    first = last = int(u)
+    for kernel, stride in np.transpose([kernels, strides])[::-1].tolist():
+        first, last = first * stride - kernel // 2, last * stride + kernel // 2
+    return first, last
+
+
+@wrong(QUESTION, "Is your second number the place of the last pixel, or how many there are?")
+def first_and_width(kernels, strides, paddings, u):
+    first, last = back(kernels, strides, paddings, u)
+    return first, last - first + 1
+
+
+@wrong(QUESTION, "That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+def centred_on_its_first_half(kernels, strides, paddings, u):
+    first, last = back(kernels, strides, paddings, u)
+    begin = u * int(np.prod(strides)) - (last - first + 1) // 2
+    return begin, begin + last - first

@@ -17,8 +17,14 @@ def max_pool_backward(x, g):
 
 
 def draw(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Draw an image of even sides, negative pixels included, and a gradient of half its sides."""
-    return rng.normal(size=(6, 8)), rng.normal(size=(3, 4))
+    """Draw an image and a gradient of half its sides.
+
+    The four pixels of a block differ, in one block all are negative, and other blocks may hold the same numbers; in
+    some images all numbers are tiny.
+    """
+    b = np.array([rng.permutation(12)[:4] - 6.0 for _ in range(12)])
+    b[rng.integers(12)] = rng.permutation(5)[:4] - 6.0
+    return unblocked(b.reshape(3, 4, 4)) * rng.choice([1.0, 1e-9]), rng.normal(size=(3, 4))
 
 
 QUESTION = Question(
@@ -30,6 +36,7 @@ QUESTION = Question(
         (np.array([[-4.0, -2.0, 4.0, -1.0], [-3.0, -1.0, 0.0, 6.0]]), np.array([[2.0, -3.0]])),
         (1e-9 * np.array([[0.0, 1.0], [2.0, 3.0], [9.0, 8.0], [6.0, 7.0]]), np.array([[1.0], [-1.0]])),  # no tolerance
     ),
+    random_cases=6,
     points=3,
     properties=(
         Property(
@@ -129,3 +136,21 @@ def placed_without_the_block(x, g):
 def among_all_maxima(x, g):
     """A pixel that equals the maximum of any block passes the gradient of its own."""
     return np.isin(x, blocks(x).max(axis=2)) * to_all_four(x, g)
+
+
+@wrong(QUESTION, "reshape cuts four pixels of one row out of the image: how do the rows of a block come together?")
+def blocks_of_one_row(x, g):
+    """Blocks of 1 x 4."""
+    b = x.reshape(*g.shape, 4)
+    return ((b == b.max(axis=2, keepdims=True)) * g[..., None]).reshape(x.shape)
+
+
+@wrong(QUESTION, "np.isclose takes any two numbers below 1e-8 for equal: which comparison has no tolerance?")
+def nearly_the_largest(x, g):
+    return np.isclose(x, to_all_four(x, blocks(x).max(axis=2))) * to_all_four(x, g)
+
+
+@wrong(QUESTION, "Of -4 and 1 the pooling keeps 1: do you compare values, or how far they are from 0?")
+def largest_by_size(x, g):
+    b = np.abs(blocks(x))
+    return unblocked((b == b.max(axis=2, keepdims=True)) * g[..., None])

@@ -23,6 +23,7 @@ QUESTION = Question(
             lambda arguments, p: bool(np.allclose(p.sum(axis=-1), 1.0, atol=1e-4)),
         ),
     ),
+    random_cases=6,
     points=1,
     forbidden=("scipy", "torch"),
 )
@@ -78,3 +79,19 @@ def smallest_logit_taken_off(z):
 def divided_by_the_largest(z):
     e = np.exp(z / z.max(axis=-1, keepdims=True))
     return e / e.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Clipping changes the answer, a shift does not: softmax sees differences.")
+def large_logits_clipped(z):
+    e = np.exp(np.minimum(z, 700.0))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "You take the largest logit off above the line: what is taken off in the sum below it?")
+def sum_of_unshifted_logits(z):
+    return np.exp(z - z.max(axis=-1, keepdims=True)) / np.exp(z).sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Those are logarithms of probabilities, all negative: what undoes a logarithm?")
+def log_softmax(z):
+    return z - np.logaddexp.reduce(z, axis=-1, keepdims=True)

@@ -90,3 +90,13 @@ def softmax_of_p(p, g):
 def plain_sum(p, g):
     """An unweighted sum of the gradients."""
     return p * (g - g.sum(axis=-1, keepdims=True))
+
+
+@wrong(QUESTION, "p g is one part of it. Raise all of g by 1: the loss's slopes must stay, and do yours?")
+def without_the_mean(p, g):
+    return p * g
+
+
+@wrong(QUESTION, "p - Y is softmax and cross-entropy in one. Here any loss may follow, and g is its gradient by p.")
+def shortcut_of_the_cross_entropy(p, g):
+    return p - g

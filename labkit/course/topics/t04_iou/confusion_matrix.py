@@ -15,8 +15,10 @@ def confusion_matrix(y_true, y_pred, num_classes, ignore):
 
 def _label_pair(rng):
     """Two label images that agree on two pixels in three; what is ignored is 255 or one of the classes."""
-    num_classes = int(rng.choice([3, 4, 20]))
-    y_true = rng.choice(num_classes, size=(9, 14), p=rng.dirichlet(np.full(num_classes, 2.0))).astype(np.uint8)
+    num_classes = int(rng.choice([4, 20]))
+    p = rng.dirichlet(np.full(num_classes, 2.0))
+    p[-1] *= rng.random() < 0.5  # in some cases the last class is never true
+    y_true = rng.choice(num_classes, size=(9, 14), p=p / p.sum()).astype(np.uint8)
     y_pred = np.where(rng.random(y_true.shape) < 0.65, y_true, rng.integers(num_classes, size=y_true.shape))
     ignore = int(rng.choice([0, 255]))
     y_true[rng.random(y_true.shape) < 0.15] = ignore
@@ -34,7 +36,7 @@ QUESTION = Question(
         (np.zeros((250, 280), np.uint8), np.ones((250, 280), np.uint8), 2, 255),  # more than two bytes can count
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
     ),
-    random_cases=6,
+    random_cases=10,
     rtol=0.0,
     atol=0.0,
     points=2,
@@ -92,3 +94,15 @@ def overflowing_bytes(y_true, y_pred, num_classes, ignore):
 @wrong(QUESTION, "No cell is above 1: an index that occurs twice is written once, as in the lesson. What adds them up?")
 def written_once(y_true, y_pred, num_classes, ignore):
     return np.minimum(pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes), 1)
+
+
+@wrong(QUESTION, "np.bincount ends at the largest number that occurs: how long does its result have to be?")
+def as_long_as_the_largest_pair(y_true, y_pred, num_classes, ignore):
+    """ValueError, where the last pair of classes does not occur."""
+    rows, columns = counted_pairs(y_true, y_pred, ignore)
+    return np.bincount(rows * num_classes + columns).reshape(num_classes, num_classes)
+
+
+@wrong(QUESTION, "np.histogram2d spreads its bins from the least label to the largest: where does class 1 begin?")
+def bins_between_the_extremes(y_true, y_pred, num_classes, ignore):
+    return np.histogram2d(*counted_pairs(y_true, y_pred, ignore), bins=num_classes)[0].astype(int)

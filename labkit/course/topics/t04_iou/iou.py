@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.checker.question import Property, Question, wrong
-from labkit.course.topics.t04_iou import SMALL_COUNTS, counts, divide, parts
+from labkit.course.topics.t04_iou import SMALL_COUNTS, counts, divide, iou_of, parts
 
 
 def iou(n):
@@ -53,3 +53,38 @@ def all_but_the_other_hits(n):
 def overlap_three_times_in_the_union(n):
     correct, predicted, true = parts(n)
     return divide(correct, predicted + true + correct)
+
+
+@wrong(QUESTION, "C classes have C scores: what stands at the place of a class that is neither true nor predicted?")
+def absent_classes_left_out(n):
+    scores = iou_of(n)
+    return scores[~np.isnan(scores)]
+
+
+@wrong(QUESTION, "That is recall, the share of a class's true pixels that are found: where are the false positives?")
+def recall(n):
+    correct, _, true = parts(n)
+    return divide(correct, true)
+
+
+@wrong(QUESTION, "That is precision, the share of a class's predictions that are right: where are the false negatives?")
+def precision(n):
+    correct, predicted, _ = parts(n)
+    return divide(correct, predicted)
+
+
+@wrong(QUESTION, "A class that is predicted and never true has a union: how large is its overlap?")
+def nan_where_never_true(n):
+    return np.where(n.sum(axis=1) > 0, iou_of(n), np.nan)
+
+
+@wrong(QUESTION, "Pixels that are neither true nor called class c count as right in yours: are they in its union?")
+def accuracy_by_class(n):
+    correct, predicted, true = parts(n)
+    return 1.0 - (predicted + true - 2.0 * correct) / n.sum()
+
+
+@wrong(QUESTION, "You add 1 to both, so that nothing is 0 / 0: what should a class score that occurs nowhere?")
+def smoothed(n):
+    correct, predicted, true = parts(n)
+    return (correct + 1.0) / (predicted + true - correct + 1.0)

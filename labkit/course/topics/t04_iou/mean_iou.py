@@ -18,7 +18,7 @@ def _counts_of_frames(rng):
     """Draw the confusion matrices of a few frames of unlike size; a class is often absent from a frame, or from all."""
     F, C = int(rng.choice([3, 6])), int(rng.choice([4, 5]))
     n = rng.integers(0, 30, (F, C, C)) + np.eye(C, dtype=np.int64) * rng.integers(10, 500, (F, C, 1))
-    n *= rng.integers(1, 20, (F, 1, 1))
+    n *= rng.integers(1, 200, (F, 1, 1))  # more pixels than 16 bits count
     for frame in n[1:]:
         absent = rng.integers(C)
         frame[absent], frame[:, absent] = 0, 0
@@ -26,6 +26,9 @@ def _counts_of_frames(rng):
         n[:, 1], n[:, :, 1] = 0, 0
     if rng.random() < 0.7:
         n[:, 2] = 0
+    if rng.random() < 0.7:
+        n[:, 3], n[:, :, 3] = 0, 0
+        n[0, 3, 3] = 1  # one pixel
     return (n.astype(np.int64),)
 
 
@@ -37,6 +40,7 @@ QUESTION = Question(
         (np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),),  # class 1: 1/1 in one frame, 0/99 in the other
         (np.array([[[6, 2, 0], [0, 4, 0], [0, 0, 0]]]),),
         (np.array([[[5, 0, 1], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]]]),),  # one pixel of class 2
+        (np.array([[[30_000, 2_000], [0, 500]]] * 3),),  # more pixels than 16 bits count
     ),
     random_cases=6,
     points=2,
@@ -106,3 +110,23 @@ def absent_is_1(n_frames):
 @wrong(QUESTION, "A class that occurs nowhere adds nothing to your sum: does it count in what you divide by?")
 def absent_is_0(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=0.0).mean()
+
+
+@wrong(QUESTION, "What is the mean of some numbers if one of them is NaN?")
+def nan_in_the_mean(n_frames):
+    return iou_of(n_frames.sum(axis=0)).mean()
+
+
+@wrong(QUESTION, "Background is a class like the others: over which classes do you average?")
+def without_background(n_frames):
+    return np.nanmean(iou_of(n_frames.sum(axis=0))[1:])
+
+
+@wrong(QUESTION, "16 bits hold numbers up to 32,767: how many pixels of a class have all frames together?")
+def added_in_16_bits(n_frames):
+    return np.nanmean(iou_of(n_frames.sum(axis=0, dtype=np.int16)))
+
+
+@wrong(QUESTION, "Means of counts need not be whole: what does the cast to integers do to a class of few pixels?")
+def means_cut_to_whole_numbers(n_frames):
+    return np.nanmean(iou_of(n_frames.mean(axis=0).astype(int)))

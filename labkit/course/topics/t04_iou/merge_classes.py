@@ -65,3 +65,22 @@ def rows_alone(n, group):
 @wrong(QUESTION, "Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
 def old_columns(n, group):
     return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
+
+
+@wrong(QUESTION, "Counts that meet are added: are yours averaged?")
+def means_of_blocks(n, group):
+    member = (np.arange(group.max() + 1)[:, None] == group).astype(float)
+    member /= member.sum(axis=1, keepdims=True)
+    return (member @ n @ member.T).astype(int)
+
+
+@wrong(QUESTION, "Your matrix still has C rows: an index array chooses rows, and does not add those of one group.")
+def rows_chosen(n, group):
+    return n[np.ix_(group, group)]
+
+
+@wrong(QUESTION, "Only the diagonal of n comes into yours: where do the mistakes between two groups go?")
+def diagonal_alone(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, (group, group), np.diagonal(n))
+    return merged

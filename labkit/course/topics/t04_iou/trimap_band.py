@@ -18,12 +18,12 @@ def trimap_band(y, width):
 
 
 def _labels(rng):
-    """Draw three classes with a slanted edge, one lone pixel, and a strip that nobody judged; H != W."""
+    """Draw classes with a slanted edge, one lone pixel, and between two of them a strip that nobody judged; H != W."""
     H, W = int(rng.integers(11, 14)), int(rng.integers(19, 24))
     v, u = np.mgrid[0:H, 0:W]
     y = np.where(0.5 * u + v < 0.25 * W + 0.3 * H, 2, 1).astype(np.uint8)
     y[u > W - 7] = 3
-    y[:, W - int(rng.integers(5, 8))] = 255
+    y[:, W - int(rng.integers(6, 8))] = 255
     y[int(rng.integers(1, H - 1)), int(rng.integers(9, 12))] = 0
     return np.roll(y, int(rng.integers(-1, 2)), axis=1), int(rng.integers(1, 4))
 
@@ -40,6 +40,7 @@ QUESTION = Question(
         (np.array([[0, 0, 255, 255]], np.uint8), 1),  # beside class 0, too, nothing was judged
         (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
     ),
+    random_cases=6,
     rtol=0.0,
     atol=0.0,
     points=3,
@@ -133,3 +134,17 @@ def slices_from_negative_places(y, width):
         near = y[v - width : v + width + 1, u - width : u + width + 1]
         out[v, u] = np.any((near != y[v, u]) & (near != 255))
     return out
+
+
+@wrong(QUESTION, "255 is no class: which two questions does that add to `another label is near`?")
+def unjudged_like_any_class(y, width):
+    framed = np.pad(y, width, mode="edge")
+    H, W = y.shape
+    near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in square(width)]
+    return np.any([n != y for n in near], axis=0)
+
+
+@wrong(QUESTION, "With 255 between them, two classes can be near and not touch: from where does your band grow?")
+def grown_from_where_classes_touch(y, width):
+    touching = np.where(trimap_band(y, 1), 1, 255)
+    return banded(touching, max(width - 1, 1), square(width - 1), lambda near, _: near == 1) & (y != 255)

@@ -18,17 +18,31 @@ def some_labels(rng, H, W, C):
     """Labels (H, W) of C classes, some of them 255."""
     y = rng.integers(0, C, (H, W)).astype(np.uint8)
     y[rng.random(y.shape) < 0.2] = 255
-    y[0, 0], y[1, 1], y[1, 2] = 255, C - 1, 0
+    y[0, 0], y[1, 1:4] = 255, (C - 1, 0, C - 1)
     return y
+
+
+def some_logits(rng, H, W, C, far=1000.0):
+    """Logits (H, W, C) a few units apart; those of pixel (1, 1) are near `far`, those of (1, 2) near -far.
+
+    In most draws a class of pixel (1, 3), not the last one, is so sure that the others' probabilities round to 0.
+    """
+    z = 2.0 * rng.normal(size=(H, W, C))
+    z[1, 1:3] += [[far], [-far]]
+    z[1, 3, rng.integers(C - 1)] += 800.0 * (rng.random() < 0.7)
+    return z
 
 
 def draw_pixels(rng):
     """Logits (H, W, C), labels (H, W), some of them ignored, and weights."""
     H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
-    return 2.0 * rng.normal(size=(H, W, C)), some_labels(rng, H, W, C), draw_weights(rng, C)
+    return some_logits(rng, H, W, C), some_labels(rng, H, W, C), draw_weights(rng, C)
 
 
 TOY = np.array([[2.0, 1.0, -1.0]])
+
+
+EPSILONS = tuple(10.0**-digits for digits in (6, 7, 8, 9, 10, 12, 15, 16))  # what people add to probabilities
 
 
 SURE = np.array([[0.0, 1000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0

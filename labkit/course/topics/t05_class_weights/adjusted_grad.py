@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.checker.question import Property, Question, wrong
-from labkit.course.topics.t05_class_weights import SURE, TOY, draw_shares, some_labels
+from labkit.course.topics.t05_class_weights import SURE, TOY, draw_shares, some_labels, some_logits
 
 
 def adjusted_grad(z, y, shares, tau):
@@ -19,7 +19,7 @@ def _pixels(rng):
     """Logits (H, W, C), labels (H, W), shares of the classes, tau."""
     H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
     return (
-        2.0 * rng.normal(size=(H, W, C)),
+        some_logits(rng, H, W, C),
         some_labels(rng, H, W, C),
         draw_shares(rng, C),
         float(rng.uniform(0.3, 1.7)),
@@ -112,3 +112,15 @@ def tau_inside_the_logarithm(z, y, shares, tau):
 @wrong(QUESTION, "A share stands in front of your gradient, as a weight would: here it only moves the logits.")
 def times_the_share(z, y, shares, tau):
     return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]
+
+
+@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+def that_overflows(z, y, shares, tau):
+    a = z + tau * np.log(shares)
+    p = np.exp(a) / np.exp(a).sum(axis=-1, keepdims=True)
+    return np.where(y[..., None] == 255, 0.0, p - parts(a, y)[1])
+
+
+@wrong(QUESTION, "What is the derivative of z + constant by z? The shares do not depend on z.")
+def with_a_factor_of_the_shares(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, tau) * (1.0 + tau * np.log(shares))

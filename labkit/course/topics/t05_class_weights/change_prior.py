@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, wrong
-from labkit.course.topics.t05_class_weights import draw_shares, draw_weights
+from labkit.course.topics.t05_class_weights import EPSILONS, draw_shares, draw_weights, some_logits
 
 
 def change_prior(z, w, shares, new_shares):
@@ -19,7 +19,7 @@ def shifted(z):
 def _network(rng):
     """Logits (H, W, C), weights, and the classes' shares in the scenes of training and of use."""
     H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
-    return 2.0 * rng.normal(size=(H, W, C)), draw_weights(rng, C), draw_shares(rng, C), draw_shares(rng, C)
+    return some_logits(rng, H, W, C, far=0.0), draw_weights(rng, C), draw_shares(rng, C), draw_shares(rng, C)
 
 
 QUESTION = Question(
@@ -30,7 +30,10 @@ QUESTION = Question(
         (np.array([0.0, 0.0]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), np.array([0.9, 0.1])),  # weights alone
         (np.array([0.0, 0.0]), np.array([1.0, 1.0]), np.array([0.5, 0.5]), np.array([0.8, 0.2])),  # scenes alone
         (np.array([[0.5, -2.0, 1.0]]), np.array([0.5, 4.0, 1.0]), np.array([0.6, 0.1, 0.3]), np.array([0.2, 0.2, 0.6])),
+        # As probabilities these are 1 and 0.
+        (np.array([0.0, -800.0]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), np.array([0.5, 0.5])),
     ),
+    random_cases=6,
     canonical=shifted,
 )
 
@@ -51,3 +54,32 @@ def ratios_multiplied(z, w, shares, new_shares):
 def probabilities(z, w, shares, new_shares):
     q = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True)) * new_shares / (w * shares)
     return q / q.sum(axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "A factor of a probability is a summand of its logarithm: which?")
+def shares_added_and_subtracted(z, w, shares, new_shares):
+    return z - w - shares + new_shares
+
+
+@wrong(QUESTION, "Which probability belongs to the logits 0 and -800, and which logarithm has it? Can you do without?")
+def by_probabilities(z, w, shares, new_shares):
+    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
+    return np.log(p * new_shares / (w * shares))
+
+
+@wrong(QUESTION, "What is np.exp(1000)? Your answer needs no exponential: what does a factor do to a logarithm?")
+def by_exponentials(z, w, shares, new_shares):
+    p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
+    return np.log(p * new_shares / (w * shares))
+
+
+for _epsilon in EPSILONS:
+
+    def by_probabilities_and_epsilon(z, w, shares, new_shares, epsilon=_epsilon):
+        q = probabilities(z, w, shares, new_shares)
+        return np.log(q + epsilon)
+
+    by_probabilities_and_epsilon.__name__ += f"_of_{_epsilon:.0e}"
+    wrong(QUESTION, "Logits may lie as low as they like: how low can log(p + epsilon) be, and do you need p?")(
+        by_probabilities_and_epsilon
+    )

@@ -11,11 +11,11 @@ def least_cost(p, cost):
 
 
 def _probabilities_and_costs(rng):
-    """Draw probabilities (H, W, C) that are rarely sure, and costs that differ both ways; to be right costs nothing."""
+    """Draw probabilities (H, W, C) that are rarely sure, and costs that differ both ways; to be right costs, too."""
     shape = int(rng.integers(5, 8)), int(rng.integers(9, 12)), int(rng.integers(4, 6))
     p = rng.dirichlet(np.full(shape[-1], 1.5), shape[:2])
     cost = np.exp(rng.uniform(-1.0, 2.5, (shape[-1], shape[-1])))
-    np.fill_diagonal(cost, 0.0)
+    np.fill_diagonal(cost, rng.uniform(0.0, 2.0, shape[-1]))
     return p, cost
 
 
@@ -58,3 +58,28 @@ def dearest(p, cost):
 @wrong(QUESTION, "To be right may cost something, too: the diagonal of cost need not be 0.")
 def right_for_nothing(p, cost):
     return (p @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)
+
+
+@wrong(QUESTION, "You take the most probable class for the truth: what do the other classes, less probable, cost?")
+def cheapest_for_the_most_likely(p, cost):
+    return cost[p.argmax(axis=-1)].argmin(axis=-1)
+
+
+@wrong(QUESTION, "An expected cost is a sum over the true classes. You take the largest of its terms.")
+def least_of_the_worst(p, cost):
+    return (p[..., None] * cost).max(axis=-2).argmin(axis=-1)
+
+
+@wrong(QUESTION, "For one j, p[i] cost[i, j] is added up over i: over which index does your sum run?")
+def summed_over_what_is_said(p, cost):
+    return (p[..., None] * cost).sum(axis=-1).argmin(axis=-1)
+
+
+@wrong(QUESTION, "p[i] multiplies cost[i, j], the row of the true class: does it multiply a column in yours?")
+def rows_and_columns_exchanged(p, cost):
+    return (p @ cost.T).argmin(axis=-1)
+
+
+@wrong(QUESTION, "That is what the best decision costs. Which class is it?")
+def the_least_price(p, cost):
+    return (p @ cost).min(axis=-1)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, wrong
-from labkit.course.topics.t05_class_weights import SURE, TOY, draw_pixels
+from labkit.course.topics.t05_class_weights import EPSILONS, SURE, TOY, draw_pixels
 
 
 def two_means(z, y, w):
@@ -23,6 +23,7 @@ QUESTION = Question(
         (TOY, np.array([1], np.uint8), np.array([1.0, 10.0, 3.0])),
         (np.concatenate([SURE, TOY]), np.array([0, 255, 1], np.uint8), np.array([2.0, 5.0, 0.5])),  # not one maximum
     ),
+    random_cases=8,
     forbidden=("scipy", "torch"),
 )
 
@@ -73,3 +74,32 @@ def one_maximum_for_all(z, y, w):
     z = z - z.max()
     loss, weight = np.log(np.exp(z).sum(axis=-1)) - z[np.arange(len(y)), y], w[y]
     return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+def means_that_overflow(z, y, w):
+    p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
+    counted = y != 255
+    loss, weight = -np.log(np.take_along_axis(p[counted], y[counted][:, None], -1))[:, 0], w[y[counted]]
+    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+
+
+@wrong(QUESTION, "The probabilities of one pixel add up to 1: along which axis of z do its classes stand?")
+def normalised_along_the_first_axis(z, y, w):
+    log_p = z - np.logaddexp.reduce(z, axis=0, keepdims=True)
+    counted = y != 255
+    loss, weight = -np.take_along_axis(log_p[counted], y[counted][:, None], -1)[:, 0], w[y[counted]]
+    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+
+
+for _epsilon in EPSILONS:
+
+    def means_with_epsilon(z, y, w, epsilon=_epsilon):
+        loss, weight = losses_and_weights(z, y, w)
+        loss = -np.log(np.exp(-loss) + epsilon)
+        return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+
+    means_with_epsilon.__name__ += f"_of_{_epsilon:.0e}"
+    wrong(QUESTION, "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?")(
+        means_with_epsilon
+    )

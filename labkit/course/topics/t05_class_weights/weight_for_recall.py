@@ -8,17 +8,24 @@ from labkit.course.checker.question import Question, wrong
 def weight_for_recall(p1, y, recall):
     """Find the smallest weight of class 1 with which at least this share of its pixels is found."""
     found_first = np.sort(p1[y])[::-1]
-    must = int(np.ceil(recall * len(found_first) - 1e-9))  # in floats 0.28 * 50 is more than 14
-    last = found_first[must - 1]
+    last = found_first[int(np.ceil(recall * len(found_first))) - 1]
     return float((1.0 - last) / last)
 
 
 def _pixels(rng):
-    """Draw probabilities of two overlapping classes, the second one rare, and a recall between two steps."""
-    y = rng.permutation(np.arange(int(rng.integers(40, 60))) < int(rng.integers(7, 12)))
-    n = int(y.sum())
-    p1 = 1.0 / (1.0 + np.exp(-rng.normal(np.where(y, -0.5, -2.5), 1.0)))
-    return p1, y, float((rng.integers(2, n) - rng.uniform(0.3, 0.7)) / n)
+    """Draw probabilities of two overlapping classes, the second one rare, and a recall between two steps.
+
+    The last pixel that must be found is at p with (1 - p) / p * p < 1 - p, in floats. Class 1 is more or less sure: it
+    needs weights below 1, above 1, or of many thousands.
+    """
+    n, sure = int(rng.integers(7, 12)), rng.choice([1.0, -12.0])
+    y = rng.permutation(np.arange(int(rng.integers(40, 60))) < n)
+    must = int(rng.integers(2, n))
+    while True:
+        p1 = 1.0 / (1.0 + np.exp(-rng.normal(np.where(y, sure, -2.5), 1.0)))
+        last = np.sort(p1[y])[-must]
+        if (1.0 - last) / last * last < 1.0 - last:
+            return p1, y, float((must - rng.uniform(0.3, 0.7)) / n)
 
 
 QUESTION = Question(
@@ -29,11 +36,11 @@ QUESTION = Question(
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
+        (np.array([1e-6, 0.2]), np.array([True, False]), 1.0),  # weight 999,999
         # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
-        # Four of five, weight 1. In floats 5 * (1 - 0.8) < 1: that none may be missed is wrong.
-        (np.array([0.9, 0.8, 0.6, 0.5, 0.2]), np.ones(5, bool), 0.8),
     ),
+    random_cases=12,
     points=3,
 )
 
@@ -94,7 +101,10 @@ def tried_without_room(p1, y, recall):
     return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)
 
 
-@wrong(QUESTION, "In floats 5 * (1 - 0.8) is a hair less than 1: leave a hair of room, or count what must be found.")
-def missed_without_room(p1, y, recall):
-    last = np.sort(p1[y])[int(np.count_nonzero(y) * (1.0 - recall))]
-    return float((1.0 - last) / last)
+for _limit in (10.0, 100.0, 1000.0, 10_000.0):
+
+    def searched_up_to(p1, y, recall, limit=_limit):
+        return min(weight_for_recall(p1, y, recall), limit)
+
+    searched_up_to.__name__ += f"_{_limit:.0f}"
+    wrong(QUESTION, "For a pixel of p1 = 0.000001 the weight is 999,999: where does your search end?")(searched_up_to)
