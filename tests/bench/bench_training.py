@@ -1,4 +1,4 @@
-"""Training step and inference of the text's network, its plain float32 loop beside labkit's; training from disk.
+"""Training step of the text's network, its plain float32 loop beside labkit's; training from disk.
 
 SmallSegNet on batches of 8 images of 320x240. The text's loop is float32, NCHW, `CrossEntropyLoss` and Adam on tensors
 that are ready. labkit's step starts from bytes, and is channels_last, with bfloat16 where the processor multiplies
@@ -17,8 +17,7 @@ import torch
 from torch import nn
 
 from labkit.frame import RGBDFrame
-from labkit.learning.engines import open_engine
-from labkit.learning.network import SmallSegNet, UNet
+from labkit.learning.network import SmallSegNet
 from labkit.learning.training import RECIPES, ImagesInMemory, TrainConfig, Trainer, bf16_is_native
 from tests.bench.measure import in_turns, table
 
@@ -80,40 +79,16 @@ def measure_steps() -> list[tuple]:
         return lambda: losses[name].append(steps[name]())
 
     times = in_turns({name: noted(name) for name in steps}, ROUNDS)
-    expected = np.array(losses["the text's loop"])
-    return rows("training step", times, {name: f"{np.abs(losses[name] / expected - 1).max():.1e}" for name in steps})
-
-
-def rows(what: str, times: dict[str, np.ndarray], last_column: dict[str, str]) -> list[tuple]:
-    """Medians, and how many times as fast as the first, round by round."""
-    first = next(iter(times.values()))
+    expected, first = np.array(losses["the text's loop"]), times["the text's loop"]
     return [
-        (what, name, f"{np.median(ms):.1f}", f"{np.median(first / ms):.1f}", last_column.get(name, ""))
+        (
+            name,
+            f"{np.median(ms):.1f}",
+            f"{np.median(first / ms):.1f}",
+            f"{np.abs(losses[name] / expected - 1).max():.1e}",
+        )
         for name, ms in times.items()
     ]
-
-
-def text_inference(model: nn.Module, rgb: np.ndarray) -> np.ndarray:
-    """Probabilities as the text computes them: float32 NCHW."""
-    x = torch.from_numpy((rgb.astype(np.float32) / 255.0).transpose(2, 0, 1).copy())[None]
-    with torch.no_grad():
-        return model(x).softmax(dim=1)[0].permute(1, 2, 0).numpy()
-
-
-def measure_inference() -> list[tuple]:
-    """Rows of one image's probabilities, in float32 everywhere."""
-    image = scenes(1)[0][0]
-    torch.manual_seed(0)
-    text, small = SmallSegNet().eval(), SmallSegNet().eval()
-    small.load_state_dict(text.state_dict())
-    small, unet = (model.to(memory_format=torch.channels_last) for model in (small, UNet().eval()))
-    runs = {
-        "the text's listing": lambda: text_inference(text, image),
-        "labkit, SmallSegNet": lambda: open_engine(small)(image),
-        "labkit, UNet": lambda: open_engine(unet)(image),
-    }
-    np.testing.assert_allclose(runs["labkit, SmallSegNet"](), runs["the text's listing"](), atol=1e-5)
-    return rows("one image", in_turns(runs, 5 * ROUNDS), {})
 
 
 def measure_disk(steps: int = 60) -> list[tuple]:
@@ -146,6 +121,6 @@ def bytes_read() -> int:
 
 def main() -> str:
     """Measure, and return the tables."""
-    loops = table("what | loop | ms | times as fast | loss off by", measure_steps() + measure_inference())
+    loops = table("training step | ms | times as fast | loss off by", measure_steps())
     disk = table("images in | steps per second | of memory's speed | MB read per step", measure_disk())
     return f"{loops}\n\n{disk}"

@@ -103,17 +103,6 @@ def test_the_lattice_is_close_to_the_sum_over_all_pairs(colours):
     assert np.corrcoef(filtered.ravel(), exact.ravel())[0, 1] > 0.995
 
 
-def test_the_filter_is_linear_and_adds_to_what_is_there():
-    rng = np.random.default_rng(0)
-    gaussian = GaussianFilter(rng.normal(size=(8, 9, 4)))
-    x, y = rng.random((2, 72, 3), np.float32)
-    both, one, other = np.zeros((3, 72, 3), np.float32)
-    gaussian.add_filtered(2.0 * x + y, 3.0, both)
-    gaussian.add_filtered(x, 6.0, one)
-    gaussian.add_filtered(y, 3.0, one)
-    assert one == pytest.approx(both, rel=1e-4, abs=1e-5) and (other == 0.0).all()
-
-
 def test_dense_mean_field_on_a_small_image_is_close_to_all_pairs():
     rng = np.random.default_rng(1)
     H, W, C = 16, 20, 3

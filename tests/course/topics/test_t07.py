@@ -87,14 +87,6 @@ def test_points_in_fingers_equals_boxes_in_the_kits_grasp_frame():
     assert found > 20
 
 
-def test_each_bound_of_the_height_is_the_one_that_counts_in_some_case():
-    rng = np.random.default_rng(0)
-    counts = set()
-    for P, table_z, palm, _, clearance in (QUESTIONS["grasp_height"].inputs(rng) for _ in range(30)):
-        counts.add(int(np.argmax([P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance])))
-    assert counts == {0, 1, 2}
-
-
 def test_looking_for_a_hint_warns_of_nothing():
     """`canonical` multiplies what wrong outputs hold, infinity and 0 among it."""
 
