@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from labkit.grasp.search_kernels import GRIP, SLIPPERY, Shortcomings, lack, search
+from labkit.grasp.search_kernels import GRIP, SLIPPERY, Shortcomings, lack
 
 STEEPEST = 0.5  # tangent: between two faces that each lean by more than this to the same side, the target slips out
 
@@ -25,26 +25,24 @@ class Contact(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def find_grips(target, scene, hidden, centre, yaws, lowest, hand, weights, enough, most):
-    """Search, then measure grips in the order of their rough costs until `most` of them hold.
+def measure_grips(found, target, hidden, centre, rules, most, dropped):
+    """Measure grips of `search`, the best first, until `most` of them hold; `dropped` counts the others on.
 
-    Returns GRIPs; for each of them the middle of the jaws along their closing direction, their opening, and the cost;
-    and counts of what was dropped and why.
+    Returns those that hold, and for each of them the middle of the jaws along their closing direction, their opening,
+    and the cost.
     """
-    found, costs, dropped = search(target, scene, hidden, centre, yaws, lowest, hand, weights, enough)
     grips, places = np.empty(most, GRIP), np.empty((most, 3))
     T, H = np.empty_like(target), np.empty_like(hidden)
     n = 0
-    for i in np.argsort(costs, kind="mergesort"):  # stable: equals stay in their order
-        if n == most or costs[i] == np.inf:
+    for grip in found:
+        if n == most:
             break
-        grip = found[i]
         turn(target, centre, grip, T)
         turn(hidden, centre, grip, H)
-        if measure(grip, T, H, hand, weights, enough, places[n], dropped):
+        if measure(grip, T, H, rules, places[n], dropped):
             grips[n] = grip
             n += 1
-    return grips[:n], places[:n], dropped
+    return grips[:n], places[:n]
 
 
 @njit(cache=True, nogil=True)
@@ -58,11 +56,12 @@ def turn(points, centre, grip, out):
 
 
 @njit(cache=True, nogil=True)
-def measure(grip, T, H, hand, weights, enough, place, dropped):
+def measure(grip, T, H, rules, place, dropped):
     """Write middle, opening and cost of a grip into `place`, given target and hidden points turned to it.
 
     The cost is the weighted sum of its shortcomings, each from 0 to 1. Says whether the grip fits and would hold.
     """
+    hand, enough = rules.hand, rules.enough
     left, right, start, end = jaws(T, grip, hand)
     if not 0.0 < right - left <= hand.opening:
         return False
@@ -91,8 +90,8 @@ def measure(grip, T, H, hand, weights, enough, place, dropped):
         unseen=1.0 - lack(unseen, enough.unseen),
     )
     place[0], place[1], place[2] = middle, right - left, 0.0
-    for i in range(len(weights)):
-        place[2] += weights[i] * shortcomings[i]
+    for i in range(len(rules.weights)):
+        place[2] += rules.weights[i] * shortcomings[i]
     return True
 
 

@@ -241,7 +241,7 @@ def _frames(yaw, xy, z) -> Float[np.ndarray, "n 4 4"]:
 def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[Grasp] | str:
     """Grasps of one target, or why there is none."""
     from labkit.grasp import search_kernels as kernels  # numba takes its time to import
-    from labkit.grasp.measure_kernels import find_grips
+    from labkit.grasp.measure_kernels import measure_grips
 
     if len(target) == 0:
         return "no target points"
@@ -249,13 +249,15 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     target = target[target[:, 2] > lowest]
     if len(target) == 0:
         return "the target is too flat: nothing of it is higher than the lowest tips"
-    hand, enough = _hand(gripper, kernels), _enough(gripper, kernels)
-    weights = kernels.Shortcomings(**WEIGHTS)
+    hand = _hand(gripper, kernels)
+    rules = kernels.Rules(lowest, hand, kernels.Shortcomings(**WEIGHTS), _enough(gripper, kernels))
     camera = np.zeros(0) if camera_position is None else camera_position
     centre, near, hidden = kernels.surroundings(target, scene, camera, lowest, hand)
 
     def find(scene, hidden):
-        return find_grips(target, scene, hidden, centre, _yaws(target), lowest, hand, weights, enough, MEASURED)
+        grips, costs, dropped = kernels.search(target, scene, hidden, centre, _yaws(target), rules)
+        best = np.argsort(costs, kind="stable")[: np.isfinite(costs).sum()]
+        return *measure_grips(grips[best], target, hidden, centre, rules, MEASURED, dropped), dropped
 
     grips, places, dropped = find(near, hidden)
     if len(grips) == 0:
@@ -266,7 +268,7 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     cos, sin = np.cos(grips["yaw"]), np.sin(grips["yaw"])
     xy = centre + np.stack([a * cos - b * sin, a * sin + b * cos], axis=1)
     T = _frames(grips["yaw"], xy, grips["tip"] + gripper.tips_below_grasp)
-    found = zip(T, opening.tolist(), (1.0 - cost / sum(weights)).tolist(), strict=True)
+    found = zip(T, opening.tolist(), (1.0 - cost / sum(rules.weights)).tolist(), strict=True)
     return [Grasp(T, width, score, number) for T, width, score in found]
 
 

@@ -70,6 +70,53 @@ class Hand(NamedTuple):
     least: float
 
 
+class Rules(NamedTuple):
+    """What holds for every grip of a target: the height of the lowest tips, the hand, and what counts how much."""
+
+    lowest: float
+    hand: Hand
+    weights: Shortcomings
+    enough: Shortcomings
+
+
+class Maps(NamedTuple):
+    """Maps of one yaw, float32 (rows, columns): the target, the scene, what is hidden; highest: of the whole scene."""
+
+    target: np.ndarray
+    scene: np.ndarray
+    hidden: np.ndarray
+    highest: float
+
+
+class Row(NamedTuple):
+    """One row of the maps from the side: float32 heights by column.
+
+    number: the row's; b: its distance from the target's middle, metres. begin, stop: the columns that hold what can be
+    gripped. material: the target between the pads. left, right: how low the tips of a finger can go with its pad at a
+    column's left edge; dark_left, dark_right: the same among what is hidden.
+    """
+
+    number: int
+    b: float
+    begin: int
+    stop: int
+    material: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    dark_left: np.ndarray
+    dark_right: np.ndarray
+
+
+class Pads(NamedTuple):
+    """The columns at which the pads may be, nearest to the target and furthest from it; -1: nowhere."""
+
+    left_near: int
+    left_far: int
+    right_near: int
+    right_far: int
+
+
+NOWHERE = Pads(-1, -1, -1, -1)
 # A grip found on the map, in radians and metres; a and b count from the target's middle.
 GRIP = np.dtype(
     [
@@ -246,93 +293,120 @@ def hand_fits(heights, row, middle, tip, hand):
 
 
 @njit(cache=True, nogil=True)
-def search(target, scene, hidden, centre, yaws, lowest, hand, weights, enough):
+def search(target, scene, hidden, centre, yaws, rules):
     """Try every yaw, row and tip height, and every pair of edges of the target there; keep the best of each few rows.
 
-    centre: x, y of the target's middle. lowest: height of the lowest tips. weights, enough: `Shortcomings`. Returns
-    GRIPs, their rough costs (infinite for a place without a grip), and counts of what was dropped and why.
+    centre: x, y of the target's middle. Returns GRIPs, their rough costs (infinite for a place without a grip), and
+    counts of what was dropped and why.
     """
     x, y = centre
+    hand = rules.hand
     bands = 2 * REACH // BAND + 1
     costs = np.full(len(yaws) * bands, np.inf)
     grips = np.empty(len(yaws) * bands, GRIP)
     dropped = np.zeros(5, np.int64)
-    maps = np.empty((3, hand.rows, hand.columns), np.float32)
+    heights = np.empty((3, hand.rows, hand.columns), np.float32)
     lines = np.empty((7, hand.columns), np.float32)
     highest = scene[:, 2].max() if len(scene) else -np.inf
+    maps = Maps(heights[0], heights[1], heights[2], highest)
     for n, yaw in enumerate(yaws):
         cos, sin = np.cos(yaw), np.sin(yaw)
-        fill(maps[0], target, x, y, cos, sin, hand.cell)
-        fill(maps[1], scene, x, y, cos, sin, hand.cell)
-        fill(maps[2], hidden, x, y, cos, sin, hand.cell)
+        fill(maps.target, target, x, y, cos, sin, hand.cell)
+        fill(maps.scene, scene, x, y, cos, sin, hand.cell)
+        fill(maps.hidden, hidden, x, y, cos, sin, hand.cell)
         for offset in range(-REACH, REACH + 1, STRIDE):
             i = n * bands + (offset + REACH) // BAND
             grips[i].yaw = yaw
-            row = hand.rows // 2 + offset
-            costs[i] = search_row(maps, lines, row, lowest, highest, hand, weights, enough, costs[i], grips[i], dropped)
+            costs[i] = search_row(maps, lines, hand.rows // 2 + offset, rules, costs[i], grips[i], dropped)
     return grips, costs, dropped
 
 
 @njit(cache=True, nogil=True)
-def search_row(maps, lines, row, lowest, highest, hand, weights, enough, best, grip, dropped):
-    """Find the best grip of one row; if it costs less than `best`, write it into `grip`. Returns the lower cost."""
-    cell, columns = hand.cell, hand.columns
-    finger_rows = int(hand.finger / cell + 0.5)
-    least_depth = LEAST_DEPTH * cell
-    material, around, shadow, left, right, dark_left, dark_right = lines
-    profile(maps[0], row, int(hand.pad / cell + 0.5), 0, columns, material)
-    top = material.max()
+def search_row(maps, lines, number, rules, best, grip, dropped):
+    """Find the best grip of one row; if it costs less than `best`, write it into `grip`. Returns the lower cost.
+
+    lines: room for the row's heights, (7, columns).
+    """
+    hand, lowest = rules.hand, rules.lowest
+    cell, least_depth = hand.cell, LEAST_DEPTH * hand.cell
+    profile(maps.target, number, int(hand.pad / cell + 0.5), 0, hand.columns, lines[0])
+    top = lines[0].max()
     if top <= lowest + least_depth:
         dropped[SHALLOW] += top > lowest
         return best
-    begin, stop = 0, columns
-    while material[begin] <= lowest:
-        begin += 1
-    while material[stop - 1] <= lowest:
-        stop -= 1
-    thick = len(hand.underside)
-    first, last = max(begin - SCAN, thick), min(stop + SCAN + 1, columns - thick)
-    profile(maps[1], row, finger_rows, first - thick, last + thick, around)
-    profile(maps[2], row, finger_rows, first - thick, last + thick, shadow)
-    finger_floor(around, hand.underside, first, last, left, right)
-    finger_floor(shadow, hand.underside, first, last, dark_left, dark_right)
+    row = from_the_side(maps, lines, number, rules)
     runs = np.empty((4, 2), np.int64)
-    b = (row - hand.rows // 2) * cell
     tip = lowest - STEP * cell
     while tip + STEP * cell < top - least_depth:
         tip += STEP * cell
-        for i in range(find_runs(material, begin, stop, tip, hand.slot, runs)):
+        for i in range(find_runs(row.material, row.begin, row.stop, tip, hand.slot, runs)):
             for j in range(i + 1):
-                first, last = runs[j, 0], runs[i, 1] - 1
-                width = (last - first) * cell  # between the cells' middles
-                depth = end_height(material, first, last) - tip
-                if width > hand.opening or depth < least_depth:
-                    dropped[WIDE if width > hand.opening else SHALLOW] += 1
-                    continue
-                offset = np.sqrt((((first + last + 1) / 2 - columns / 2) * cell) ** 2 + b**2)
-                cost = weights.shallow * lack(depth, enough.shallow) + weights.wide * width / enough.wide
-                cost += weights.offset * (1.0 - lack(offset, enough.offset))
-                if cost >= best:
-                    continue
-                left_near, left_far = free_side(left, first, -1, tip)
-                right_near, right_far = free_side(right, last + 1, 1, tip)
-                if left_near < 0 or right_near < 0 or (right_near - left_near - 2) * cell > hand.opening:
-                    dropped[FINGERS] += 1
-                    continue
-                spare = min(min(first - left_far, right_far - last - 1) * cell, (hand.opening - width) / 2)
-                dark = max(dark_left[left_near], dark_right[right_near]) - tip
-                cost += weights.tight * lack(spare, enough.tight)
-                cost += weights.shadow * (1.0 - lack(dark, 1.5 * enough.shadow))
-                if cost >= best:
-                    continue
-                if highest > tip + hand.palm and not hand_fits(maps[1], row, (first + last + 1) // 2, tip, hand):
-                    dropped[PALM] += 1
-                    continue
-                best = cost
-                grip.b, grip.tip = b, tip
-                grip.left_near, grip.left_far = (left_near - columns / 2) * cell, (left_far - columns / 2) * cell
-                grip.right_near, grip.right_far = (right_near - columns / 2) * cell, (right_far - columns / 2) * cell
+                cost, pads = rough_cost(maps, row, runs[j, 0], runs[i, 1] - 1, tip, rules, best, dropped)
+                if cost < best:
+                    best = cost
+                    grip.b, grip.tip = row.b, tip
+                    middle = hand.columns / 2
+                    grip.left_near, grip.left_far = (pads.left_near - middle) * cell, (pads.left_far - middle) * cell
+                    grip.right_near, grip.right_far = (
+                        (pads.right_near - middle) * cell,
+                        (pads.right_far - middle) * cell,
+                    )
     return best
+
+
+@njit(cache=True, nogil=True)
+def from_the_side(maps, lines, number, rules):
+    """Look at a row from the side; lines: its heights, of which the first are the target's already."""
+    hand = rules.hand
+    material, around, shadow, left, right, dark_left, dark_right = lines
+    begin, stop = 0, hand.columns
+    while material[begin] <= rules.lowest:
+        begin += 1
+    while material[stop - 1] <= rules.lowest:
+        stop -= 1
+    thick, finger_rows = len(hand.underside), int(hand.finger / hand.cell + 0.5)
+    first, last = max(begin - SCAN, thick), min(stop + SCAN + 1, hand.columns - thick)
+    profile(maps.scene, number, finger_rows, first - thick, last + thick, around)
+    profile(maps.hidden, number, finger_rows, first - thick, last + thick, shadow)
+    finger_floor(around, hand.underside, first, last, left, right)
+    finger_floor(shadow, hand.underside, first, last, dark_left, dark_right)
+    b = (number - hand.rows // 2) * hand.cell
+    return Row(number, b, begin, stop, material, left, right, dark_left, dark_right)
+
+
+@njit(cache=True, nogil=True)
+def rough_cost(maps, row, first, last, tip, rules, best, dropped):
+    """The cost of gripping columns first to last of a row with the tips at a height, and where the pads may be.
+
+    The cost is infinite if nothing can be gripped so, or not for less than `best`.
+    """
+    hand, weights, enough = rules.hand, rules.weights, rules.enough
+    cell, middle = hand.cell, (first + last + 1) / 2
+    width = (last - first) * cell  # between the cells' middles
+    depth = end_height(row.material, first, last) - tip
+    if width > hand.opening or depth < LEAST_DEPTH * cell:
+        dropped[WIDE if width > hand.opening else SHALLOW] += 1
+        return np.inf, NOWHERE
+    offset = np.sqrt(((middle - hand.columns / 2) * cell) ** 2 + row.b**2)
+    cost = weights.shallow * lack(depth, enough.shallow) + weights.wide * width / enough.wide
+    cost += weights.offset * (1.0 - lack(offset, enough.offset))
+    if cost >= best:
+        return np.inf, NOWHERE
+    left_near, left_far = free_side(row.left, first, -1, tip)
+    right_near, right_far = free_side(row.right, last + 1, 1, tip)
+    if left_near < 0 or right_near < 0 or (right_near - left_near - 2) * cell > hand.opening:
+        dropped[FINGERS] += 1
+        return np.inf, NOWHERE
+    spare = min(min(first - left_far, right_far - last - 1) * cell, (hand.opening - width) / 2)
+    dark = max(row.dark_left[left_near], row.dark_right[right_near]) - tip
+    cost += weights.tight * lack(spare, enough.tight)
+    cost += weights.shadow * (1.0 - lack(dark, 1.5 * enough.shadow))
+    if cost >= best:
+        return np.inf, NOWHERE
+    if maps.highest > tip + hand.palm and not hand_fits(maps.scene, row.number, int(middle), tip, hand):
+        dropped[PALM] += 1
+        return np.inf, NOWHERE
+    return cost, Pads(left_near, left_far, right_near, right_far)
 
 
 @njit(cache=True, nogil=True)
