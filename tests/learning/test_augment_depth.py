@@ -8,10 +8,13 @@ from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base
 from labkit.learning.augment_depth import (
     augment_frames,
+    correlated_noise,
+    flying_pixels,
     random_calibration,
     random_sensor,
     random_size,
     random_view,
+    stereo_shadow,
 )
 from labkit.learning.channels import CHANNELS
 from labkit.sim.spec import Camera
@@ -61,10 +64,48 @@ def test_sensors_range_from_exact_to_blind(view):
     seen = [random_sensor(view.depth, rng) for _ in range(200)]
     exact = [np.array_equal(depth, view.depth) for depth in seen]
     blind = [not depth.any() for depth in seen]
-    assert 0.15 < np.mean(exact) < 0.35 and 0.0 < np.mean(blind) < 0.08
+    assert 0.12 < np.mean(exact) < 0.3 and 0.0 < np.mean(blind) < 0.08
     errors = [np.abs(d - view.depth)[d > 0.0].mean() for d, e, b in zip(seen, exact, blind, strict=True) if not e | b]
-    assert 0.0005 < np.median(errors) < 0.003 and max(errors) < 0.006
+    assert 0.0005 < np.median(errors) < 0.003 and 0.003 < max(errors) < 0.009
     assert all(depth.shape == view.depth.shape and depth.dtype == np.float32 for depth in seen)
+
+
+def test_noise_is_up_to_4_mm_at_1_m_and_neighbours_have_it_in_common():
+    rng = np.random.default_rng(5)
+    fields = [correlated_noise((120, 160), rng) for _ in range(60)]
+    spread = np.array([field.std() for field in fields])
+    assert spread.max() < 0.00401 and spread.min() < 0.001 and spread.mean() == pytest.approx(0.002, abs=0.0004)
+    steps = np.array([np.diff(field, axis=1).std() for field in fields]) / spread
+    assert steps.max() < 1.0 < np.sqrt(2.0), "independent pixels differ by sqrt(2) standard deviations"
+    assert steps.min() < 0.2, "some errors reach over many pixels"
+
+
+def test_a_stereo_camera_is_blind_behind_things_on_the_side_away_from_its_second_eye():
+    depth = np.full((60, 80), 1.0, np.float32)
+    depth[20:40, 30:50] = 0.8
+    sides = set()
+    for seed in range(40):
+        hidden = stereo_shadow(depth, np.random.default_rng(seed))
+        rows, columns = np.nonzero(hidden)
+        beside = [columns < 30, columns >= 50, rows < 20, rows >= 40]
+        names = ("left", "right", "above", "below")
+        side = next(name for name, there in zip(names, beside, strict=True) if there.all())
+        sides.add(side)
+        inside = (rows >= 20) & (rows < 40) if side in ("left", "right") else (columns >= 30) & (columns < 50)
+        assert inside.all()
+        # Disparity D at 1 m is D / 0.8 at 0.8 m: D / 4 pixels lie in the shadow.
+        assert 8 / 4 - 1 <= len(rows) / 20 <= 40 / 4 + 1
+    assert len(sides) == 4
+    assert not stereo_shadow(np.full((6, 8), 1.0, np.float32), np.random.default_rng(0)).any()
+
+
+def test_flying_pixels_hang_between_the_two_sides_of_a_jump():
+    depth = np.full((40, 50), 1.0, np.float32)
+    depth[:, 25:], depth[:3] = 0.7, 0.0
+    seen = flying_pixels(depth, np.random.default_rng(0))
+    moved = np.nonzero(seen != depth)
+    assert 10 < len(moved[0]) < 74 and set(moved[1]) == {24, 25}
+    assert (seen[moved] > 0.7).all() and (seen[moved] < 1.0).all() and not seen[:3].any()
 
 
 def test_calibrations_are_off_by_about_a_centimetre_a_degree_and_half_a_centimetre(view):
