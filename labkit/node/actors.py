@@ -21,6 +21,7 @@ from labkit.node.messages import (
     Transforms,
 )
 from labkit.node.sync import Synchronizer
+from labkit.support.validation import require
 
 
 class Camera:
@@ -46,8 +47,7 @@ class Camera:
         topics: Topics = DEFAULT_TOPICS,
         depth: str = "32FC1",
     ):
-        if depth not in convert.DEPTH:
-            raise ValueError(f"depth: expected one of {', '.join(convert.DEPTH)}, got {depth!r}")
+        require("depth", depth in convert.DEPTH, f"one of {', '.join(convert.DEPTH)}", repr(depth))
         self.transport, self.topics, self.depth = transport, topics, depth
         self.frame_id, self.base_frame = frame_id, base_frame
         for topic, kind in (
@@ -78,8 +78,7 @@ class Camera:
 
         A frame that comes late is published at once, and the next ones keep their places in time.
         """
-        if not rate > 0.0:
-            raise ValueError(f"rate: expected frames a second, above 0, got {rate}")
+        require("rate", rate > 0.0, "frames a second, above 0", rate)
         stop = stop or threading.Event()
         start, count = time.monotonic(), 0
         for count, frame in enumerate(frames, start=1):

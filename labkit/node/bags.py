@@ -20,6 +20,7 @@ from labkit.node.segmentation import Counts, SegmentationNode
 from labkit.node.transforms import TransformTree
 from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline
+from labkit.support.validation import require
 
 STORAGES = {"mcap": rosbag2.StoragePlugin.MCAP, "sqlite3": rosbag2.StoragePlugin.SQLITE3}
 FOREVER = QosTime(0, 0)
@@ -36,8 +37,7 @@ class BagWriter(Transport):
     """
 
     def __init__(self, path, wants=(), storage: str = "mcap"):
-        if storage not in STORAGES:
-            raise ValueError(f"storage: expected one of {', '.join(STORAGES)}, got {storage!r}")
+        require("storage", storage in STORAGES, f"one of {', '.join(STORAGES)}", repr(storage))
         self.path, self.wants = Path(path), frozenset(wants)
         if self.path.exists():
             raise FileExistsError(17, "it is there already", str(self.path))

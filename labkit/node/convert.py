@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.node.messages import Buffer, CameraInfo, Header, Image, PointCloud2, PointField, Pose
-from labkit.support.validation import check_K, check_shape, check_T
+from labkit.support.validation import check_K, check_shape, check_T, require
 
 # Encoding: type of a number, numbers a pixel.
 ENCODINGS = {
@@ -48,8 +48,7 @@ def layout(encoding: str) -> tuple[str, int]:
     channels = re.fullmatch(r"32FC([1-9]\d?)", encoding) if isinstance(encoding, str) else None
     if channels:
         return "f4", int(channels[1])
-    if encoding not in ENCODINGS:
-        raise ValueError(f"encoding: expected one of {', '.join(ENCODINGS)}, got {encoding!r}")
+    require("encoding", encoding in ENCODINGS, f"one of {', '.join(ENCODINGS)}", repr(encoding))
     return ENCODINGS[encoding]
 
 
@@ -58,15 +57,13 @@ def check_image(message: Image, encodings=None) -> Image:
 
     encodings: those that the reader can use, default all. Takes no time that grows with the image.
     """
-    if not isinstance(message, Image):
-        raise ValueError(f"message: expected an Image, got {type(message).__name__}")
+    require("message", isinstance(message, Image), "an Image", type(message).__name__)
     kind, channels = layout(message.encoding)
     if encodings is not None and message.encoding not in encodings:
         raise ValueError(f"encoding: expected one of {', '.join(encodings)}, got {message.encoding!r}")
     _check_counts(message, ("height", "width", "step"))
     row = message.width * channels * np.dtype(kind).itemsize
-    if message.step < row:
-        raise ValueError(f"step: expected at least {row} bytes for {message.width} pixels, got {message.step}")
+    require("step", message.step >= row, f"at least {row} bytes for {message.width} pixels", message.step)
     _check_data(message, message.step * (message.height - 1) + row)
     return message
 
@@ -79,10 +76,8 @@ def _check_counts(message, names) -> None:
 
 
 def _check_data(message, needed: int) -> None:
-    if not isinstance(message.data, Buffer):
-        raise ValueError(f"data: expected bytes, got {type(message.data).__name__}")
-    if len(message.data) < needed:
-        raise ValueError(f"data: expected {needed} bytes, got {len(message.data)}: the message is truncated")
+    require("data", isinstance(message.data, Buffer), "bytes", type(message.data).__name__)
+    require("data", len(message.data) >= needed, f"{needed} bytes", f"{len(message.data)}: the message is truncated")
 
 
 def decode_image(message: Image) -> Shaped[np.ndarray, "H W *channels"]:
@@ -113,8 +108,7 @@ def encode_image(array: Shaped[np.ndarray, "H W *channels"], encoding: str, head
     kind, channels = layout(encoding)
     expected = (None, None) if channels == 1 else (None, None, channels)
     array = check_shape("array", array, expected)
-    if array.dtype != np.dtype(kind):
-        raise ValueError(f"array: expected {np.dtype(kind).name} for {encoding}, got {array.dtype}")
+    require("array", array.dtype == np.dtype(kind), f"{np.dtype(kind).name} for {encoding}", array.dtype)
     height, width = array.shape[:2]
     step = width * channels * array.dtype.itemsize
     return Image(header, height, width, encoding, int(sys.byteorder == "big"), step, array.tobytes())
@@ -149,8 +143,7 @@ def depth_image(message: Image, scale: float = 0.001) -> Float32[np.ndarray, "H 
 
 def camera_matrix(message: CameraInfo) -> Float[np.ndarray, "3 3"]:
     """Read K from a calibration message; raises ValueError for none, such as the zeros of an uncalibrated camera."""
-    if not isinstance(message, CameraInfo):
-        raise ValueError(f"message: expected a CameraInfo, got {type(message).__name__}")
+    require("message", isinstance(message, CameraInfo), "a CameraInfo", type(message).__name__)
     _check_counts(message, ("height", "width"))
     return check_K("K", check_shape("K", message.K, (9,)).reshape(3, 3))
 
@@ -165,8 +158,7 @@ def to_frame(
     """
     size = (rgb.height, rgb.width)
     for name, other in (("depth", depth), ("info", info)):
-        if (other.height, other.width) != size:
-            raise ValueError(f"{name}: expected the size of rgb, {size}, got {(other.height, other.width)}")
+        require(name, (other.height, other.width) == size, f"the size of rgb, {size}", (other.height, other.width))
         if other.header.frame_id != rgb.header.frame_id:
             raise ValueError(
                 f"{name}: expected the frame of rgb, {rgb.header.frame_id!r}, got {other.header.frame_id!r}; "
@@ -191,8 +183,7 @@ def decode_cloud(message: PointCloud2) -> Float32[np.ndarray, "N 3"]:
 
     Raises ValueError if one of them is missing or bytes are.
     """
-    if not isinstance(message, PointCloud2):
-        raise ValueError(f"message: expected a PointCloud2, got {type(message).__name__}")
+    require("message", isinstance(message, PointCloud2), "a PointCloud2", type(message).__name__)
     where = {field.name: field for field in message.fields}
     if missing := [name for name in "xyz" if name not in where]:
         raise ValueError(f"fields: expected x, y and z, got none for {', '.join(missing)}")

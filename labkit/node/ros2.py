@@ -17,6 +17,7 @@ from labkit.node import ros2_types
 from labkit.node.bus import Transport
 from labkit.node.messages import Message, Transforms
 from labkit.node.wire import TYPES, Wire
+from labkit.support.validation import require
 
 logger = logging.getLogger(__name__)
 STATIC = "tf_static"  # the last part of the topic whose messages a late listener must get, too
@@ -101,10 +102,8 @@ class Ros2Transport(Transport):
         another reliability or depth.
         """
         for option, value in (("inputs", inputs), ("outputs", outputs)):
-            if value not in RELIABILITIES:
-                raise ValueError(f"qos_{option}: expected one of {', '.join(RELIABILITIES)}, got {value!r}")
-        if depth < 1:
-            raise ValueError(f"qos_depth: expected at least one message, got {depth}")
+            require(f"qos_{option}", value in RELIABILITIES, f"one of {', '.join(RELIABILITIES)}", repr(value))
+        require("qos_depth", depth >= 1, "at least one message", depth)
         self._inputs, self._outputs, self._depth = inputs, outputs, depth
 
     def advertise(self, topic: str, kind: type) -> None:

@@ -29,7 +29,7 @@ from labkit.node.messages import (
 from labkit.node.sync import Synchronizer
 from labkit.node.transforms import TransformTree
 from labkit.pipeline import Perception, Pipeline
-from labkit.support.validation import check_T
+from labkit.support.validation import check_T, require
 
 logger = logging.getLogger(__name__)
 OUTPUTS = {
@@ -97,10 +97,8 @@ class SegmentationNode:
         patience: float = 0.2,
         tree: TransformTree | None = None,
     ):
-        if not (np.isfinite(slop) and slop >= 0.0):
-            raise ValueError(f"slop: expected seconds of 0 or more, got {slop}")
-        if not (np.isfinite(depth_scale) and depth_scale > 0.0):
-            raise ValueError(f"depth_scale: expected metres per unit, above 0, got {depth_scale}")
+        require("slop", np.isfinite(slop) and slop >= 0.0, "seconds of 0 or more", slop)
+        require("depth_scale", np.isfinite(depth_scale) and depth_scale > 0.0, "metres per unit, above 0", depth_scale)
         self.pipeline, self.transport, self.topics = pipeline, transport, topics
         self.T_base_cam = None if T_base_cam is None else check_T("T_base_cam", T_base_cam)
         self.base_frame, self.depth_scale, self.patience = base_frame, depth_scale, patience
@@ -156,8 +154,7 @@ class SegmentationNode:
             logger.warning("%s: distortion is not undone; publish rectified images", self.topics.info)
 
     def _take_transforms(self, stream: str, message: Transforms) -> None:
-        if not isinstance(message, Transforms):
-            raise ValueError(f"message: expected Transforms, got {type(message).__name__}")
+        require("message", isinstance(message, Transforms), "Transforms", type(message).__name__)
         for transform in message.transforms:
             try:
                 self.tree.add(transform, static=stream == "tf_static")

@@ -4,6 +4,7 @@ from collections import Counter, deque
 from collections.abc import Sequence
 
 from labkit.node.messages import NANOSECONDS
+from labkit.support.validation import require
 
 
 class Synchronizer:
@@ -25,10 +26,8 @@ class Synchronizer:
     """
 
     def __init__(self, streams: Sequence[str], slop: int, depth: int = 10, restart: int = NANOSECONDS):
-        if slop < 0:
-            raise ValueError(f"slop: expected nanoseconds of 0 or more, got {slop}")
-        if depth < 1:
-            raise ValueError(f"depth: expected at least one waiting message, got {depth}")
+        require("slop", slop >= 0, "nanoseconds of 0 or more", slop)
+        require("depth", depth >= 1, "at least one waiting message", depth)
         self.slop, self.restart, self.left = slop, restart, Counter()
         self._waiting = {stream: deque(maxlen=depth) for stream in streams}
         self._newest: dict[str, int] = {}

@@ -24,6 +24,7 @@ from labkit.node.messages import (
     Transform,
     Transforms,
 )
+from labkit.support.validation import require
 
 TYPES = {
     Image: "sensor_msgs/msg/Image",
@@ -65,8 +66,7 @@ class Wire:
 
         Raises ValueError for a type that the kit does not use, and for bytes that do not hold such a message.
         """
-        if name not in KINDS:
-            raise ValueError(f"type: expected one of {', '.join(KINDS)}, got {name}")
+        require("type", name in KINDS, f"one of {', '.join(KINDS)}", name)
         try:
             raw = self.store.deserialize_ros1(data, name) if self.ros1 else self.store.deserialize_cdr(data, name)
             return _read(KINDS[name], raw)
@@ -135,8 +135,7 @@ def _read(kind: type, raw):
     if kind is Pose:
         return Pose(_plain(raw.header), _plain(raw.pose.position), _plain(raw.pose.orientation))
     if kind is Diagnostics:
-        if len(raw.status) != 1:
-            raise ValueError(f"status: expected the diagnostics of one node, got {len(raw.status)}")
+        require("status", len(raw.status) == 1, "the diagnostics of one node", len(raw.status))
         status = raw.status[0]
         values = {pair.key: pair.value for pair in status.values}
         return Diagnostics(_plain(raw.header), status.name, int(status.level), status.message, values)

@@ -58,8 +58,7 @@ class Client:
         plugin = importlib.util.find_spec("eglRenderer")
         with silent(1), silent(2):
             opened = plugin is not None and self.loadPlugin(plugin.origin, "_eglRendererPlugin") >= 0
-        if not opened:
-            raise ValueError('renderer: expected a machine with EGL for "egl", got none (Debian: libegl1)')
+        require("renderer", opened, 'a machine with EGL for "egl"', "none (Debian: libegl1)")
         self.egl = True
 
     def quiet(self):
