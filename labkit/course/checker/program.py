@@ -1,9 +1,12 @@
-"""From a notebook to the program that answers one question: the answer's cell, and what it needs of other cells.
+"""From a notebook to the program that answers one question: a slice of it, the answer's cell and what that needs.
 
 The check in a notebook, `labkit check` and the grader run the same program, so a tick of one is a tick of the others:
 
     program(cells, "iou", blanks)    the cell that defines iou, and by names the definitions, imports and constants of
                                      other cells that it needs; not the rest of these cells, and not their drawings
+
+In this order: a cell becomes statements that know which names they bind, change and need (`Parsed`, `Statement`); from
+the answer on, names are followed to the statements that give them their values (`Slice`).
 
 Nothing here runs a student's code. The module needs the standard library alone, so that it can also run in the
 grader's sandbox: a stranger's text may break a parser.
@@ -14,17 +17,14 @@ import builtins
 import re
 import symtable
 import sys
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 UNREADABLE = (SyntaxError, ValueError, RecursionError, MemoryError)  # what a parser raises for a stranger's text
-KEEPS_ITS_BODY = (
-    "%%time",
-    "%%timeit",
-    "%%capture",
-    "%%prun",
-)  # cell magics around Python; others hold another language
+# Cell magics around Python; others hold another language.
+KEEPS_ITS_BODY = ("%%time", "%%timeit", "%%capture", "%%prun")
 # Names that show something or count progress. They are replaced by functions that do nothing.
 QUIET = {
     "tqdm": "lambda things=(), *rest, **options: things",
@@ -84,8 +84,9 @@ def program(
     (('cell 1', 'import numpy as np\\n'), ('cell 2', 'half = 0.5\\n'), ('f', 'def f(x):\\n    return half * np.abs(x)'))
     """
     try:
-        slicer = Slicer([parsed(cell) for cell in cells], blanks, {*packages, *sys.stdlib_module_names}, forbidden)
-        return slicer.cut(name, given or {}, latest)
+        without = {module.partition(".")[0] for module in forbidden}
+        modules = {*packages, *sys.stdlib_module_names} - without
+        return Slice(list(map(parsed, cells)), name, blanks, given or {}, modules, without, latest).program()
     except Refused as reason:
         return Program(refused=str(reason))
 
@@ -109,22 +110,27 @@ def cells_of(notebook_cells: object) -> list[Cell]:
 # ------------------------------------------------------------------------------------------------------- one cell
 
 
-@dataclass
 class Statement:
     """Statements at the top of a cell that share lines, usually one.
 
     binds: names that it gives a value. touches: names whose value it may change. needs: names that it or a function in
-    it reads. modules: what it imports where the import must succeed.
+    it reads. modules: what it imports where the import must succeed. star: whether it imports all names of a module.
+    future: whether it is an import from __future__. imports: whether all that it does is to import.
     """
 
-    nodes: list[ast.stmt]
-    first: int
-    last: int
-    binds: set[str]
-    touches: set[str]
-    needs: set[str]
-    modules: set[str]
-    star: bool
+    def __init__(self, nodes: list[ast.stmt], lines: list[str]):
+        self.nodes = nodes
+        self.first, self.last = first_line(nodes[0]), last_line(nodes)
+        binds, needs = names_of("\n".join(lines[self.first - 1 : self.last]))
+        checked = [target for node in nodes if is_check(node) for target in node.targets]
+        self.binds = binds - {target.id for target in checked if isinstance(target, ast.Name)}
+        self.touches = set().union(*map(touched, nodes)) & (needs | self.binds)  # others are names inside functions
+        self.needs = needs | self.touches
+        self.modules = {module for node in nodes for module in imported(node)}
+        froms = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+        self.star = any(node.names[0].name == "*" for node in froms)
+        self.future = any(node.module == "__future__" for node in froms)
+        self.imports = any(isinstance(node, ast.Import | ast.ImportFrom) for node in nodes)
 
 
 class Parsed:
@@ -138,7 +144,7 @@ class Parsed:
         try:
             tree = self.parse()
             self.dump = ast.dump(tree)
-            self.statements = list(statements(tree, self.text.split("\n")))
+            self.statements = statements(tree, self.text.split("\n"))
         except UNREADABLE as error:
             line = getattr(error, "lineno", None)
             self.problem = f"its cell is not Python{f': look at line {line}' if line else ''}"
@@ -209,28 +215,25 @@ def without_magic(line: str) -> str | None:
     return None
 
 
-def statements(tree: ast.Module, lines: list[str]) -> Iterator[Statement]:
+def statements(tree: ast.Module, lines: list[str]) -> list[Statement]:
     """The statements of a cell, those on the same lines together."""
-    together: list[Statement] = []
+    together: list[list[ast.stmt]] = []
     for node in tree.body:
-        first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
-        if not together or first > together[-1].last:
-            together.append(Statement([], first, first, set(), set(), set(), set(), False))
-        statement = together[-1]
-        statement.nodes.append(node)
-        statement.last = max(statement.last, node.end_lineno or first)
-    for statement in together:
-        text = "\n".join(lines[statement.first - 1 : statement.last])
-        statement.binds, statement.needs = names_of(text)
-        for node in statement.nodes:
-            statement.touches |= touched(node)
-            statement.modules |= set(imported(node))
-            statement.star |= isinstance(node, ast.ImportFrom) and node.names[0].name == "*"
-            if is_check(node):
-                statement.binds -= {target.id for target in node.targets if isinstance(target, ast.Name)}
-        statement.touches &= statement.needs | statement.binds  # the others are names inside functions
-        statement.needs |= statement.touches
-        yield statement
+        if together and first_line(node) <= last_line(together[-1]):
+            together[-1].append(node)
+        else:
+            together.append([node])
+    return [Statement(nodes, lines) for nodes in together]
+
+
+def first_line(node: ast.stmt) -> int:
+    """The number of a statement's first line; decorators stand above it."""
+    return min([node.lineno, *(decorator.lineno for decorator in getattr(node, "decorator_list", []))])
+
+
+def last_line(nodes: list[ast.stmt]) -> int:
+    """The number of the last line of some statements."""
+    return max(node.end_lineno for node in nodes)
 
 
 def names_of(text: str) -> tuple[set[str], set[str]]:
@@ -293,108 +296,114 @@ def is_check(node: ast.stmt) -> bool:
 # -------------------------------------------------------------------------------------------------- several cells
 
 
-class Slicer:
-    """The cells of a notebook, and what of them an answer needs."""
+class Slice:
+    """The slice of a notebook for one answer: the statements that give values to the names that it needs.
 
-    def __init__(self, cells: list[Parsed], blanks: Collection[str], modules: set[str], forbidden: Collection[str]):
-        self.cells, self.blanks, self.modules = cells, blanks, modules
-        self.forbidden = {name.partition(".")[0] for name in forbidden}
+    cells: in the order of the notebook, or in that in which they were run if `latest` is set. name: of the answer.
+    blanks, given: as in `program`. modules: those that there are where answers are graded, forbidden: those that there
+    are, but not for this task. Raises Refused where the answer cannot be graded.
+    """
 
-    def cut(self, name: str, given: Mapping[str, str], latest: bool) -> Program:
-        """The program of one answer; raises Refused."""
-        home = self.home(name, latest)
-        chosen: dict[int, set[int]] = {}
-        calls: dict[str, None] = {}
-        seen = {(name, home)}
-        waiting: list[tuple[str, int, tuple[str, ...]]] = [(name, home, (name,))]
-        quiet: dict[str, None] = {}
+    def __init__(
+        self,
+        cells: list[Parsed],
+        name: str,
+        blanks: Collection[str],
+        given: Mapping[str, str],
+        modules: Collection[str],
+        forbidden: Collection[str],
+        latest: bool,
+    ):
+        self.cells, self.name, self.blanks, self.given, self.latest = cells, name, blanks, given, latest
+        self.modules, self.forbidden = modules, forbidden
+        self.home = self.home_of_answer()
+        self.chosen: dict[int, set[int]] = {}  # positions of statements, by cell
+        self.calls: dict[str, None] = {}  # other blanks, in the order in which they are met
+        self.quiet: dict[str, None] = {}  # names of QUIET that no cell gives a value
+        self.follow()
+
+    def program(self) -> Program:
+        """The slice as texts to run."""
+        pieces = [("quiet", "\n".join(f"{name} = {QUIET[name]}" for name in self.quiet))] if self.quiet else []
+        pieces += [(f"{blank}, the kit's", self.given[blank]) for blank in self.calls if blank in self.given]
+        for where in sorted(self.chosen):
+            label = self.name if where == self.home else f"cell {where + 1}"
+            pieces.append((label, hushed(self.cells[where].kept(self.chosen[where]))))
+        return Program(tuple(pieces), tuple(self.calls))
+
+    def follow(self) -> None:
+        """Follow names from the answer to the statements that give them values, and to what these need, and so on."""
+        seen = {(self.name, self.home)}
+        waiting = deque([(self.name, self.home, (self.name,))])  # a name, the cell that needs it, and how it came there
         while waiting:
-            wanted, asking, way = waiting.pop(0)
-            if wanted != name and wanted in self.blanks:
-                calls[wanted] = None
-                if wanted in given:
-                    continue
-            at = home if wanted == name else self.place(wanted, asking, latest)
-            if at is None:
-                if wanted in QUIET:
-                    quiet[f"{wanted} = {QUIET[wanted]}"] = None
-                continue
-            for where, i in self.statements_for(wanted, at, home if at <= home else at):
-                statement = self.cells[where].statements[i]
+            wanted, asking, way = waiting.popleft()
+            for where, statement in self.choose(wanted, asking):
                 self.allow(statement, way)
-                if i in chosen.setdefault(where, set()):
-                    continue
-                chosen[where].add(i)
                 for other in sorted(statement.needs):
                     if (other, where) not in seen:
                         seen.add((other, where))
                         waiting.append((other, where, (*way, other)))
-        pieces = [("quiet", "\n".join(quiet))] if quiet else []
-        pieces += [(f"{blank}, the kit's", given[blank]) for blank in calls if blank in given]
-        for where in sorted(chosen):
-            text = hushed(self.cells[where].kept(chosen[where]))
-            pieces.append((name if where == home else f"cell {where + 1}", text))
-        return Program(tuple(pieces), tuple(calls))
 
-    def home(self, name: str, latest: bool) -> int:
+    def choose(self, wanted: str, asking: int) -> Iterator[tuple[int, Statement]]:
+        """Take in the statements that a name needs which a cell reads: those that are new in the slice, by cell."""
+        if wanted in self.blanks and wanted != self.name:
+            self.calls[wanted] = None
+            if wanted in self.given:
+                return
+        at = self.home if wanted == self.name else self.place(wanted, asking)
+        if at is None:
+            if wanted in QUIET:
+                self.quiet[wanted] = None
+            return
+        # What changes a value in place counts, up to the answer; a module is no value.
+        binding = [statement for statement in self.cells[at].statements if wanted in statement.binds]
+        is_value = not any(statement.imports for statement in binding)
+        for where in range(at, max(at, self.home) + 1):
+            for i, statement in enumerate(self.cells[where].statements):
+                binds = where == at and (wanted in statement.binds or statement.star or statement.future)
+                changes = is_value and wanted in statement.touches
+                if (binds or changes) and i not in self.chosen.setdefault(where, set()):
+                    self.chosen[where].add(i)
+                    yield where, statement
+
+    def home_of_answer(self) -> int:
         """The cell that holds the answer; raises Refused if there is none, or several that differ."""
-        marked = [i for i, cell in enumerate(self.cells) if cell.grade_id == name]
-        defining = [i for i in marked if name in self.cells[i].binds]
-        answered = [i for i in defining if not self.cells[i].is_blank(name)]
-        if len({self.cells[i].dump for i in answered}) > 1:
+        name, cells = self.name, self.cells
+        marked = [i for i, cell in enumerate(cells) if cell.grade_id == name]
+        binding = [i for i in marked if name in cells[i].binds]
+        answered = [i for i in binding if not cells[i].is_blank(name)]
+        if len({cells[i].dump for i in answered}) > 1:
             raise Refused(f"{len(answered)} different cells have its grade id: keep one")
-        elsewhere = [
-            i
-            for i, cell in enumerate(self.cells)
-            if i not in marked and name in cell.binds and (latest or not cell.is_blank(name)) and cell.defines(name)
-        ]
-        if latest and elsewhere:
+        elsewhere = [i for i, cell in enumerate(cells) if i not in marked and cell.defines(name)]
+        if self.latest and elsewhere:
             return elsewhere[-1]
-        for found in (answered[-1:], elsewhere[-1:], defining[-1:]):
-            if found:
-                return found[0]
-        raise Refused(next((self.cells[i].problem for i in marked if self.cells[i].problem), f"no cell defines {name}"))
+        elsewhere = [i for i in elsewhere if not cells[i].is_blank(name)]
+        if found := answered or elsewhere or binding:
+            return found[-1]
+        raise Refused(next((cells[i].problem for i in marked if cells[i].problem), f"no cell defines {name}"))
 
-    def place(self, wanted: str, asking: int, latest: bool) -> int | None:
-        """The cell that gives a name its value for a cell that needs it."""
+    def place(self, wanted: str, asking: int) -> int | None:
+        """The cell that gives a name its value for a cell that needs it; None if that is Python's own, or nobody's."""
         binding = [i for i, cell in enumerate(self.cells) if wanted in cell.binds]
         if wanted in self.blanks:
-            binding = [i for i in binding if self.cells[i].grade_id == wanted] or [
-                i for i in binding if self.cells[i].defines(wanted)
-            ]
+            marked = [i for i in binding if self.cells[i].grade_id == wanted]
+            binding = marked or [i for i in binding if self.cells[i].defines(wanted)]
         if asking in binding:
             return asking
-        above, below = [i for i in binding if i < asking], [i for i in binding if i > asking]
-        if hasattr(builtins, wanted):
-            below = []
-        if binding and latest:
+        if self.latest and binding:
             return binding[-1]
-        if above or below:
-            return above[-1] if above else below[0]
+        if above := [i for i in binding if i < asking]:
+            return above[-1]
+        if hasattr(builtins, wanted):
+            return None
+        if below := [i for i in binding if i > asking]:
+            return below[0]
         stars = [i for i, cell in enumerate(self.cells) if any(statement.star for statement in cell.statements)]
-        return stars[-1] if stars and not hasattr(builtins, wanted) else None
-
-    def statements_for(self, wanted: str, at: int, until: int) -> Iterator[tuple[int, int]]:
-        """The statements of a cell that give a name its value, and those up to the answer that change it in place."""
-        for where in range(at, until + 1):
-            for i, statement in enumerate(self.cells[where].statements):
-                binds = where == at and (wanted in statement.binds or statement.star)
-                future = where == at and any(
-                    isinstance(node, ast.ImportFrom) and node.module == "__future__" for node in statement.nodes
-                )
-                if binds or future or (wanted in statement.touches and self.is_value(wanted, at)):
-                    yield where, i
-
-    def is_value(self, wanted: str, at: int) -> bool:
-        """Whether a name stands for a value, not for a module."""
-        nodes = [n for statement in self.cells[at].statements if wanted in statement.binds for n in statement.nodes]
-        return not any(isinstance(node, ast.Import | ast.ImportFrom) for node in nodes)
+        return stars[-1] if stars else None
 
     def allow(self, statement: Statement, way: tuple[str, ...]) -> None:
         """Raise Refused if a statement imports what is absent where answers are graded; way: names that led to it."""
-        for module in sorted(statement.modules):
-            if module in QUIET_MODULES or (module in self.modules and module not in self.forbidden):
-                continue
+        for module in sorted(statement.modules - self.modules - set(QUIET_MODULES)):
             through = f"it uses {way[1]}: " if len(way) > 1 else ""
             if module in KIT:
                 raise Refused(f"{through}an answer does not use {module}; take what you need from the arguments")
