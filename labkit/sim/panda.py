@@ -1,4 +1,4 @@
-"""The arm that acts in a World: plan, move, grasp, lift, place (topic 07). It moves by its motors alone.
+"""The arm that acts in a World: plan, move, grasp, lift (topic 07). It moves by its motors alone.
 
 No joint is set, no constraint made, no object touched but by the fingers' friction. The simulator's true poses are read
 in one place, `_Witness`, and only to score a lift. Metres, radians, base frame.
@@ -14,23 +14,17 @@ from jaxtyping import Float
 from labkit.labels import CLASSES, TARGET
 from labkit.sim.client import pybullet
 from labkit.sim.kinematics import (
-    FINGER_MAX,
     FINGER_MAX_EFFORT,
     MAX_EFFORT,
-    forward_kinematics,
-    inverse_kinematics,
 )
 from labkit.sim.planning import (
     MotionPlan,
     plan_grasp,
-    plan_transit,
-    points_in_the_way,
-    straight_line,
     straight_up,
     trajectory,
 )
 from labkit.sim.world import TIME_STEP, World
-from labkit.support.validation import check_finite, check_shape, check_T, require
+from labkit.support.validation import check_finite, check_shape, require
 
 ARM_JOINTS = tuple(range(7))
 FINGER_JOINTS = (9, 10)
@@ -45,7 +39,6 @@ CLOSING_SECONDS = 1.0  # at most
 STALLED = 0.002  # m/s: fingers slower than this for STALLED_STEPS have met something
 STALLED_STEPS = 10
 CLOSED = 0.002  # m, jaws no wider than this hold nothing
-LETTING_GO = 0.03  # m, how much the jaws open to put an object down
 HOLD_SECONDS = 1.0
 LIFTED = 0.10  # m
 
@@ -101,12 +94,6 @@ class Panda:
     def _joint_state(self, joints: Sequence[int], field: int) -> np.ndarray:
         states = self.world.client.getJointStates(self.world.robot, joints)
         return np.array([state[field] for state in states])
-
-    def inverse_kinematics(
-        self, T_base_grasp: Float[np.ndarray, "4 4"], q0: Float[np.ndarray, "7"] | None = None
-    ) -> Float[np.ndarray, "7"] | None:
-        """Joint angles within the limits for a grasp frame, near q0 (default: where the arm is), or None."""
-        return inverse_kinematics(T_base_grasp, self.q if q0 is None else q0)
 
     def plan(self, grasp: Any, scene: Float[np.ndarray, "M 3"] | None = None) -> MotionPlan | str:
         """Plan a motion from here to a grasp and up; the reason in words if there is none.
@@ -173,38 +160,6 @@ class Panda:
                 break
         return plan
 
-    def place(
-        self, where: Float[np.ndarray, "4 4"] | Float[np.ndarray, "3"], scene: Float[np.ndarray, "M 3"] | None = None
-    ) -> str | None:
-        """Put the held object down, open, and go back up; None when done, else the reason why not.
-
-        where: the grasp frame at which to let go, T_base_grasp, or only its position (x, y, z) to keep the hand's
-        orientation; the height at which it was gripped puts an object back on the table. scene: points to keep clear
-        of, without those of the held object.
-        """
-        T_now = forward_kinematics(self.q)
-        T = T_now.copy()
-        if np.shape(where) == (3,):
-            T[:3, 3] = where
-        else:
-            T = check_T("where", where)
-        T_above = T.copy()
-        T_above[2, 3] = max(T[2, 3], T_now[2, 3])
-        across = self.inverse_kinematics(T_above)
-        down = None if across is None else straight_line(T_above, T, across)
-        if down is None:
-            return "out of reach"
-        finger, table_z = self.opening / 2, self.world.spec.table.z
-        points = points_in_the_way(_points(scene), self.q, finger, table_z)
-        transit = plan_transit(self.q, across, finger, points, table_z)
-        if isinstance(transit, str):
-            return f"no path: {transit}"
-        if not all(self._follow_or_back_off(leg, LINE_SPEED) for leg in (*transit, down)):
-            return "blocked on the way over"
-        self._open()
-        self._follow(down[::-1], LINE_SPEED)
-        return None
-
     def _follow(self, path: Float[np.ndarray, "N 7"], line_speed: float = np.inf) -> bool:
         """Send the motors along a path, from rest to rest; stop and say False where something holds the arm up."""
         for q in trajectory(path, TIME_STEP, line_speed):
@@ -216,9 +171,9 @@ class Panda:
         self._wait(SETTLE_SECONDS)
         return True
 
-    def _follow_or_back_off(self, leg: Float[np.ndarray, "N 7"], line_speed: float = np.inf) -> bool:
+    def _follow_or_back_off(self, leg: Float[np.ndarray, "N 7"]) -> bool:
         """Follow a leg; where something holds the arm up, return to the leg's beginning and say False."""
-        arrived = self._follow(leg, line_speed)
+        arrived = self._follow(leg)
         if not arrived:
             nearest = np.abs(leg - self.q).max(axis=1).argmin()
             self._follow(np.vstack([self.q, leg[nearest::-1]]), LINE_SPEED)
@@ -239,12 +194,6 @@ class Panda:
             still = 0 if moving else still + 1
             if still == STALLED_STEPS:
                 break
-
-    def _open(self) -> None:
-        """Open the jaws enough to let go."""
-        self._gripping = False
-        self._opening = min(self.opening + LETTING_GO, 2 * FINGER_MAX)
-        self._wait((self._opening - self.opening) / 2 / FINGER_SPEED + 0.1)
 
     def _step(self, q: Float[np.ndarray, "7"]) -> None:
         """One step of the simulation, at whose end the arm is to be at q; forces are limited to the URDF's efforts."""

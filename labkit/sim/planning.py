@@ -73,7 +73,7 @@ def plan_grasp(
     points = check_finite("points", check_shape("points", points, (None, 3)))
     if not 0.0 < opening <= 2 * FINGER_MAX:
         return f"too wide for the jaws: an opening of {1000 * opening:.0f} mm, at most {2000 * FINGER_MAX:.0f}"
-    points = points_in_the_way(points, q, finger, table_z)
+    points = thin(without_robot(points[points[:, 2] > table_z + ON_TABLE], q, finger))
     reason = "out of reach"
     for approach in APPROACHES:
         plans = [_lines(turned, opening, approach) for turned in (T, T @ np.diag([-1.0, -1.0, 1.0, 1.0]))]
@@ -88,13 +88,6 @@ def plan_grasp(
                 blocked = transit
             reason = f"no path: {blocked}"
     return reason
-
-
-def points_in_the_way(
-    points: Float[np.ndarray, "M 3"], q: Float[np.ndarray, "7"], finger: float, table_z: float
-) -> Float[np.ndarray, "K 3"]:
-    """The camera's points without the table, which is checked as a plane, and the arm as it stands at q; thinned."""
-    return thin(without_robot(points[points[:, 2] > table_z + ON_TABLE], q, finger))
 
 
 def _lines(T_base_grasp, opening: float, approach: float):

@@ -396,24 +396,6 @@ def test_same_scene_same_lift_and_another_world_is_left_alone():
         assert again == result and other.pose("thing").tobytes() == world.pose("thing").tobytes()
 
 
-def test_place_puts_it_down_and_the_arm_can_lift_again():
-    with world_of(thing(0.5, 0.1)) as world:
-        forbid(world, *FORCES_AND_TELEPORTS)
-        panda = Panda(world)
-        assert panda.lift(grasp(top_down(0.5, 0.1, 0.02))).success
-        assert panda.place(np.array([0.6, -0.15, 0.02])) is None
-        world.step(120)
-        assert np.allclose(world.pose("thing")[:3, 3], (0.6, -0.15, 0.02), atol=0.005)
-        assert kinematics.forward_kinematics(panda.q)[2, 3] > 0.1
-        assert panda.lift(grasp(top_down(0.6, -0.15, 0.02))).success
-        assert panda.place(top_down(0.45, 0.0, 0.02, 0.5)) is None
-        assert np.linalg.norm(world.pose("thing")[:2, 3] - (0.45, 0.0)) < 0.02
-        yaw = Rotation.from_matrix(world.pose("thing")[:3, :3]).as_euler("xyz")[2]
-        assert yaw % (np.pi / 2) == pytest.approx(0.5, abs=0.05)
-        assert panda.place(np.array([1.2, 0.0, 0.02])) == "out of reach"
-        assert panda.place(np.array([0.5, 0.0, 0.02]), scene=wall(0.3, 0.7)).startswith("no path")
-
-
 # Bad input
 
 
@@ -432,7 +414,6 @@ AIM = top_down(0.5, 0.0, 0.02)
         ("points", lambda panda: planning.plan_grasp(AIM, 0.05, Q_HOME, np.full((2, 3), np.nan), 0.0)),
         ("scene", lambda panda: panda.plan(grasp(AIM), np.zeros((4, 2)))),
         ("grasp", lambda panda: panda.lift(SimpleNamespace(plan=GraspPlan(), clouds=[]))),  # a Perception, not its plan
-        ("where", lambda panda: panda.place(np.zeros((4, 3)))),
         ("plan", lambda panda: panda.execute(planning.plan_grasp(AIM, 0.05, STALE, NOTHING, 0.0))),
         ("world", lambda panda: Panda(World(replace(scene(), robot=False)))),
     ],
