@@ -69,15 +69,14 @@ OPERATORS = {
 COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 # What may be missing around an expression `_`: the kind of the mistake, how many nodes it adds, and the texts.
 AROUND = (
-    ("transpose", 1, "_.T | np.swapaxes(_, -1, -2)"),
-    ("sign", 1, "-_ | np.abs(_)"),
-    ("not", 1, "~_ | not _"),
-    ("power", 1, "np.sqrt(_) | _ ** 2"),
-    ("logarithm", 1, "np.log(_) | np.log2(_) | np.log10(_)"),
-    ("exponential", 1, "np.exp(_)"),
-    ("cast", 1, "_.astype(float) | _.astype(int) | float(_) | int(_) | np.int64(_)"),
-    ("rounding", 1, "np.round(_) | np.floor(_) | np.ceil(_)"),
-    ("copy", 1, "_.copy()"),
+    ("transpose", 1.5, "_.T | np.swapaxes(_, -1, -2)"),
+    ("sign", 1.5, "-_ | np.abs(_)"),
+    ("cast", 1.5, "_.astype(float) | _.astype(int) | float(_) | int(_) | np.int64(_)"),
+    ("copy", 1.5, "_.copy()"),
+    ("power", 2, "np.sqrt(_) | _ ** 2"),
+    ("logarithm", 2, "np.log(_) | np.log2(_) | np.log10(_)"),
+    ("exponential", 2, "np.exp(_)"),
+    ("rounding", 2, "np.round(_) | np.floor(_) | np.ceil(_)"),
     ("off by one", 2, "_ + 1 | _ - 1 | _ + 0.5 | _ - 0.5"),
     ("factor", 2, "2 * _ | _ / 2 | _ * 1000 | _ / 1000 | _ * 255 | _ / 255 | _ * 256"),
     ("complement", 2, "1 - _"),
@@ -317,8 +316,26 @@ def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
         return
     if isinstance(node, ast.Name) and node.id not in scope.names:  # np, range, float ...
         return
+    if is_condition(node, parent):
+        yield Recipe(
+            "not", "~", 1, template("~_" if not isinstance(parent, ast.If | ast.IfExp | ast.While) else "not _")
+        )
+        return
     yield from missing_around(node)
     yield from missing_terms(node, scope)
+    if not isinstance(node, ast.Name):
+        for other in scope.names:
+            yield Recipe("name", other, 2, lambda n, other=other: name(n, other))
+
+
+def is_condition(node: ast.expr, parent: ast.AST) -> bool:
+    """Whether an expression is true or false, perhaps for each entry."""
+    if isinstance(parent, ast.If | ast.IfExp | ast.While) and node is parent.test:
+        return True
+    called = getattr(getattr(node, "func", None), "attr", "")
+    masks = ast.BitAnd | ast.BitOr | ast.Invert | ast.Not
+    named = called in ("any", "all", "isin") or called.startswith(("is", "logical"))
+    return named or isinstance(node, ast.Compare | ast.BoolOp) or isinstance(getattr(node, "op", None), masks)
 
 
 def like(old: ast.AST, new: ast.AST) -> ast.AST:
@@ -396,6 +413,8 @@ def conditions(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
 
             yield Recipe("condition", f"without {i}", 1, make, (value,))
     masks = ast.BitAnd | ast.BitOr | ast.Invert
+    if isinstance(node, ast.Name):
+        yield Recipe("condition", "None", 2.5, template("_ is not None"))
     if isinstance(node, ast.Compare) or isinstance(getattr(node, "op", None), masks):
         for term in scope.names:
             for text in ROUND_A_CONDITION.format(*[term] * 4).split(" | "):
@@ -468,6 +487,9 @@ def with_option(option: str, value: str) -> Callable:
 
 def constants(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """Another number, truth value, or type."""
+    if isinstance(node, ast.Attribute) and node.attr in ("nan", "inf", "pi", "e"):
+        for text in ("0.0", "1.0", "np.nan", "np.inf", "2 * np.pi", "np.pi / 2"):
+            yield Recipe("constant", text, 1, template(text))
     if not isinstance(node, ast.Constant):
         return
     value = node.value
@@ -488,14 +510,14 @@ def constants(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
             value**2,
             1 / value if value else 0,
         ]
-        others += [float("nan")] if value in (0, 1) else [0.5, value * 1000, value / 1000]
+        others += [float("nan")] if value in (0, 1) else [0.5, value * 1000, value / 1000, float("inf")]
     elif isinstance(value, str):
         others = [o for pair in STRINGS if value in pair for o in pair]
     else:
         others = []
     for other in dict.fromkeys(map(repr, others)):
         if other != repr(value):
-            number = float("nan") if other == "nan" else ast.literal_eval(other)
+            number = float(other) if other in ("nan", "inf") else ast.literal_eval(other)
             make = lambda n, number=number: ast.copy_location(ast.Constant(number), n)  # noqa: E731
             yield Recipe("constant", other, 1, make)
 
