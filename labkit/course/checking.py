@@ -89,12 +89,18 @@ def check(name: str, answer: object) -> Callable:
     if verdict.problem is not None and verdict.problem.kind == "unanswered":
         notes += ("The kit's function takes its place below.",)
     page = Page()
-    if verdict.needs_a_look and verdict.pieces:
-        if jupyter() is not None:
-            page.show(describe(question, verdict, printed, notes, LOOKING))
-        verdict = replace(verdict, findings=findings(question, verdict.pieces, PUBLIC_SEED))
+    if verdict.needs_a_look and verdict.pieces and jupyter() is not None:
+        page.show(describe(question, verdict, printed, notes, LOOKING))
+    verdict = looked_at(question, verdict)
     shown = describe(question, verdict, printed, notes)
     return conclude(shown, answer if verdict.passed else question.reference, verdict.passed, page)
+
+
+def looked_at(question: Question, verdict: Verdict) -> Verdict:
+    """The verdict with what instruments and repair find in the program of a wrong answer, if that may help."""
+    if not verdict.needs_a_look or not verdict.pieces:
+        return verdict
+    return replace(verdict, findings=findings(question, verdict.pieces, PUBLIC_SEED))
 
 
 def judged(question: Question, answer: Callable, printed: Printed) -> Verdict:

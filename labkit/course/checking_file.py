@@ -9,7 +9,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from labkit.course.checker.comparison import Problem
@@ -17,7 +17,7 @@ from labkit.course.checker.judge import Verdict
 from labkit.course.checker.program import Cell, Parsed, cells_of, program
 from labkit.course.checker.question import PACKAGES, Question
 from labkit.course.checker.run import Printed
-from labkit.course.checking import describe, jupyter
+from labkit.course.checking import describe, jupyter, looked_at
 from labkit.course.grading.isolated import Run, cases_of
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import TOPICS, of_topic
@@ -83,7 +83,8 @@ class CheckedLab:
             cut = program(self.cells, name, self.questions, PACKAGES, question.forbidden, given)
         if cut.refused:
             return Verdict(Problem("refused", cut.refused), None, "")
-        return Run(question, cut, Limits(), unsafe=True).judged(cases_of(question, None))[0]
+        verdict = Run(question, cut, Limits(), unsafe=True).judged(cases_of(question, None))[0]
+        return looked_at(question, replace(verdict, pieces=cut.pieces))
 
 
 def not_saved(names: Sequence[str], cells: Sequence[Cell]) -> list[str]:
