@@ -343,12 +343,14 @@ Checkout = Annotated[Path, typer.Option(help="The checkout to write into.")]
 
 @new.command("question")
 def new_question(
-    name: Annotated[str, typer.Argument(help="Topic and function, such as 04_iou.dice.")], course: Checkout = Path(".")
+    name: Annotated[str, typer.Argument(help="Topic and function, such as 04_iou.dice.")],
+    points: Annotated[int, typer.Option(help="What it is worth.", min=1)] = 2,
+    course: Checkout = Path("."),
 ) -> None:
     """Write a question that works, right answers and wrong ones, and its cells in the topic's solution."""
     from labkit.course import scaffold
 
-    tell_written(scaffold.new_question(course, name))
+    tell_written(scaffold.new_question(course, name, points))
 
 
 @new.command("lab")

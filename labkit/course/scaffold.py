@@ -42,6 +42,7 @@ QUESTION = Question(
     name="TOPIC.NAME",
     reference=NAME,
     inputs=inputs,
+    points=POINTS,
     by_hand=(  # TODO cases that can be done by hand, each with something that goes wrong in it
         (np.array([[1, 2, 3], [4, 5, 7]]),),
         (np.array([[5, 0, 0, -2]]),),
@@ -93,7 +94,7 @@ ANSWER = '''def NAME(values):
     [6, 16]
     """
     ### BEGIN SOLUTION
-    # TODO the right answer; where no lesson shows its step, a comment "# New step: ..." says what is new
+    # TODO the right answer; half of a lab's points are for steps of no lesson: "# New step: ..." says what is new
     return values.sum(axis=1)
     ### END SOLUTION'''
 
@@ -131,16 +132,16 @@ PICTURE = """frame = data_gen.render(data_gen.sample_scene(1, "test"), (320, 240
 panels({"the camera's image": frame.rgb, "its true labels": overlay(frame.rgb, frame.labels)})
 plt.show()"""
 
-WRITTEN = """## Written question (15 minutes, 3 points)
+WRITTEN = """## Written question (15 minutes)
 
 TODO a derivation or an interpretation, in numbered parts."""
 
 MODEL_ANSWER = """TODO the model answer, part by part, in 500 characters or more.
 
-**Rubric (3 points).**
+**Rubric (2 points).**
 
 - 1 point: TODO
-- 2 points: TODO"""
+- 1 point: TODO"""
 
 END = """## Before you hand in
 
@@ -150,25 +151,27 @@ a fresh process, with what it needs of your other cells and nothing else. What i
 ROW = "| DIGITS WORDS | | [lab](labs/TOPIC/TOPIC.ipynb) | TODO where in the kit, and a lesson if there is one |\n"
 
 
-def filled(template: str, topic: str, name: str = "", number: int = 0) -> str:
-    """Put names into a template."""
+def filled(template: str, topic: str, name: str = "", number: int = 0, points: int = 0) -> str:
+    """Put names and numbers into a template."""
     digits, _, words = topic.partition("_")
-    values = {"TOPIC": topic, "NAME": name, "NUMBER": str(number), "DIGITS": digits, "WORDS": words.replace("_", " ")}
-    return re.sub(r"\b(TOPIC|NUMBER|DIGITS|WORDS)\b|NAME", lambda found: values[found[0]], template)
+    values = {"TOPIC": topic, "NAME": name, "DIGITS": digits, "WORDS": words.replace("_", " ")}
+    values |= {"NUMBER": str(number), "POINTS": str(points)}
+    return re.sub("|".join(values), lambda found: values[found[0]], template)
 
 
 # --------------------------------------------------------------------------------------------- the commands
 
 
-def new_question(course: Path, name: str) -> list[Path]:
+def new_question(course: Path, name: str, points: int = 2) -> list[Path]:
     """Begin a question such as "04_iou.dice"; returns the files written: its module, right answers, the solution.
 
-    course: a checkout. Raises ValueError, and writes nothing, if the topic is not there, or the name is no identifier
-    or taken: by a question, by the topic's module, or by a cell of the solution.
+    course: a checkout. points: what it is worth. Raises ValueError, and writes nothing, if the topic is not there, or
+    the name is no identifier or taken: by a question, by the topic's module, or by a cell of the solution.
     """
     course = checkout(course)
     topic, _, function = name.partition(".")
     folder, solution = topic_folder(course, topic), solution_of(course, topic)
+    require("points", points >= 1, "at least 1", points)
     known = folder.is_dir() and solution.is_file()
     require(
         "name", known, f"a topic and a function; `labkit new lab {topic}` begins a topic that is not there", repr(name)
@@ -183,9 +186,9 @@ def new_question(course: Path, name: str) -> list[Path]:
         require("name", not taken, f"a name that {path.relative_to(course)} does not have already", repr(name))
     answers = course / "tests" / "alternatives" / f"t{topic}.py"
     right = answers.read_text() if answers.exists() else filled(NO_ALTERNATIVES, topic)
-    add_task(notebook, topic, function)
+    add_task(notebook, topic, function, points)
     files = {
-        folder / f"{function}.py": filled(QUESTION, topic, function).encode(),
+        folder / f"{function}.py": filled(QUESTION, topic, function, points=points).encode(),
         answers: (right + filled(ALTERNATIVES, topic, function)).encode(),
         solution: to_bytes(tidy(notebook)),
     }
@@ -267,7 +270,7 @@ def marked(cell: NotebookNode, grade_id: str, **mark) -> NotebookNode:
 
 def lab_notebook(topic: str) -> NotebookNode:
     """A solution with data, a written question and no blank."""
-    written = marked(new_markdown_cell(MODEL_ANSWER), f"{topic[3:]}_in_words", grade=True, solution=True, points=3)
+    written = marked(new_markdown_cell(MODEL_ANSWER), f"{topic[3:]}_in_words", grade=True, solution=True, points=2)
     end = f'from labkit import check_file\n\ncheck_file("{topic}.ipynb")'
     cells = [
         new_markdown_cell(filled(START, topic)),
@@ -283,7 +286,7 @@ def lab_notebook(topic: str) -> NotebookNode:
     return new_notebook(cells=cells)
 
 
-def add_task(notebook: NotebookNode, topic: str, function: str) -> None:
+def add_task(notebook: NotebookNode, topic: str, function: str, points: int) -> None:
     """Add a task of ten minutes before the written question, if that has a cell of its own, else before the end.
 
     The beginning of the lab tells of it: its minutes, and a row if there is a table of tasks.
@@ -297,7 +300,7 @@ def add_task(notebook: NotebookNode, topic: str, function: str) -> None:
     notebook.cells[place:place] = [
         new_markdown_cell(filled(TASK, topic, function, number)),
         marked(new_code_cell(filled(ANSWER, topic, function)), function, solution=True),
-        marked(new_code_cell(call), f"check_{function}", grade=True, locked=True, points=2),
+        marked(new_code_cell(call), f"check_{function}", grade=True, locked=True, points=points),
         new_markdown_cell(HINTS),
     ]
     row = f"| {number} | `{function}`: TODO in a few words | 10 |\n"

@@ -1,5 +1,6 @@
 """`labkit new`: what it writes works at once and says what is left to do; a name that does not fit writes nothing."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -87,7 +88,7 @@ def test_a_question_as_it_is_written_fulfils_the_rules_for_questions(tenth):
 
 
 def test_what_is_written_is_free_of_lint(course, tenth):
-    scaffold.new_question(course, "04_iou.dice")
+    scaffold.new_question(course, "04_iou.not_yet")
     for command in (["check", "--ignore", "I"], ["format", "--check"]):
         ruff = [sys.executable, "-m", "ruff", *command, "--no-cache", "--config", str(ROOT / "pyproject.toml")]
         done = subprocess.run([*ruff, "."], cwd=course, capture_output=True, text=True)
@@ -96,18 +97,28 @@ def test_what_is_written_is_free_of_lint(course, tenth):
 
 def test_a_question_for_a_lab_that_there_is_comes_last_and_counts(course):
     before = nbformat.read(ROOT / "solutions/04_iou/04_iou.ipynb", as_version=4)
-    scaffold.new_question(course, "04_iou.dice")
+    scaffold.new_question(course, "04_iou.not_yet")
     after = nbformat.read(course / "solutions/04_iou/04_iou.ipynb", as_version=4)
     sources = [cell.source for cell in before.cells]
     new = [cell for cell in after.cells[1:] if cell.source not in sources]
-    assert [cell.metadata.get("nbgrader", {}).get("grade_id") for cell in new] == [None, "dice", "check_dice", None]
-    assert new[0].source.startswith("## Task 7: ")
+    assert [cell.metadata.get("nbgrader", {}).get("grade_id") for cell in new] == [
+        None,
+        "not_yet",
+        "check_not_yet",
+        None,
+    ]
+    number = max(int(n) for text in sources for n in re.findall(r"^## Task (\d+)", text, re.MULTILINE)) + 1
+    assert new[0].source.startswith(f"## Task {number}: ")
     assert [cell.source for cell in after.cells[1:] if cell not in new] == sources[1:]
-    assert "\n| 6 | a written question | 15 |\n| 7 | `dice`: " in after.cells[0].source
-    assert "\n105 minutes in all." in after.cells[0].source and "\n95 minutes in all." in sources[0]
+    rows = [line for line in after.cells[0].source.splitlines() if line not in sources[0]]
+    minutes = [int(re.search(r"(\d+) minutes in all", cells[0].source)[1]) for cells in (before.cells, after.cells)]
+    assert minutes[1] == minutes[0] + 10 and rows[0].startswith(f"| {number} | `not_yet`: ")
     assert len(scaffold.left_to_do(course)) == OF_QUESTION
     places = [todo.partition(": TODO")[0] for todo in scaffold.left_to_do(course)]
-    assert "labkit/course/topics/t04_iou/dice.py:9" in places and "solutions/04_iou/04_iou.ipynb, cell dice" in places
+    assert (
+        "labkit/course/topics/t04_iou/not_yet.py:9" in places
+        and "solutions/04_iou/04_iou.ipynb, cell not_yet" in places
+    )
 
 
 @pytest.mark.parametrize(
@@ -145,7 +156,7 @@ def test_a_failure_halfway_leaves_everything_as_it_was(course, monkeypatch):
         plain(path, data)
 
     monkeypatch.setattr(scaffold, "write_atomically", disk_full)
-    for begin, name in ((scaffold.new_question, "04_iou.dice"), (scaffold.new_lab, "10_pieces")):
+    for begin, name in ((scaffold.new_question, "04_iou.not_yet"), (scaffold.new_lab, "10_pieces")):
         with pytest.raises(OSError, match="No space"):
             begin(course, name)
         assert snapshot(course) == before and not (course / "labkit/course/topics/t10_pieces").exists()
