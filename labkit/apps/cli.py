@@ -294,22 +294,30 @@ def node(
         raise ValueError("out: expected --out with --bag, and only with it")
     if extra and not (on_ros and extra[0] == "--ros-args"):
         raise ValueError(f"node: expected options of `labkit node --help`, and ROS's behind --ros-args, got {extra[0]}")
-    given = (model, engine, crf, target, table_z, camera_pose, base_frame, mirror, slop, depth_scale)
-    settings = command.Settings(*given, qos_inputs, qos_outputs, qos_depth, tuple(topic or ()))
-    if sim:
-        from data_gen import render, sample_scene
-
-        spec = sample_scene(seed, "test")
-    if on_ros:
-        command.run_on_ros(settings, 1 if ros1 else 2, extra or [], render(spec, (320, 240)) if sim else None)
-    elif sim:
-        from labkit.node.rehearsal import camera_to_lift
-
-        typer.echo(camera_to_lift(spec, settings.pipeline(spec.table.z)))
-    else:
+    settings = command.Settings(
+        model=model,
+        engine=engine,
+        crf=crf,
+        target=target,
+        table_z=table_z,
+        camera_pose=camera_pose,
+        base_frame=base_frame,
+        mirror=mirror,
+        slop=slop,
+        depth_scale=depth_scale,
+        qos_inputs=qos_inputs,
+        qos_outputs=qos_outputs,
+        qos_depth=qos_depth,
+        renamed=tuple(topic or ()),
+    )
+    if bag is not None:
         line, answered = command.answer_bag(settings, bag, out, probabilities, storage)
         typer.echo(line)
         raise typer.Exit(0 if answered else 1)
+    if on_ros:
+        command.run_on_ros(settings, 1 if ros1 else 2, extra or [], seed if sim else None)
+    else:
+        typer.echo(command.rehearse(settings, seed))
 
 
 @app.command()

@@ -5,7 +5,6 @@ import threading
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import repeat
 
-from labkit.frame import RGBDFrame
 from labkit.node import ros
 from labkit.node.actors import Camera
 from labkit.node.bags import process
@@ -92,9 +91,23 @@ def numbers_of(text: str) -> list[float]:
         return []
 
 
-def run_on_ros(settings: Settings, version: int = 2, arguments=(), frame: RGBDFrame | None = None) -> Counts | None:
-    """Run on ROS until SIGINT. version: 2 or 1. arguments: ROS's own. frame: what a simulated camera shall publish."""
+def rehearse(settings: Settings, seed: int) -> str:
+    """Let a simulated camera, the node and an arm work on a scene in this process; a line on what came of it."""
+    from data_gen import sample_scene
+    from labkit.node.rehearsal import camera_to_lift
+
+    spec = sample_scene(seed, "test")
+    return camera_to_lift(spec, settings.pipeline(spec.table.z))
+
+
+def run_on_ros(settings: Settings, version: int = 2, arguments=(), seed: int | None = None) -> Counts | None:
+    """Run on ROS until SIGINT. version: 2 or 1. arguments: ROS's own. seed: of a scene for a simulated camera."""
     settings.node(), ros.require(version)  # what is wrong or missing is said before anything else happens
+    frame = None
+    if seed is not None:
+        from data_gen import render, sample_scene
+
+        frame = render(sample_scene(seed, "test"), (320, 240))
 
     def build(transport, stop: threading.Event) -> SegmentationNode:
         chosen = settings

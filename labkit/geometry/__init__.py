@@ -1,9 +1,8 @@
 """From pixels with depth to points in the robot's base frame, and what a cloud of points says (topic 06).
 
 `projection` goes from pixels to points and back, and moves points between frames; `clouds` finds centroid, axes, plane,
-outliers and separate objects; `channels` is what a network sees of a depth image, `sensor` what a real camera makes of
-it, and `augment` what training makes of both. Metres throughout. Every function checks what it is given: a ValueError
-names the argument, what was expected and what came.
+outliers and separate objects; `sensor` is what a real camera makes of a depth image. Metres throughout. Every function
+checks what it is given: a ValueError names the argument, what was expected and what came.
 """
 
 from labkit.geometry.clouds import (

@@ -16,6 +16,8 @@ CAPSULE = ctypes.pythonapi.PyCapsule_New
 CAPSULE.restype, CAPSULE.argtypes = ctypes.py_object, (POINTER, ctypes.c_char_p, POINTER)
 DONOR = "libgeometry_msgs__rosidl_typesupport_fastrtps_c.so"
 DONOR_HANDLE = "rosidl_typesupport_fastrtps_c__get_message_type_support_handle__geometry_msgs__msg__TransformStamped"
+# Where rclpy looks in a message class's own class; all but the first serve to build messages, which bytes never are.
+LOOKED_UP = ("_TYPE_SUPPORT", "_CREATE_ROS_MESSAGE", "_CONVERT_FROM_PY", "_CONVERT_TO_PY", "_DESTROY_ROS_MESSAGE")
 
 
 class _Handle(ctypes.Structure):
@@ -56,18 +58,28 @@ def message_class(name: str, checksum: str) -> type:
 
 def made_class(name: str, checksum: str) -> type:
     """Make the class of a type for `raw` subscriptions and for publishing bytes; arguments as in `message_class`."""
+    support, alive = type_support(name, checksum)
+    metaclass = type("Made", (type,), dict.fromkeys(LOOKED_UP, support))
+    return metaclass(name.rpartition("/")[2], (), {"alive": alive})
+
+
+def type_support(name: str, checksum: str) -> tuple[object, tuple]:
+    """A type's support as rclpy takes it, in a capsule: the donor's, with another name and another hash.
+
+    The second result is what the first points to: it must live as long.
+    """
     package, _, kind = name.split("/")
     donor = getattr(ctypes.CDLL(DONOR), DONOR_HANDLE)
     donor.restype = ctypes.POINTER(_Handle)
     handle = _Handle.from_buffer_copy(donor().contents)
+
     callbacks = _Callbacks.from_buffer_copy(ctypes.cast(handle.data, ctypes.POINTER(_Callbacks)).contents)
     callbacks.namespace, callbacks.name = f"{package}::msg".encode(), kind.encode()
+    handle.data = ctypes.addressof(callbacks)
+
     digits = bytes.fromhex(checksum.removeprefix("RIHS01_"))
-    hashed = _Hash(1, (ctypes.c_uint8 * 32)(*digits))
-    give_hash = ctypes.CFUNCTYPE(POINTER, POINTER)(lambda _: ctypes.addressof(hashed))
-    handle.data, handle.hash = ctypes.addressof(callbacks), ctypes.cast(give_hash, POINTER)
-    support = CAPSULE(ctypes.addressof(handle), None, None)
-    # rclpy uses the other four when a message is to be built, which never happens to bytes.
-    names = ("_TYPE_SUPPORT", "_CREATE_ROS_MESSAGE", "_CONVERT_FROM_PY", "_CONVERT_TO_PY", "_DESTROY_ROS_MESSAGE")
-    metaclass = type("Made", (type,), dict.fromkeys(names, support))  # where rclpy looks
-    return metaclass(kind, (), {"kept": (handle, callbacks, hashed, give_hash)})
+    type_hash = _Hash(version=1, value=(ctypes.c_uint8 * 32)(*digits))
+    give_hash = ctypes.CFUNCTYPE(POINTER, POINTER)(lambda _: ctypes.addressof(type_hash))
+    handle.hash = ctypes.cast(give_hash, POINTER)
+
+    return CAPSULE(ctypes.addressof(handle), None, None), (handle, callbacks, type_hash, give_hash)

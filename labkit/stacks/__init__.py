@@ -1,5 +1,5 @@
-"""The same mask by other means (topic 09): other engines for the network, and other stacks' ways to a mask, in Python.
+"""The same mask by other means (topic 09): other stacks' ways to it, and their listings, in Python.
 
-engines: a network as an ONNX file, in OpenCV or onnxruntime. threshold: HSV ranges. regions: k-means, components, the
-choice of one. matlab: labels with scores, a montage. small_fcn: three layers.
+threshold: HSV ranges. regions: k-means, components, the choice of one. matlab: labels with scores, a montage. blocks: a
+block diagram that runs. small_fcn: three layers. The same network in other engines: `labkit.learning.engines`.
 """

@@ -1,1 +1,1 @@
-"""What the other rooms lean on and no user imports: checks of arguments, files, augmentation, compiled loops."""
+"""What the other rooms lean on and no user imports: checks of arguments, files, processes, compiled loops."""
