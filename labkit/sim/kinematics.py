@@ -9,8 +9,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from labkit.support.validation import check_finite, check_shape, check_T
-
 PANDA_URDF = "franka_panda/panda.urdf"  # within pybullet_data
 
 # Seven arm joints (rad), then two finger joints (m): folded back over the base, the hand pointing down, fingers open.
@@ -113,19 +111,12 @@ def inverse_kinematics(
     """Joint angles within the limits that put the grasp frame at T_base_grasp to 0.1 mm and 0.001 rad, or None.
 
     Damped least squares from several starts: first q0 (the way to stay near it) and the closed form for a grasp from
-    above, then random ones, always the same. Raises ValueError if T_base_grasp is no rigid transform, or q0 not seven
-    finite angles.
+    above, then random ones, always the same. `plan_grasp` checks what comes here.
 
     >>> T = forward_kinematics(np.array([0.1, 0.2, 0.3, -2.0, 0.1, 2.0, 0.5]))
     >>> np.allclose(forward_kinematics(inverse_kinematics(T)), T, atol=1e-3)
     True
     """
-    T = check_T("T_base_grasp", T_base_grasp)
-    return solve(T, None if q0 is None else check_finite("q0", check_shape("q0", q0, (7,))))
-
-
-def solve(T_base_grasp, q0=None) -> Float[np.ndarray, "7"] | None:
-    """As `inverse_kinematics`, for arguments that are already checked."""
     if _wrist_out_of_reach(T_base_grasp):
         return None
     first = [q for q in (q0, top_down_joints(T_base_grasp)) if q is not None]

@@ -13,16 +13,8 @@ from jaxtyping import Float
 
 from labkit.labels import CLASSES, TARGET
 from labkit.sim.client import pybullet
-from labkit.sim.kinematics import (
-    FINGER_MAX_EFFORT,
-    MAX_EFFORT,
-)
-from labkit.sim.planning import (
-    MotionPlan,
-    plan_grasp,
-    straight_up,
-    trajectory,
-)
+from labkit.sim.kinematics import FINGER_MAX_EFFORT, MAX_EFFORT
+from labkit.sim.planning import MotionPlan, plan_grasp, straight_up, trajectory
 from labkit.sim.world import TIME_STEP, World
 from labkit.support.validation import check_finite, check_shape, require
 
@@ -66,6 +58,7 @@ class Panda:
     come down with. `scene`, where a method takes one, is the points (M, 3) that the camera saw. Raises ValueError if
     the world has no robot.
 
+    >>> from labkit.sim.kinematics import forward_kinematics
     >>> from labkit.sim.spec import Camera, SceneSpec
     >>> with World(SceneSpec(objects=(), camera=Camera.looking_at((0.5, 0, 0), 0.9, 0.3, 0.8))) as world:
     ...     T = forward_kinematics(Panda(world).q)

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from labkit.sim.collision import Margin, first_contact, thin, without_robot
-from labkit.sim.kinematics import FINGER_MAX, MAX_VELOCITY, forward_kinematics, solve
+from labkit.sim.kinematics import FINGER_MAX, MAX_VELOCITY, forward_kinematics, inverse_kinematics
 from labkit.support.validation import check_finite, check_shape, check_T
 
 LIFT = 0.18  # m
@@ -125,7 +125,7 @@ def straight_line(
     shift = np.outer(1.0 - share, T_from[:3, 3]) + np.outer(share, T_to[:3, 3])
     path = []
     for T in RigidTransform.from_components(shift, turn(share)).as_matrix():
-        q = solve(T, path[-1] if path else q0)
+        q = inverse_kinematics(T, path[-1] if path else q0)
         if q is None or (path and np.abs(q - path[-1]).max() > 10 * JOINT_STEP):
             return None
         path.append(q)

@@ -407,9 +407,7 @@ AIM = top_down(0.5, 0.0, 0.02)
 @pytest.mark.parametrize(
     ("argument", "call"),
     [
-        ("T_base_grasp", lambda panda: kinematics.inverse_kinematics(np.eye(3))),
-        ("T_base_grasp", lambda panda: kinematics.inverse_kinematics(STRETCHED)),
-        ("q0", lambda panda: kinematics.inverse_kinematics(AIM, np.full(7, np.nan))),
+        ("T_base_grasp", lambda panda: planning.plan_grasp(STRETCHED, 0.05, Q_HOME, NOTHING, 0.0)),
         ("q", lambda panda: planning.plan_grasp(AIM, 0.05, np.zeros(6), NOTHING, 0.0)),
         ("points", lambda panda: planning.plan_grasp(AIM, 0.05, Q_HOME, np.full((2, 3), np.nan), 0.0)),
         ("scene", lambda panda: panda.plan(grasp(AIM), np.zeros((4, 2)))),
