@@ -395,6 +395,9 @@ def grade(
         tuple[str, str] | None, typer.Option(help="A group of wrong answers, see class.html, and what all in it read.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
+    tidy: Annotated[
+        bool, typer.Option("--tidy", help="Remove pages and grades of students whose submission is gone.")
+    ] = False,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Without bubblewrap: submissions may do anything here.")
     ] = False,
@@ -409,11 +412,16 @@ def grade(
     from labkit.course.grading.sandbox import NO_SANDBOX
 
     workers = workers or os.cpu_count() or 1
-    how = {"workers": workers, "force": force, "unsafe": unsafe}
+    how = {"workers": workers, "force": force, "unsafe": unsafe, "tidy": tidy}
     graded = grade_course(topic, course, submissions, out, seed, new_round, comment, **how)
     typer.echo(terminal_table(graded.lab, graded.records))
     for student, failure in graded.failures.items():
         typer.echo(f"{student}: {failure}", err=True)
+    for old, name in graded.renamed.items():
+        typer.echo(f"{old} is {name} now: grades and pages were moved")
+    if graded.gone:
+        done = "removed what there was" if tidy else "--tidy removes the pages and grades"
+        typer.echo(f"{done} of students without a submission: {', '.join(graded.gone)}")
     folder = out or course / "grades" / topic
     typer.echo(f"{len(graded.records)} students, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
     if unsafe:

@@ -8,6 +8,7 @@ A student is named by name and number, since two may share a name: "Ada Lovelace
 """
 
 import re
+import unicodedata
 
 from nbgrader.plugins import FileNameCollectorPlugin
 
@@ -27,7 +28,7 @@ def student_and_notebook(path: str) -> tuple[str, str] | None:
     if found is None:
         return None
     notebook = re.sub(r"(?: ?\(\d+\)|-\d+)(?=\.ipynb$)", "", found["file"])  # of a file handed in, or saved, again
-    return f"{found['name']}_{found['number']}", notebook
+    return f"{unicodedata.normalize('NFC', found['name'])}_{found['number']}", notebook
 
 
 class LmsCollector(FileNameCollectorPlugin):

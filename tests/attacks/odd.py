@@ -141,14 +141,15 @@ ODD = (
         Odd(name, plain, "rename the student's folder")
         for name in (
             "line\nbreak",
-            "long" * 50,
+            "long" * 60,
             "no_utf8_\udcff",
             "no_utf8_\\xff",  # what the one before would be written as
             "odd-name-0123456789ab",  # what a page of an odd name might be called
             "\x1b]0;a terminal's title\x07",
             "right\u202eot left",
             "<script>alert(1)<script>",
-            "x' onmouseover='alert(1)",
+            'x" onmouseover="alert(1)',
+            ".begins with a dot",
             "ada;=1+1",
         )
     ),
@@ -174,7 +175,10 @@ ODD = (
         "no_cells", as_notebook(lambda cells: [1, None, {}, []]), "it is not this lab: no cell has a grade id of 04_iou"
     ),
     Odd("=HYPERLINK(1)", plain, right=True),
-    Odd("Zoë Ångström", plain, right=True),
+    *(
+        Odd(name, plain, right=True)
+        for name in ("Zoë Ångström", "Ben & Ada O'Brien", "x' onmouseover='alert(1)", "ä" * 100, "李 小龙", "a" * 200)
+    ),
     *(
         Odd(f"time_{i}", with_time(text), right=True)
         for i, text in enumerate(

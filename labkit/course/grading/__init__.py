@@ -11,5 +11,6 @@ batch      a folder of submissions: what changed is graded
 outputs    grades.csv, results.json, and `feedback`, a page per student
 markdown   a stranger's Markdown, made harmless
 gradebook  nbgrader's database and the copies that formgrader shows
+students   those who were renamed, and those who are gone
 refusal    why nbgrader's own Autograde does nothing
 """

@@ -31,13 +31,14 @@ SECRET_FILE = "secret_seed"
 class Record:
     """What is kept of a graded submission. reason: why it could not be graded, "" if it was.
 
-    key: of all that the results depend on.
+    digest: of the notebook; key: of all that the results depend on.
     """
 
     student: str
     reason: str
     results: tuple[Result, ...]
     sandboxed: bool
+    digest: str
     key: str
 
     @property
@@ -84,9 +85,10 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
     with bar, closing(sandbox.servers), ThreadPoolExecutor(batch.workers) as executor:
         jobs = ((batch, submission) for submission in waiting)
         for submission, results in as_they_come(graded, jobs, executor, 2 * batch.workers):
-            student = submission.student
-            records[student] = Record(student, submission.reason, results, not batch.unsafe, keys[student])
-            write_record(batch.out, records[student])
+            student, sandboxed = submission.student, not batch.unsafe
+            done = Record(student, submission.reason, results, sandboxed, submission.digest, keys[student])
+            records[student] = done
+            write_record(batch.out, done)
             bar.update()
     return [records[submission.student] for submission in batch.submissions], len(waiting)
 

@@ -20,10 +20,11 @@ LARGEST_NOTEBOOK = 20 << 20  # bytes
 MOST_VALUES = 1_000_000  # of JSON: a second of parsing and 100 MB of memory
 MOST_CELLS = 5_000
 MOST_SOURCE = 1_000_000  # characters of code
-LONGEST_NAME = 100
+LONGEST_NAME = 220  # bytes: the names of a student's pages are longer, and no file's has more than 255
+LONGEST_SHOWN = 60  # characters of a name that will not do
 ODD_NAME = "odd-name-"
-# What HTML, shells, other file systems or spreadsheets would read as more than a letter of a name.
-UNSAFE_IN_NAMES = frozenset("<>&\"'`/\\:*?|;%")
+# What pages, scripts, shells, addresses, other file systems or spreadsheets would read as more than a letter of a name.
+UNSAFE_IN_NAMES = frozenset('<>"`/\\:*?|;%')
 
 
 @dataclass(frozen=True)
@@ -110,14 +111,15 @@ def released_by(notebook: dict) -> tuple[str, dict[str, str]]:
 def read_submissions(folder: Path, lab: Lab) -> list[Submission]:
     """Read what is in a folder of students' folders, by their names; each file once.
 
-    What begins with a dot is passed over, and so is a student who handed in nothing of this topic. What a student put
-    there never raises; ValueError says that there is no such folder.
+    A student who handed in nothing of this topic is passed over, and so is what begins with a dot and holds nothing of
+    it. What a student put there never raises; ValueError says that there is no such folder.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"submissions: expected a folder of students' folders, got {folder}")
     names = sorted((entry.name for entry in os.scandir(folder)), key=os.fsencode)
-    read = [read_submission(folder / name, lab) for name in names if not name.startswith(".")]
+    names = [name for name in names if not name.startswith(".") or os.path.isdir(folder / name / lab.topic)]
+    read = [read_submission(folder / name, lab) for name in names]
     return [submission for submission in read if submission is not None]
 
 
@@ -157,12 +159,9 @@ def find_notebook(place: Path, topic: str) -> Path | None:
     """The notebook in a student's folder, None if there is no folder of this topic; follows no link."""
     if not is_folder(place, "the student's folder"):
         raise Unreadable(f"not in a student's folder; expected STUDENT/{topic}/{topic}.ipynb")
-    if is_odd(place.name):
-        unsafe = "".join(sorted(UNSAFE_IN_NAMES))
-        raise Unreadable(
-            f"rename the student's folder, {ascii(place.name)[:LONGEST_NAME]}: expected at most {LONGEST_NAME} bytes, "
-            f"printable characters, none of {unsafe}, and no {ODD_NAME} at the beginning"
-        )
+    if fault := fault_of(place.name):
+        shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in place.name[:LONGEST_SHOWN])
+        raise Unreadable(f"rename the student's folder {shown}: {fault}")
     if not is_folder(place / topic, f"the folder {topic}"):
         return None
     notebook = place / topic / f"{topic}.ipynb"
@@ -174,20 +173,26 @@ def find_notebook(place: Path, topic: str) -> Path | None:
     return notebook
 
 
-def is_odd(name: str) -> bool:
-    """Whether a folder's name would not do as a student's, in a page, a table, a terminal or as a file.
+def fault_of(name: str) -> str:
+    """What of a folder's name would not do in a page, a table, a terminal or as a file; "" if it may name a student.
 
-    >>> is_odd("Zoë Ångström"), is_odd("<b>"), is_odd("two\\nlines")
-    (False, True, True)
+    >>> fault_of("Zoë O'Brien & Co."), fault_of("two\\nlines")
+    ('', "it holds '\\\\n'")
     """
-    raw = os.fsencode(name)
-    unsafe = bool(UNSAFE_IN_NAMES & set(name)) or not name.isprintable() or name.startswith(ODD_NAME)
-    return unsafe or len(raw) > LONGEST_NAME or name != name.strip()
+    for character in name:
+        if character in UNSAFE_IN_NAMES or not character.isprintable():
+            return f"it holds {character!a}"
+    if name != name.strip():
+        return "it begins or ends with a space"
+    if name.startswith((".", ODD_NAME)):
+        return f"it begins with {'a dot' if name[0] == '.' else ODD_NAME}"
+    size = len(os.fsencode(name))
+    return f"it is {size} bytes long, at most {LONGEST_NAME} are possible" if size > LONGEST_NAME else ""
 
 
 def name_of(name: str) -> str:
     """A student's name: the folder's, or one that is made of an odd one's bytes, so that no two are the same."""
-    return ODD_NAME + hashlib.sha256(os.fsencode(name)).hexdigest()[:12] if is_odd(name) else name
+    return ODD_NAME + hashlib.sha256(os.fsencode(name)).hexdigest()[:12] if fault_of(name) else name
 
 
 def is_folder(path: Path, what: str) -> bool:

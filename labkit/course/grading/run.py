@@ -12,19 +12,23 @@ from labkit.course.grading.outputs import write_outputs
 from labkit.course.grading.overview import add_comment, read_comments, standings
 from labkit.course.grading.reading import Lab, read_lab, read_submissions
 from labkit.course.grading.sandbox import Limits
+from labkit.course.grading.students import known_students, remove_students, rename_students
 
 
 @dataclass(frozen=True)
 class Graded:
     """The records of all students, by name, and how many were graded in this run.
 
-    failures: what could not be written into the gradebook, by student.
+    failures: what could not be written into the gradebook, by student. renamed: new names by the old ones; gone: of
+    whom there are pages and grades but no submission any more, in this run removed if it was to `tidy`.
     """
 
     lab: Lab
     records: list[Record]
     graded_now: int
     failures: dict[str, str]
+    renamed: dict[str, str]
+    gone: list[str]
 
     @property
     def needs_a_look(self) -> bool:
@@ -41,6 +45,7 @@ def grade_course(
     new_round: bool = False,
     comment: tuple[str, str] | None = None,
     limits: Limits | None = None,
+    tidy: bool = False,
     progress: bool = True,
     **how,
 ) -> Graded:
@@ -48,7 +53,8 @@ def grade_course(
 
     course: folder with labs/ and gradebook.db. submissions: course/submitted by default; out: course/grades/TOPIC.
     seed: the secret one; new_round: take another one, and grade everybody anew. comment: (group, text), for the pages
-    of all whose answers belong to that group of wrong ones. how: workers, force, unsafe, as `Batch` has them.
+    of all whose answers belong to that group of wrong ones. tidy: remove what there is of students without a
+    submission. how: workers, force, unsafe, as `Batch` has them.
     Raises ValueError for a topic, lab, folder or group that there is not, for another seed than the round's, and where
     no sandbox can be made.
     """
@@ -58,6 +64,7 @@ def grade_course(
     out = course / "grades" / topic if out is None else Path(out)
     with private():
         secret = secret_for(out, seed, new_round)
+        renamed = rename_students(course, out, topic, read)
         batch = Batch(lab, read, out, secret, limits=limits or Limits(), **how)
         records, graded_now = grade_batch(batch, progress)
         comments = read_comments(out)
@@ -66,8 +73,11 @@ def grade_course(
             comments = add_comment(out, groups, *comment)
         write_outputs(out, lab, records, comments)
         failures = write_gradebook(course, lab, zip(records, read, strict=True), comments)
+        gone = sorted(known_students(out) - {record.student for record in records})
+        if tidy:
+            remove_students(course, out, topic, gone)
         close_to_others(course, out)
-    return Graded(lab, records, graded_now, failures)
+    return Graded(lab, records, graded_now, failures, renamed, gone)
 
 
 @contextmanager

@@ -14,7 +14,11 @@ import pytest
 import serving
 
 ROOT = Path(__file__).parents[3]
-PAGES = [page for page in (ROOT / "README.md", ROOT / "docs/grading.md") if "labkit grade 04_iou\n" in page.read_text()]
+PAGES = [
+    page
+    for page in (ROOT / "README.md", ROOT / "docs/grading.md")
+    if "labkit grade 04_iou --course" in page.read_text()
+]
 # What the students of tests/data/submitted have right.
 RIGHT = {
     "ada": {"confusion_matrix", "iou", "mean_iou", "merge_classes", "trimap_band"},
@@ -48,22 +52,32 @@ def test_there_is_such_a_page():
 def test_the_commands_grade_and_formgrader_shows_it(clone, tmp_path):
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     given = commands(PAGES[0])
-    assert given[0].startswith("make ") and given[-1] == "make lab"
+    assert given[0].startswith("make ") and given[-1] == "cd out/sample && jupyter lab"
     for command in given[1:-1]:
         if command.startswith("export PATH"):
             continue
         done = subprocess.run(command, shell=True, cwd=clone, env=environment, capture_output=True, text=True)
         assert done.returncode == (1 if "labkit grade" in command else 0), done.stderr
-    rows = list(csv.DictReader((clone / "grades/04_iou/grades.csv").open()))
+    assert not (clone / "submitted").exists()
+    course = clone / "out/sample"
+    rows = list(csv.DictReader((course / "grades/04_iou/grades.csv").open()))
     points = {s: {row["question"]: float(row["points"]) for row in rows if row["student"] == s} for s in RIGHT}
     for student, right in RIGHT.items():
         assert {name for name, earned in points[student].items() if earned} == right
-    with serving.jupyterlab(clone, tmp_path) as url:
+    with serving.jupyterlab(course, tmp_path) as url:
         address = f"{url}/formgrader/api/submissions/04_iou?token={serving.TOKEN}"
         shown = json.loads(urllib.request.urlopen(address).read())
     assert {s["student"]: s["score"] for s in shown} == {s: sum(earned.values()) for s, earned in points.items()}
     assert {s["student"]: s["needs_manual_grade"] for s in shown} == {"ada": True, "ben": True, "eve": True}
+
+
+def test_git_ignores_what_grading_leaves(clone):
+    names = ("downloaded", "submitted", "autograded", "feedback", "grades")
+    for name in names:
+        (clone / name).mkdir()
+        (clone / name / "file").touch()
+    (clone / "gradebook.db").touch()
     git = ["git", "-C", str(clone)]
     subprocess.run([*git, "init", "--quiet"], check=True)
-    status = subprocess.run([*git, "status", "--short"], capture_output=True, text=True, check=True).stdout.split()
-    assert {"submitted/", "grades/", "autograded/", "gradebook.db"}.isdisjoint(status)
+    status = subprocess.run([*git, "status", "--short"], capture_output=True, text=True, check=True).stdout
+    assert not [name for name in (*names, "gradebook.db") if name in status]
