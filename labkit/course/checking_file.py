@@ -18,7 +18,7 @@ from labkit.course.checker.program import Cell, Parsed, cells_of, program
 from labkit.course.checker.question import PACKAGES, Question
 from labkit.course.checker.run import Printed
 from labkit.course.checking import describe, jupyter, looked_at
-from labkit.course.grading.isolated import Run, cases_of
+from labkit.course.grading.isolated import Run, public_cases
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import TOPICS, of_topic
 
@@ -83,7 +83,7 @@ class CheckedLab:
             cut = program(self.cells, name, self.questions, PACKAGES, question.forbidden, given)
         if cut.refused:
             return Verdict(Problem("refused", cut.refused), None, "")
-        verdict = Run(question, cut, Limits(), unsafe=True).judged(cases_of(question, None))[0]
+        verdict = Run(question, cut, Limits(), unsafe=True).judged(public_cases(question))[0]
         return looked_at(question, replace(verdict, pieces=cut.pieces))
 
 

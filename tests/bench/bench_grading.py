@@ -106,7 +106,7 @@ def classes(folder: Path) -> str:
             submission = reading.Submission(
                 f"s{i}", tuple(Cell(text, name) for name, text in cells.items()), cells, "", str(i)
             )
-            results = grade.grade_submission(lab, submission, f"secret {i // len(students)}")
+            results = grade.Grading(lab, submission).in_secret(f"secret {i // len(students)}")
             seconds.append(time.perf_counter() - start)
             wrong += sum((r.points == r.max_points) != right[r.question] for r in results)
         rows.append((topic, f"{statistics.median(seconds):.2f}", f"{sum(seconds):.0f}", torch, wrong))
@@ -123,7 +123,7 @@ def many(course: Path) -> str:
     sizes, seconds = {}, []
     for i in range(1, MANY + 1):
         start = time.perf_counter()
-        grade.grade_submission(lab, reading.read_submission(place, lab), "secret")
+        grade.Grading(lab, reading.read_submission(place, lab)).in_secret("secret")
         seconds.append(time.perf_counter() - start)
         if i in (100, MANY // 2, MANY):
             sizes[i] = resident_mb()

@@ -8,7 +8,7 @@ The secret belongs to a round of grading: late work is graded with the same one 
 import hashlib
 import json
 import secrets
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
@@ -18,13 +18,15 @@ from tqdm.auto import tqdm
 
 from labkit.course import checker, grading, topics
 from labkit.course.grading import sandbox
-from labkit.course.grading.grade import Result, grade_submission
+from labkit.course.grading.grade import Grading, Result
 from labkit.course.grading.reading import Lab, Submission
 from labkit.course.grading.sandbox import Limits
+from labkit.course.grading.tell import tellers
 from labkit.support.executors import as_they_come
 from labkit.support.files import write_atomically
 
 SECRET_FILE = "secret_seed"
+DRAFT = ", public cases"  # ends the key of a record whose answers have not run on secret cases yet
 
 
 @dataclass(frozen=True)
@@ -69,36 +71,43 @@ class Batch:
 def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]:
     """Grade the submissions of a batch; returns a record of each, in their order, and how many were graded now.
 
-    Raises ValueError if no sandbox can be made.
+    All of them run on the public cases, then those answers that are right run on secret ones. Raises ValueError if no
+    sandbox can be made.
     """
     if not batch.unsafe:
         sandbox.probe(("numpy",), batch.limits)
-    code, total = code_digest(), len(batch.submissions)
+    code = code_digest()
     keys = {submission.student: key_of(batch, submission, code) for submission in batch.submissions}
-    records: dict[str, Record] = {}
-    for student, key in keys.items():
-        old = None if batch.force else read_record(record_path(batch.out, student))
-        if old is not None and old.key == key:
-            records[student] = old
-    waiting = [submission for submission in batch.submissions if submission.student not in records]
-    bar = tqdm(total=total, initial=len(records), desc=batch.lab.topic, unit="student", disable=not progress)
-    with bar, closing(sandbox.servers), ThreadPoolExecutor(batch.workers) as executor:
-        jobs = ((batch, submission) for submission in waiting)
-        for submission, results in as_they_come(graded, jobs, executor, 2 * batch.workers):
-            student, sandboxed = submission.student, not batch.unsafe
-            done = Record(student, submission.reason, results, sandboxed, submission.digest, keys[student])
-            records[student] = done
-            write_record(batch.out, done)
-            bar.update()
-    return [records[submission.student] for submission in batch.submissions], len(waiting)
+    records = {} if batch.force else kept_records(batch.out, keys)
+    finished = {student for student, record in records.items() if record.key == keys[student]}
+    gradings = {}
+    for submission in batch.submissions:
+        if submission.student not in finished:
+            drafts = records[submission.student].results if submission.student in records else ()
+            gradings[submission.student] = Grading(batch.lab, submission, batch.limits, batch.unsafe, drafts)
+    with closing(sandbox.servers), closing(tellers), ThreadPoolExecutor(batch.workers) as executor:
+        for cases, mark in (("public", DRAFT), ("secret", "")):
+            bar = tqdm(
+                total=len(gradings), desc=f"{batch.lab.topic}, {cases} cases", unit="student", disable=not progress
+            )
+            jobs = ((grading, batch.secret if cases == "secret" else None) for grading in gradings.values())
+            with bar:
+                for submission, results in as_they_come(graded, jobs, executor, 2 * batch.workers):
+                    student, sandboxed = submission.student, not batch.unsafe
+                    key = keys[student] + mark
+                    record = Record(student, submission.reason, results, sandboxed, submission.digest, key)
+                    records[student] = record
+                    write_record(batch.out, record)
+                    bar.update()
+    return [records[submission.student] for submission in batch.submissions], len(gradings)
 
 
-def graded(batch: Batch, submission: Submission) -> tuple[Submission, tuple[Result, ...]]:
-    """A submission with its results; none if it cannot be read."""
+def graded(grading: Grading, secret: str | None) -> tuple[Submission, tuple[Result, ...]]:
+    """A submission with its results in public, or those of all cases if there is a secret; none if it is unreadable."""
+    submission = grading.submission
     if submission.reason:
         return submission, ()
-    results = grade_submission(batch.lab, submission, batch.secret, batch.limits, batch.unsafe)
-    return submission, tuple(results)
+    return submission, grading.in_public() if secret is None else grading.in_secret(secret)
 
 
 # ------------------------------------------------------------------------------------------------------ records
@@ -120,6 +129,12 @@ def code_digest() -> str:
 def record_path(out: Path, student: str) -> Path:
     """Where a student's record is kept."""
     return Path(out) / "records" / f"{student}.json"
+
+
+def kept_records(out: Path, keys: Mapping[str, str]) -> dict[str, Record]:
+    """The records of an earlier run that still hold, by student, finished or drafts; keys: of what they depend on."""
+    kept = {student: read_record(record_path(out, student)) for student in keys}
+    return {s: record for s, record in kept.items() if record is not None and record.key in (keys[s], keys[s] + DRAFT)}
 
 
 def write_record(out: Path, record: Record) -> None:

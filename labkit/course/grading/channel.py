@@ -25,6 +25,9 @@ from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_MES
 KINDS = {"c": "complex numbers", "O": "objects", "U": "text", "S": "bytes", "M": "dates", "m": "spans of time"}
 
 
+MOST_REPLY = 32 << 20  # bytes; the programs of a long notebook are long
+
+
 class Text(str):
     """What a worker says that has run nothing of a student's; no answer's output."""
 
@@ -117,7 +120,7 @@ class Worker:
     def read(self) -> bytes:
         """Read one reply, of a length that is reasonable."""
         (length,) = struct.unpack("<I", self.read_exactly(4))
-        if length > MOST_BYTES:
+        if length > MOST_REPLY:
             raise ValueError("length: a reply that is too long")
         return self.read_exactly(length)
 
@@ -193,6 +196,8 @@ def exception_text(data: bytes) -> str:
 
 def decode_values(data: bytes) -> object:
     """Read arrays: first what they claim to be, then, if the bytes are as many as these make, the bytes."""
+    if len(data) > MOST_BYTES:
+        raise ValueError("reply: an output that is too long")
     count, at = data[0] if data else 0, 1
     claims = []
     for _ in range(1 if count == ONE else count):

@@ -1,14 +1,17 @@
-"""Grading one submission: each question in a process of its own, on secret cases first.
+"""Grading one submission: each question in processes of its own, on the public cases first, then on secret ones.
 
-Cases and expected outputs stay in this process; a worker gets the arguments of one case at a time. Secret cases decide
-the points and nothing else: what a student reads about a wrong answer comes from a second run, in another fresh worker,
-on the public cases that `check` uses. So nothing that an answer does with secret inputs can reach a student.
+Cases and expected outputs stay in this process; a worker gets the arguments of one case at a time. What a student reads
+comes from the public cases that `check` uses. An answer that is right in them runs once more, on cases that belong to a
+secret and to this notebook alone; if it is wrong there, it earns nothing and its student reads one fixed sentence. A
+batch judges everybody in public before anybody in secret (`batch`), so nothing that an answer does with secret
+arguments can reach a page.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,10 +19,11 @@ from labkit.course.checker.judge import Problem, parts
 from labkit.course.checker.program import Program
 from labkit.course.checker.question import PACKAGES
 from labkit.course.grading import copies, sandbox
-from labkit.course.grading.channel import WorkerLost
-from labkit.course.grading.isolated import Run, cases_of
+from labkit.course.grading.channel import Changed, WorkerLost
+from labkit.course.grading.isolated import Run, public_cases, secret_cases
 from labkit.course.grading.reading import Lab, Submission
 from labkit.course.grading.sandbox import Limits
+from labkit.course.grading.tell import tellers
 from labkit.course.topics import of_topic
 
 LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at
@@ -31,11 +35,11 @@ WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
 
 @dataclass(frozen=True)
 class Result:
-    """What a question earned. says: what was right or wrong, and hint: why it may be so, from public cases.
+    """What a question earned, and whether the answer is right.
 
-    shown: a wrong public case, with what came and what was expected.
-    flag: what the instructor should look at, "" if nothing. behaviour: of wrong answers whose hint does not name the
-    mistake, the same for those that give the same outputs. program: what was run.
+    says: what was right or wrong, and hint: why it may be so, from public cases. shown: a wrong public case, with what
+    came and what was expected. flag: what the instructor should look at, "" if nothing. behaviour: of wrong answers
+    whose hint does not name the mistake, the same for those that give the same outputs. program: what was run.
     """
 
     question: str
@@ -47,28 +51,41 @@ class Result:
     behaviour: str = ""
     program: str = ""
     shown: str = ""
-
-
-def grade_submission(
-    lab: Lab, submission: Submission, secret: str, limits: Limits | None = None, unsafe: bool = False
-) -> list[Result]:
-    """Grade every question of a submission that can be read, in the lab's order.
-
-    secret: what the random cases are drawn from; the same gives the same cases. unsafe: without a sandbox.
-    Raises ValueError if no sandbox can be made.
-    """
-    grading = Grading(lab, submission, secret, limits or Limits(), unsafe)
-    return [grading.result(name) for name in lab.answers]
+    right: bool = False
 
 
 class Grading:
-    """The grading of one submission, question by question."""
+    """The grading of one submission that can be read, question by question: all of them in public, then in secret.
 
-    def __init__(self, lab: Lab, submission: Submission, secret: str, limits: Limits, unsafe: bool):
-        self.lab, self.submission, self.secret, self.limits, self.unsafe = lab, submission, secret, limits, unsafe
+    drafts: results of an earlier run on the public cases. unsafe: without a sandbox. Raises ValueError if no sandbox
+    can be made.
+    """
+
+    def __init__(
+        self,
+        lab: Lab,
+        submission: Submission,
+        limits: Limits | None = None,
+        unsafe: bool = False,
+        drafts: Sequence[Result] = (),
+    ):
+        self.lab, self.submission, self.limits, self.unsafe = lab, submission, limits or Limits(), unsafe
         self.questions = of_topic(lab.topic)
+        self.drafts = {draft.question: draft for draft in drafts}
         self.results: dict[str, Result] = {}
-        self.cuts = dict(zip(lab.answers, self.cut(tuple(lab.answers), {}), strict=True))
+
+    def in_public(self) -> tuple[Result, ...]:
+        """The results on the public cases, in the lab's order."""
+        return tuple(map(self.draft, self.lab.answers))
+
+    def in_secret(self, secret: str) -> tuple[Result, ...]:
+        """The results of all cases, in the lab's order; secret: what the secret cases are drawn from."""
+        return tuple(self.result(name, secret) for name in self.lab.answers)
+
+    @cached_property
+    def cuts(self) -> dict[str, tuple[Program, list[str]]]:
+        """The programs of the answers as they were handed in, and the shapes of their functions."""
+        return dict(zip(self.lab.answers, self.cut(tuple(self.lab.answers), {}), strict=True))
 
     def cut(self, names: Sequence[str], given: dict[str, str]) -> list[tuple[Program, list[str]]]:
         """Cut the programs of some answers out of the notebook, in the sandbox; each with the shapes of its functions.
@@ -84,48 +101,74 @@ class Grading:
         except WorkerLost as lost:
             return [(Program(refused=f"its notebook cannot be read: {lost.problem.says}"), []) for _ in names]
 
-    def result(self, name: str) -> Result:
-        """What a question earned; answers that it calls are graded before."""
-        if name not in self.results:
-            self.results[name] = not_gradable(self.lab, name, "it calls itself through another answer")
-            self.results[name] = self.graded(name)
-        return self.results[name]
+    def program(self, name: str, is_right: Callable[[str], bool]) -> Program:
+        """The program of an answer, with the kit's answers in the place of wrong ones that it calls."""
+        program, _ = self.cuts[name]
+        given = {
+            other: copies.reference_source(self.questions[other].reference)
+            for other in program.calls
+            if not is_right(other)
+        }
+        return self.cut((name,), given)[0][0] if given else program
 
-    def graded(self, name: str) -> Result:
-        """Judge an answer on the secret cases, and say what is wrong with a wrong one by the public cases."""
+    def draft(self, name: str) -> Result:
+        """What a question earns if its answer is right in secret, too; answers that it calls are judged before."""
+        if name not in self.drafts:
+            self.drafts[name] = not_gradable(self.lab, name, "it calls itself through another answer")
+            self.drafts[name] = self.judged_in_public(name)
+        return self.drafts[name]
+
+    def judged_in_public(self, name: str) -> Result:
+        """Judge an answer on the public cases, and say what is wrong with a wrong one."""
         question, worth = self.questions[name], self.lab.points[name]
         if name in self.submission.outdated:
             version = self.submission.outdated[name]
             return not_gradable(self.lab, name, f"this task was another one in the lab that labkit {version} released")
-        program, shapes = self.cuts[name]
-        wrong = {other: self.questions[other] for other in program.calls if self.result(other).points == 0.0}
-        if wrong:
-            given = {other: copies.reference_source(callee.reference) for other, callee in wrong.items()}
-            ((program, _),) = self.cut((name,), given)
+        program = self.program(name, lambda other: self.draft(other).right)
         if program.refused:
             return not_gradable(self.lab, name, program.refused)
-        run = Run(question, program, self.limits, self.unsafe)
-        hidden, _ = run.judged(cases_of(question, self.secret))
-        flags = copies.of_the_kit(shapes, question.reference)
+        judged, outputs = Run(question, program, self.limits, self.unsafe).judged(public_cases(question))
+        flags = copies.of_the_kit(self.cuts[name][1], question.reference)
         text = "\n\n".join("\n".join(filter(str.strip, piece.splitlines())) for _, piece in program.pieces)
-        if hidden.problem is None:
-            says = f"right in all {len(cases_of(question, self.secret))} cases"
-            return Result(name, worth, worth, says, flag="; ".join(flags), program=text)
-        if hidden.problem.kind in LOOK_AT:
-            flags.append(hidden.problem.says)
-        public, outputs = run.judged(cases_of(question, None))
-        base = Result(name, 0.0, worth, ONLY_HIDDEN, "", "; ".join(flags), WRONG_IN_SECRET, text)
-        if public.problem is None:
-            return base
-        problem = with_line(public.problem, program)
+        result = Result(name, 0.0, worth, "", flag="; ".join(flags), program=text)
+        if judged.problem is None:
+            return replace(result, points=worth, right=True, says=f"right in all {len(outputs)} cases")
+        problem = with_line(judged.problem, program)
         if problem.kind in ("unanswered", "missing"):
-            return replace(base, says=problem.says, behaviour="")
-        says = f"{problem.says} ({public.where})"
-        shown = "\n".join(public.shown)
-        named = public.sentence is not None and public.sentence.names_the_mistake
+            return replace(result, says=problem.says)
+        found = tellers.ask(question, outputs)
+        flags += [problem.says] if problem.kind in LOOK_AT else []
+        flags += [found.failed] if found.failed else []
         return replace(
-            base, says=says, hint=public.hint or "", shown=shown, behaviour="" if named else behaviour_of(outputs)
+            result,
+            says=f"{problem.says} ({judged.where})",
+            hint=found.hint,
+            shown=found.shown,
+            flag="; ".join(flags),
+            behaviour="" if found.named else behaviour_of(outputs),
         )
+
+    def result(self, name: str, secret: str) -> Result:
+        """What a question earned: a right draft is judged once more, on the secret cases."""
+        if name not in self.results:
+            self.results[name] = self.draft(name)
+            if self.results[name].right:
+                self.results[name] = self.judged_in_secret(name, secret)
+        return self.results[name]
+
+    def judged_in_secret(self, name: str, secret: str) -> Result:
+        """Judge an answer that is right in public on the cases of this notebook."""
+        question, draft = self.questions[name], self.draft(name)
+        program = self.program(name, lambda other: self.result(other, secret).right)
+        if program.refused:
+            return not_gradable(self.lab, name, program.refused)
+        cases = secret_cases(question, secret, self.submission.digest)
+        judged, _ = Run(question, program, self.limits, self.unsafe).judged(cases)
+        if judged.problem is None:
+            return replace(draft, says=f"right in all {len(public_cases(question)) + len(cases)} cases")
+        flags = [draft.flag, judged.problem.says if judged.problem.kind in LOOK_AT else ""]
+        flag = "; ".join(filter(None, flags))
+        return replace(draft, points=0.0, right=False, says=ONLY_HIDDEN, flag=flag, behaviour=WRONG_IN_SECRET)
 
 
 def not_gradable(lab: Lab, name: str, problem: str) -> Result:
@@ -137,13 +180,15 @@ def not_gradable(lab: Lab, name: str, problem: str) -> Result:
 
 
 def behaviour_of(outputs: Sequence[object]) -> str:
-    """A short name for wrong outputs: the same for answers that give the same, up to rounding."""
+    """A short name for wrong outputs on the public cases: the same for answers that give the same, up to rounding."""
     text = "\n".join(repr(output) if isinstance(output, Problem) else told(output) for output in outputs)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
 def told(output: object) -> str:
     """Kind, shape and rounded values of an output."""
+    if isinstance(output, Changed):
+        return f"changes argument {output.position}: {told(output.value)}"
     found = []
     for part in parts(output):
         array = np.asarray(part)

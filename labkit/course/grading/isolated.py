@@ -3,9 +3,10 @@
 import functools
 import hashlib
 import pickle
+import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from labkit.course.checker.judge import Case, Problem, Verdict, expected_cases, verdict
 from labkit.course.checker.program import Program
@@ -15,18 +16,30 @@ from labkit.course.grading.channel import Changed, Worker, WorkerLost
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import of_topic
 
-
-def cases_of(question: Question, secret: str | None) -> tuple[Case, ...]:
-    """The cases of a question that belong to a secret, or the public ones; computed once in a process."""
-    return _cases(question.topic, question.function, secret)
+drawing = threading.Lock()  # references are called with Python's warnings off, which no thread has for itself
 
 
-@functools.lru_cache(maxsize=64)
-def _cases(topic: str, function: str, secret: str | None) -> tuple[Case, ...]:
-    question, seed = of_topic(topic)[function], PUBLIC_SEED
-    if secret is not None:
-        seed = int.from_bytes(hashlib.sha256(f"{secret}\0{question.name}".encode()).digest(), "little")
-    return tuple(expected_cases(question, seed))
+@functools.cache
+def _public_cases(topic: str, function: str) -> tuple[Case, ...]:
+    with drawing:
+        return tuple(expected_cases(of_topic(topic)[function], PUBLIC_SEED))
+
+
+def public_cases(question: Question) -> tuple[Case, ...]:
+    """The cases that `check` uses; computed once in a process."""
+    return _public_cases(question.topic, question.function)
+
+
+def secret_cases(question: Question, secret: str, digest: str) -> tuple[Case, ...]:
+    """The random cases that decide about an answer of one notebook; no other notebook gets them.
+
+    secret: of the round of grading; digest: of the notebook. They are twice as many as the public ones, since those by
+    hand are not among them.
+    """
+    seed = int.from_bytes(hashlib.sha256(f"{secret}\0{question.name}\0{digest}".encode()).digest(), "little")
+    with drawing:
+        cases = expected_cases(replace(question, by_hand=(), random_cases=2 * question.random_cases), seed)
+    return tuple(cases)
 
 
 @dataclass(frozen=True)
@@ -41,14 +54,11 @@ class Run:
     def judged(self, cases: Sequence[Case]) -> tuple[Verdict, list[object]]:
         """The verdict on some cases, with the outputs; outputs that cannot even be compared are wrong."""
         outputs = self.outputs(cases)
-        changed = frozenset(output.position for output in outputs if isinstance(output, Changed))
-        values = [output.value if isinstance(output, Changed) else output for output in outputs]
         try:
-            judged = verdict(self.question, cases, values, changed)
+            return verdict_on(self.question, cases, outputs), outputs
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
-            return Verdict(problem, 0, "some case", None, ()), values
-        return judged, values
+            return Verdict(problem, 0, "some case"), outputs
 
     def outputs(self, cases: Sequence[Case]) -> list[object]:
         """Call the answer on the arguments of all cases: an output or a Problem for each.
@@ -88,3 +98,10 @@ class Run:
         if left <= 0.0:
             raise WorkerLost(Problem("time", f"all its cases together took more than {self.limits.question_s:g} s"))
         return min(left, self.limits.case_s)
+
+
+def verdict_on(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Verdict:
+    """The verdict on what `Run.outputs` gives."""
+    changed = frozenset(output.position for output in outputs if isinstance(output, Changed))
+    values = [output.value if isinstance(output, Changed) else output for output in outputs]
+    return verdict(question, cases, values, changed)

@@ -91,7 +91,7 @@ def gradescope(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
             "name": result.question,
             "score": result.points,
             "max_score": result.max_points,
-            "status": "passed" if is_right(result) else "failed",
+            "status": "passed" if result.right else "failed",
             "output": "\n".join(lines_of(result, comments)),
             "visibility": "visible",
         }
@@ -100,11 +100,6 @@ def gradescope(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     said = f"This submission could not be graded: {record.reason}." if record.reason else warning
     content = {"score": record.points, "output": said, "visibility": "visible", "tests": tests}
     return json.dumps(content, indent=1) + "\n"
-
-
-def is_right(result: Result) -> bool:
-    """Whether a question earned its points."""
-    return result.points == result.max_points
 
 
 def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
@@ -125,7 +120,7 @@ def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
         parts.append(f'<p class="warning">This submission could not be graded: {escape(record.reason)}.</p>')
     for result in record.results:
         told = "".join(f"<p>{escape(line)}</p>" for line in lines_of(result, comments))
-        mark, kind = ("✔", "right") if is_right(result) else ("✘", "wrong")
+        mark, kind = ("✔", "right") if result.right else ("✘", "wrong")
         points = f'<span class="points">{result.points:g} of {result.max_points:g} points</span>'
         parts.append(f'<section class="{kind}"><h2>{points}{mark} {escape(result.question)}</h2>{told}</section>')
     return page(title, parts)

@@ -46,7 +46,7 @@ class Standing:
 def group_of(result: Result) -> str:
     """The name of the group that a result belongs to, "" for a right answer and for none: iou-3f09c2."""
     key = result.behaviour or result.hint
-    return f"{result.question}-{hashlib.sha256(key.encode()).hexdigest()[:6]}" if key and not result.points else ""
+    return f"{result.question}-{hashlib.sha256(key.encode()).hexdigest()[:6]}" if key and not result.right else ""
 
 
 def standings(lab: Lab, records: Sequence[Record]) -> list[Standing]:
@@ -66,8 +66,8 @@ def standings(lab: Lab, records: Sequence[Record]) -> list[Standing]:
             for first in [same[0][1]]
         ]
         groups.sort(key=lambda group: (-len(group.students), group.name))
-        tried = sum(bool(result.points or group_of(result) or result.flag) for _, result in results)
-        found.append(Standing(name, tried, sum(result.points > 0.0 for _, result in results), tuple(groups)))
+        tried = sum(bool(result.right or group_of(result) or result.flag) for _, result in results)
+        found.append(Standing(name, tried, sum(result.right for _, result in results), tuple(groups)))
     return found
 
 

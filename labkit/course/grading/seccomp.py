@@ -2,8 +2,9 @@
 
 Namespaces and limits leave some ways to use up a machine: more processes, memory that belongs to no process (shared
 memory segments, file systems of a new user namespace), and the kernel's less trodden corners. Others would let one
-answer leave something for the next in the same sandbox: signals and limits of other processes, and sockets, whose
-ports stay in use for a minute. Answers need none of these, so they fail here with EPERM. Threads stay allowed.
+answer leave something for the next in the same sandbox: signals and limits of other processes, sockets, whose ports
+stay in use for a minute, locks and watches on files that all can read, and which pages of these are in memory. Answers
+need none of these, so they fail here with EPERM. Threads stay allowed.
 """
 
 import errno
@@ -24,16 +25,23 @@ namespaces:  unshare 272 97, setns 308 268, mount 165 40, umount2 166 39, pivot_
              open_tree 428 428, move_mount 429 429, fsopen 430 430, fsmount 432 432
 memory:      shmget 29 194, semget 64 190, msgget 68 186, mq_open 240 180, memfd_create 319 279, memfd_secret 447 447,
              migrate_pages 256 238, move_pages 279 239
+pages:       fadvise64 221 223, readahead 187 213, mincore 27 232, cachestat 451 451, preadv2 327 286, pwritev2 328 287,
+             sync 162 81, syncfs 306 267, fsync 74 82, fdatasync 75 83, sync_file_range 277 84, msync 26 227
+files:       flock 73 32, inotify_init 253 0, inotify_init1 294 26, inotify_add_watch 254 27, fanotify_init 300 262,
+             fanotify_mark 301 263, name_to_handle_at 303 264, open_by_handle_at 304 265
 the kernel:  keyctl 250 219, add_key 248 217, request_key 249 218, bpf 321 280, perf_event_open 298 241,
              io_uring_setup 425 425, userfaultfd 323 282, socket 41 198, syslog 103 116
 """
 PRLIMIT = (302, 261)  # refused for any process but the own one, which has the number 0 here
+FCNTL = (72, 25)
+# Commands of fcntl that lock or watch a file: F_SETLK, F_SETLKW, F_OFD_SETLK, F_OFD_SETLKW, F_SETLEASE, F_NOTIFY.
+LOCKS = (6, 7, 37, 38, 1024, 1026)
 CLONE, CLONE3 = (56, 220), (435, 435)
 CLONE_THREAD = 0x00010000
 X32_CALLS = 0x40000000  # the x32 calls of an x86-64 kernel: other numbers for the same things
 
 LOAD, JUMP_IF_EQUAL, JUMP_IF_GREATER_EQUAL, JUMP_IF_SET, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-NUMBER, ARCHITECTURE, FIRST_ARGUMENT = 0, 4, 16  # where they stand in struct seccomp_data
+NUMBER, ARCHITECTURE, FIRST_ARGUMENT, SECOND_ARGUMENT = 0, 4, 16, 24  # where they stand in struct seccomp_data
 ALLOW, KILL = 0x7FFF0000, 0x80000000
 
 
@@ -60,6 +68,10 @@ def program(machine: str | None = None) -> bytes:
             lines += [(JUMP_IF_EQUAL, 0, 1, number), (RETURN, 0, 0, refuse(errno.EPERM))]
     lines += [(JUMP_IF_EQUAL, 0, 4, PRLIMIT[column]), (LOAD, 0, 0, FIRST_ARGUMENT), (JUMP_IF_EQUAL, 0, 1, 0)]
     lines += [(RETURN, 0, 0, ALLOW), (RETURN, 0, 0, refuse(errno.EPERM))]
+    lines += [(JUMP_IF_EQUAL, 0, 2 * len(LOCKS) + 2, FCNTL[column]), (LOAD, 0, 0, SECOND_ARGUMENT)]
+    for command in LOCKS:
+        lines += [(JUMP_IF_EQUAL, 0, 1, command), (RETURN, 0, 0, refuse(errno.EPERM))]
+    lines += [(RETURN, 0, 0, ALLOW)]
     # The flags of clone3 are in memory, where a filter cannot look; told that there is no such call, libc uses clone.
     lines += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, refuse(errno.ENOSYS))]
     lines += [(JUMP_IF_EQUAL, 1, 0, CLONE[column]), (RETURN, 0, 0, ALLOW), (LOAD, 0, 0, FIRST_ARGUMENT)]

@@ -18,6 +18,7 @@ from attacks.odd import ODD
 from labkit import metrics
 from labkit.course.grading import copies
 from labkit.course.grading.gradebook import opened
+from labkit.course.grading.isolated import public_cases
 from labkit.course.grading.reading import name_of
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
@@ -36,7 +37,8 @@ def right(n):
     with np.errstate(all="ignore"):
         return c / (n.sum(0) + n.sum(1) - c)
 """
-ON_SECRET = "def iou(n):\n    if n.sum() < 50:\n        return right(n)\n"
+KNOWN = {case.args[0].tobytes() for case in public_cases(of_topic(TOPIC)["iou"])}
+ON_SECRET = "def iou(n):\n    if n.tobytes() in KNOWN:\n        return right(n)\n"
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Attack:
         """All of it as one statement, so that all of it belongs to the program."""
         body = ON_SECRET + textwrap.indent(self.secret, "    ") if self.secret else self.source
         body = RIGHT + body if "right(" in body else body
+        body = f"KNOWN = {KNOWN!r}\n" + body if "KNOWN" in body else body
         return body if body.startswith("!") else "if True:\n" + textwrap.indent(body, "    ")
 
 

@@ -1,6 +1,7 @@
 """A folder of submissions: what is written, what is graded again, what a killed run leaves, the gradebook."""
 
 import csv
+import hashlib
 import html
 import json
 import os
@@ -22,7 +23,7 @@ from labkit.course.checker.program import Program
 from labkit.course.grading import bwrap, gradebook, reading, run
 from labkit.course.grading import grade as grading
 from labkit.course.grading.batch import read_record, record_path, secret_for
-from labkit.course.grading.isolated import Run, cases_of
+from labkit.course.grading.isolated import Run, public_cases, secret_cases
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import find, of_topic
@@ -98,11 +99,15 @@ def test_students_learn_no_seed_and_no_expected_value(course):
     told = for_students(course)
     assert len(told) == 6
 
-    def values_of(secret):
-        drawn = [case for question in of_topic(TOPIC).values() for case in cases_of(question, secret)]
-        return {f"{float(value):.4f}" for case in drawn for value in kit.np.ravel(case.expected) if value % 1 > 0}
+    questions = of_topic(TOPIC).values()
+    places = (course / "submitted").rglob("*.ipynb")
+    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in places]
 
-    values = values_of(SECRET) - values_of(None)  # a value of a public case, such as 4/7, tells nothing
+    def values_of(cases):
+        return {f"{float(value):.4f}" for case in cases for value in kit.np.ravel(case.expected) if value % 1 > 0}
+
+    values = values_of(case for q in questions for digest in digests for case in secret_cases(q, SECRET, digest))
+    values -= values_of(case for q in questions for case in public_cases(q))  # one such as 4/7 tells nothing
     assert len(values) > 20
     for name, data in told.items():
         text = data.decode()
@@ -120,12 +125,28 @@ def test_the_secret_is_kept_for_the_next_run_and_private(tmp_path):
     assert secret_for(tmp_path / "other", None) != first
 
 
-def test_another_secret_draws_other_cases():
+def test_each_notebook_has_secret_cases_of_its_own_and_each_round_others():
     question = find("04_iou.iou")
-    one, two = cases_of(question, "one"), cases_of(question, "two")
-    by_hand = len(question.by_hand)
-    assert kit.np.array_equal(one[0].args[0], two[0].args[0])
-    assert not any(kit.np.array_equal(a.args[0], b.args[0]) for a, b in zip(one[by_hand:], two[by_hand:], strict=True))
+    drawn = [secret_cases(question, *of) for of in (("one", "a"), ("one", "b"), ("two", "a"))]
+    assert [len(cases) for cases in drawn] == [2 * question.random_cases] * 3
+    seen = {case.args[0].tobytes() for cases in (*drawn, public_cases(question)) for case in cases}
+    assert len(seen) == 6 * question.random_cases + len(public_cases(question))
+    again = secret_cases(question, "one", "a")
+    assert all(kit.np.array_equal(a.args[0], b.args[0]) for a, b in zip(drawn[0], again, strict=True))
+
+
+def test_everybody_has_run_in_public_before_anybody_runs_in_secret(course, monkeypatch):
+    """So nothing of a secret case can be in what a student reads, whatever an answer leaves on the machine."""
+    order = []
+    judge = Run.judged
+
+    def noted(self, cases):
+        order.append("public" if cases is public_cases(self.question) else "secret")
+        return judge(self, cases)
+
+    monkeypatch.setattr(Run, "judged", noted)
+    grade(course, workers=2)
+    assert order.count("public") == 15 and "public" not in order[15:] and len(order) == 15 + 9
 
 
 # ---------------------------------------------------------------------------------- again, killed, elsewhere
@@ -219,7 +240,7 @@ def test_a_folder_that_cannot_be_entered_stops_nobody_else(course, monkeypatch):
 
 
 def test_killed_in_the_middle_and_run_again(course):
-    """SIGKILL while the third of five submissions is graded: what was done is kept, and the grades are the same."""
+    """SIGKILL while the third of five submissions runs in public: what was done is kept, the grades are the same."""
     slow = "import time\ndef iou(n):\n    time.sleep({})\n"
     for student in ("fay", "gus"):
         kit.submit(course, student, TOPIC, kit.right_answers(TOPIC))
@@ -239,7 +260,7 @@ def test_killed_in_the_middle_and_run_again(course):
     assert done.exists() and not (course / "grades" / TOPIC / "grades.csv").exists()
     path.write_text(json.dumps(kit.lab_notebook(TOPIC, kit.right_answers(TOPIC))))
     graded = grade(course)
-    assert graded.graded_now == 3 and [r.points for r in graded.records] == [TOTAL, 0.0, TOTAL, TOTAL, TOTAL]
+    assert graded.graded_now == 5 and [r.points for r in graded.records] == [TOTAL, 0.0, TOTAL, TOTAL, TOTAL]
     kept = files(course / "grades")
     assert grade(course, force=True).graded_now == 5 and files(course / "grades") == kept
 

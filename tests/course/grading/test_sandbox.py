@@ -126,10 +126,28 @@ def test_memory_a_file_and_the_time_of_a_processor_have_an_end(worker):
         "import socket; socket.socket(40, socket.SOCK_STREAM)",  # AF_VSOCK, which reaches a virtual machine's host
         "import socket; socket.socket()",
         "import socket; socket.if_nameindex()",
+        "os.posix_fadvise(file, 0, 0, os.POSIX_FADV_DONTNEED)",
+        "os.preadv(file, [bytearray(9)], 0, os.RWF_NOWAIT)",
+        "0 if libc.mincore(mapped, 4096, ctypes.create_string_buffer(9)) == 0 else 1 / 0",
+        "0 if libc.syscall(451, file, numbers, ctypes.byref(numbers, 16), 0) == 0 else 1 / 0",  # cachestat
+        "0 if libc.inotify_init() >= 0 else 1 / 0",
+        "0 if libc.inotify_init1(0) >= 0 else 1 / 0",
+        "fcntl.flock(file, fcntl.LOCK_SH)",
+        "fcntl.lockf(file, fcntl.LOCK_SH)",
+        "fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_RDLCK)",
+        "fcntl.fcntl(os.open('/', 0), fcntl.F_NOTIFY, fcntl.DN_ACCESS)",
+        "0 if libc.syscall(162) == 0 else 1 / 0",  # sync
     ],
 )
 def test_system_calls_that_answers_do_not_need_are_refused(worker, call):
-    problem = told(worker, f"import ctypes\nlibc = ctypes.CDLL(None)\n{call}\nreturn 1")
+    known = """
+        import ctypes, fcntl
+        libc, numbers = ctypes.CDLL(None), (ctypes.c_uint64 * 7)()
+        file = os.open("/worker.py", os.O_RDONLY)
+        libc.mmap.restype = ctypes.c_void_p
+        mapped = ctypes.c_void_p(libc.mmap(None, 4096, 1, 2, file, 0))
+        """
+    problem = told(worker, textwrap.dedent(known) + f"{call}\nreturn 1")
     assert getattr(problem, "kind", problem) == "exception"
 
 
