@@ -140,9 +140,13 @@ def program_here(question: Question) -> Program | None:
     None where the kernel's history does not have the answer: nbval keeps none. Other blanks that it calls are the
     student's, or the kit's where a check has put that in their place.
     """
-    shell = jupyter()
-    cells = [Cell(source) for source in shell.history_manager.input_hist_raw]
-    blanks = of_topic(question.topic)
+    shell, blanks = jupyter(), of_topic(question.topic)
+    last = {cell: number for number, cell in ran.items()}
+    cells = [
+        Cell(source, ran[number] if ran.get(number) in blanks else "")
+        for number, source in enumerate(shell.history_manager.input_hist_raw)
+        if number not in ran or last[ran[number]] == number
+    ]
     given = {name: other.source for name, other in blanks.items() if shell.user_ns.get(name) is other.reference}
     cut = program(cells, question.function, blanks, PACKAGES, question.forbidden, given, latest=True)
     return None if cut.refused.startswith("no cell defines") else cut
@@ -152,6 +156,21 @@ def jupyter() -> object | None:
     """The running IPython shell, None in plain Python."""
     ipython = sys.modules.get("IPython")
     return None if ipython is None else ipython.get_ipython()
+
+
+# By number of execution the cell's id, from the first check on and where Jupyter tells it. A lab's answers have their
+# functions' names.
+ran: dict[int, str] = {}
+
+
+def note_cell(info: object) -> None:
+    """Keep which cell is about to run."""
+    if info.store_history and info.cell_id:
+        ran[len(jupyter().history_manager.input_hist_raw)] = info.cell_id  # it is put there next
+
+
+if jupyter() is not None:
+    jupyter().events.register("pre_run_cell", note_cell)
 
 
 class Page:
@@ -193,7 +212,7 @@ def describe(
         return Shown("○", f"{name}: not answered yet", *notes)
     if problem.kind == "refused":
         refused = f"{name} cannot be graded: {problem.says}"
-        return Shown("✘", refused, "The grader would refuse it in these words.", *notes)
+        return Shown("✘", refused, "So the grader would not take it.", *notes)
     lines: list[str | Marked] = [f"line {number}:  {text}" for number, text in problem.lines]
     lines += [f"In {verdict.where}:", *(f"    {line}" for line in verdict.shown)] if verdict.shown else []
     sentence = None if looking else verdict.sentence

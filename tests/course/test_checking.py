@@ -1,6 +1,7 @@
 """The student's check: what it shows in a terminal and in Jupyter, what it returns; and it never stops a notebook."""
 
 import re
+import subprocess
 import sys
 from xml.etree import ElementTree
 
@@ -196,3 +197,35 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
     assert "text/html" in outputs[9][0].data
     assert not [o for cell in outputs for o in cell if o.output_type == "stream" and o.name == "stderr"]
     nbformat.validate(notebook)
+
+
+FIRST_TRY = "def iou(n):\n    return n / 2"
+IOU = (
+    "def iou(n):\n    i = np.diag(n)\n    with np.errstate(all='ignore'):\n        return i / (n.sum(0) + n.sum(1) - i)"
+)
+CHECK = ("iou = check('04_iou.iou', iou)", "check_iou")
+
+
+@pytest.mark.parametrize(
+    "cells, shown",
+    [
+        ([(FIRST_TRY, "iou"), (IOU, "mine"), CHECK], "✘ iou cannot be graded: the cell of its task holds another iou"),
+        ([(FIRST_TRY, "iou"), (IOU, "iou"), CHECK], "✔ iou is right"),
+        ([(FIRST_TRY, "mine"), (IOU, "iou"), CHECK], "✔ iou is right"),
+        ([(IOU, "iou"), (IOU, "mine"), CHECK], "✔ iou is right"),
+        ([(IOU, "a-cell-of-another-editor"), CHECK], "✔ iou is right"),
+        ([("import tempfile\n" + IOU + " + 0 * len(tempfile.gettempdir())", "iou"), CHECK], "an answer writes no file"),
+        ([("def iou(n):\n    return open('scores')", "iou"), CHECK], "an answer opens no file"),
+    ],
+)
+def test_a_notebooks_check_takes_the_cell_that_will_be_graded(cells, shown):
+    """Jupyter tells with each cell that runs its id, which is the answer's name in a released lab."""
+    first = ("from labkit import check\nimport numpy as np\nimport labkit.course.checking", "setup")
+    program = f"""
+from IPython.core.interactiveshell import InteractiveShell
+shell = InteractiveShell.instance()
+for source, cell in {[first, *cells]!r}:
+    shell.run_cell(source, store_history=True, cell_id=cell).raise_error()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert shown in done.stdout

@@ -376,7 +376,10 @@ class Slice:
             raise Refused(f"{len(answered)} different cells have its grade id: keep one")
         elsewhere = [i for i, cell in enumerate(cells) if i not in marked and cell.defines(name)]
         if self.latest and elsewhere:
-            return elsewhere[-1]
+            if not answered or answered[-1] > elsewhere[-1]:
+                return max([elsewhere[-1], *answered])
+            if cells[elsewhere[-1]].dump != cells[answered[-1]].dump:
+                raise Refused(f"the cell of its task holds another {name}, which would be graded: put yours there")
         elsewhere = [i for i in elsewhere if not cells[i].is_blank(name)]
         if found := answered or elsewhere or binding:
             return found[-1]
@@ -402,9 +405,13 @@ class Slice:
         return stars[-1] if stars else None
 
     def allow(self, statement: Statement, way: tuple[str, ...]) -> None:
-        """Raise Refused if a statement imports what is absent where answers are graded; way: names that led to it."""
+        """Raise Refused if a statement needs what is absent where answers are graded; way: names that led to it."""
+        through = f"it uses {way[1]}: " if len(way) > 1 else ""
+        if "open" in statement.needs and not any("open" in cell.binds for cell in self.cells):
+            raise Refused(f"{through}an answer opens no file; take what you need from the arguments")
+        if "tempfile" in statement.modules:
+            raise Refused(f"{through}an answer writes no file; keep what you need in arrays")
         for module in sorted(statement.modules - self.modules - set(QUIET_MODULES)):
-            through = f"it uses {way[1]}: " if len(way) > 1 else ""
             if module in KIT:
                 raise Refused(f"{through}an answer does not use {module}; take what you need from the arguments")
             if module in self.forbidden:

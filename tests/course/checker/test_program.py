@@ -81,7 +81,9 @@ def test_in_a_saved_notebook_the_nearest_above_counts_and_the_marked_cell_is_the
 
 
 def test_in_a_kernel_what_was_run_last_counts():
-    assert function(*RIGHT_AND_LATER, latest=True)() == 5
+    assert function("k = 1", "def f():\n    return k", *RIGHT_AND_LATER[2:], latest=True)() == 5
+    refused = program(cells(*RIGHT_AND_LATER), "f", latest=True).refused
+    assert refused == "the cell of its task holds another f, which would be graded: put yours there"
     assert function(*RIGHT_AND_LATER[:3], latest=True)() == 2
 
 
