@@ -172,23 +172,23 @@ def new_question(course: Path, name: str, points: int = 2) -> list[Path]:
     topic, _, function = name.partition(".")
     folder, solution = topic_folder(course, topic), solution_of(course, topic)
     require("points", points >= 1, "at least 1", points)
-    known = folder.is_dir() and solution.is_file()
-    require(
-        "name", known, f"a topic and a function; `labkit new lab {topic}` begins a topic that is not there", repr(name)
-    )
+    known = (folder / "__init__.py").is_file() and solution.is_file()
+    expected = f"a topic and a function; `labkit new lab {topic}` begins a topic that is not there"
+    require("name", known, expected, repr(name))
     fits = re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", function) and not keyword.iskeyword(function)
     require("name", fits, "lower-case letters, digits and single underscores behind the dot", repr(name))
-    notebook, shared = read(solution), folder / "__init__.py"
+    notebook, module = read(solution), folder / f"{function}.py"
     graded = [cell.metadata.nbgrader.grade_id for cell in notebook.cells if "nbgrader" in cell.metadata]
     cells = "\n".join([cell.source for cell in notebook.cells if cell.cell_type == "code"] + graded)
-    for path, text in ((solution, cells), (shared, shared.read_text()), (folder / f"{function}.py", "")):
-        taken = path.exists() if not text else is_used(function, text)
-        require("name", not taken, f"a name that {path.relative_to(course)} does not have already", repr(name))
+    shared = (folder / "__init__.py").read_text()
+    free = not (module.exists() or is_used(function, cells) or is_used(function, shared))
+    expected = f"a name that neither the questions of {topic} nor the cells of its solution have already"
+    require("name", free, expected, repr(name))
     answers = course / "tests" / "alternatives" / f"t{topic}.py"
     right = answers.read_text() if answers.exists() else filled(NO_ALTERNATIVES, topic)
     add_task(notebook, topic, function, points)
     files = {
-        folder / f"{function}.py": filled(QUESTION, topic, function, points=points).encode(),
+        module: filled(QUESTION, topic, function, points=points).encode(),
         answers: (right + filled(ALTERNATIVES, topic, function)).encode(),
         solution: to_bytes(tidy(notebook)),
     }
@@ -215,7 +215,7 @@ def new_lab(course: Path, topic: str) -> list[Path]:
     course = checkout(course)
     require("topic", re.fullmatch(r"\d\d(_[a-z0-9]+)+", topic), "two digits, _ and a name: 10_instances", repr(topic))
     there = {path.parent.name for path in course.glob("solutions/*/*.ipynb")}
-    there |= {path.name.removeprefix("t") for path in topic_folder(course, topic).parent.glob("t*")}
+    there |= {path.parent.name.removeprefix("t") for path in course.glob("labkit/course/topics/t*/__init__.py")}
     taken = sorted(other for other in there if other[:2] == topic[:2])
     require("topic", not taken, f"a number that is free, not that of {', '.join(taken)}", repr(topic))
     readme = course / "README.md"
