@@ -11,13 +11,14 @@ from jaxtyping import Bool
 
 from labkit.apps import degrade, trials
 from labkit.apps.evaluation import lift_anew
+from labkit.apps.trials import FIRST_SEED, SIZE
 from labkit.frame import RGBDFrame
 from labkit.labels import OBSTACLE, TARGET
 from labkit.metrics import wilson_interval
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.validation import require
 
-FIRST_SEED, SCENES, SIZE = 600_000, 60, (320, 240)
+SCENES = 60
 
 # How a mask is spoilt: the strengths tried, weakest first, and a function of mask, strength and generator.
 KINDS: dict[str, tuple[tuple[float, ...], Callable]] = {

@@ -13,6 +13,7 @@ from jaxtyping import UInt8
 
 from labkit.apps import trials
 from labkit.apps.evaluation import lift_anew
+from labkit.apps.trials import FIRST_SEED, SIZE
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, SURFACE, TARGET
 from labkit.learning.engines import open_engine, segment_like_cpp
@@ -21,7 +22,7 @@ from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.stacks import regions
 from labkit.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
 
-FIRST_SEED, SCENES, SIZE = 600_000, 40, (320, 240)
+SCENES = 40
 TRAINING_SEEDS = range(630_000, 630_024)  # what the classical methods are fitted to, and the small FCN is trained on
 STEPS = 1000  # of the small FCN's training
 K = 6  # regions of k-means

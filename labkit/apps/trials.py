@@ -11,6 +11,8 @@ from tqdm.auto import tqdm
 from labkit.support.executors import executor_for
 from labkit.support.files import write_atomically
 
+FIRST_SEED, SIZE = 600_000, (320, 240)  # of the scenes that both studies look at, and of their pictures
+
 
 def in_order(function: Callable, items: Iterable, workers: int = 1, dask: str | None = None) -> Iterator:
     """Yield function(item) for each item, in their order; where they run says `executor_for`."""

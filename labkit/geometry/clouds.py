@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
+from labkit.geometry.projection import Scalar
 from labkit.support.validation import check_finite, check_points, check_shape, check_whole, require
-
-Scalar = int | float | np.integer | np.floating
 
 
 def centroid_and_covariance(

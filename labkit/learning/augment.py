@@ -84,6 +84,20 @@ def random_colour(x: Float[torch.Tensor, "N 3 H W"], draws: Draws) -> Float[torc
     return torch.einsum("ncd,ndhw->nchw", A, x) + b[..., None, None]
 
 
+def random_hue(x: Float[torch.Tensor, "N 3 H W"], draws: Draws) -> Float[torch.Tensor, "N 3 H W"]:
+    """Swap the colours of some images, take them from some, and the whole picture from a few."""
+    whole = torch.rand(draws.whole, generator=draws.generator).tolist()
+    orders = [torch.randperm(3, generator=draws.generator) if share < 0.3 else None for share in whole]
+    for i, (share, order) in enumerate(zip(whole[draws.rows], orders[draws.rows], strict=True)):
+        if order is not None:
+            x[i] = x[i][order]
+        elif share < 0.4:
+            x[i] = x[i].mean(dim=0, keepdim=True)
+        elif share < 0.46:
+            x[i] = 0.5
+    return x
+
+
 def random_sharpness(x: Float[torch.Tensor, "N 3 H W"], draws: Draws) -> Float[torch.Tensor, "N 3 H W"]:
     """Blur some images and sharpen others a little: towards their 3x3 mean, or away from it; half stay as they are."""
     amount = draws.uniform(-0.4, 0.8) * (draws.uniform(0.0, 1.0) < 0.5)

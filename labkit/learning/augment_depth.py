@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import IGNORE, OBSTACLE, TARGET
-from labkit.learning.augment import Draws, random_colour, random_noise, random_sharpness
+from labkit.learning.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
 from labkit.learning.channels import geometry_channels, mirrored
 
 
@@ -147,20 +147,6 @@ def random_size(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     T = frame.T_base_cam.copy()
     T[:3, 3] = factor * (T[:3, 3] - (0.0, 0.0, frame.table_z or 0.0))
     return replace(frame, T_base_cam=T, depth=frame.depth * np.float32(factor), table_z=0.0)
-
-
-def random_hue(x: Float[torch.Tensor, "N 3 H W"], draws: Draws) -> Float[torch.Tensor, "N 3 H W"]:
-    """Swap the colours of some images, take them from some, and the whole picture from a few."""
-    whole = torch.rand(draws.whole, generator=draws.generator).tolist()
-    orders = [torch.randperm(3, generator=draws.generator) if share < 0.3 else None for share in whole]
-    for i, (share, order) in enumerate(zip(whole[draws.rows], orders[draws.rows], strict=True)):
-        if order is not None:
-            x[i] = x[i][order]
-        elif share < 0.4:
-            x[i] = x[i].mean(dim=0, keepdim=True)
-        elif share < 0.46:
-            x[i] = 0.5
-    return x
 
 
 def augment_frames(
