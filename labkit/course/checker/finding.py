@@ -12,8 +12,15 @@ from dataclasses import asdict, dataclass
 MOST_FINDINGS = 8
 MOST_SPANS = 6
 WATCHES = ("overflow", "division", "no number", "wraps", "writes")
-# Kinds of repairs. Of those that change as much the first is told: learnt from answers of students with their thoughts.
+# Kinds of repairs. Of those that change as much the first is told: what a copy mends nothing else explains, and where
+# a part can go, any other change of it is right by accident; the rest is learnt from answers of students.
 REPAIRS = (
+    "copy",
+    "line too many",
+    "too much",
+    "condition",
+    "option",
+    "call too many",
     "comparison",
     "operator",
     "axis",
@@ -26,19 +33,15 @@ REPAIRS = (
     "constant",
     "slice",
     "type",
-    "option",
     "function",
     "transpose",
-    "condition",
     "branch",
     "cast",
     "index",
     "size",
-    "line too many",
     "lines exchanged",
     "moved",
     "names exchanged",
-    "copy",
     "factor",
     "power",
     "logarithm",
@@ -57,8 +60,6 @@ REPAIRS = (
     "period",
     "index missing",
     "index too many",
-    "call too many",
-    "too much",
 )
 
 

@@ -12,7 +12,7 @@ import ast
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from labkit.course.checker.finding import Span
 
@@ -123,7 +123,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a node is replaced. key: the same for recipes that do the same to other nodes; cost: nodes that change."""
+    """How a node is replaced. key: the same for those that do the same to other nodes; cost: nodes that change."""
 
     kind: str
     key: str
@@ -214,7 +214,7 @@ def expressions(root: ast.AST) -> Iterator[Place]:
 def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
     """Recipes at single places, at each occurrence of an expression, and in parallel lines."""
     places = list(expressions(function))
-    recipes = {place: {r.key: r for r in recipes_for(place, scope)} for place in places}
+    recipes = {place: {(r.kind, r.key): r for r in recipes_for(place, scope)} for place in places}
     for place in places:
         for recipe in recipes[place].values():
             yield at([place], [recipe])
@@ -308,8 +308,13 @@ def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
     if isinstance(node, ast.Slice):
         yield from slices(node)
         return
+    if isinstance(parent, ast.Subscript) and isinstance(parent.ctx, ast.Store) and node is parent.value:
+        yield from names(node, scope)  # x in x[i] = 1: written to anything else, the line would do nothing
+        return
+    option = parent.arg if isinstance(parent, ast.keyword) and parent.arg in ("axis", "keepdims") else ""
     for family in (operators, comparisons, conditions, calls, constants, names, attributes, subscripts, branches):
-        yield from family(node, scope)
+        for recipe in family(node, scope):
+            yield replace(recipe, kind=option) if option else recipe
     if isinstance(node, ast.Constant | ast.Tuple | ast.List | ast.Starred | ast.Lambda):
         return
     if isinstance(parent, ast.keyword) and parent.arg in ("dtype", "axis", "mode"):
@@ -519,7 +524,7 @@ def constants(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
         if other != repr(value):
             number = float(other) if other in ("nan", "inf") else ast.literal_eval(other)
             make = lambda n, number=number: ast.copy_location(ast.Constant(number), n)  # noqa: E731
-            yield Recipe("constant", other, 1, make)
+            yield Recipe("option" if isinstance(value, str) else "constant", other, 1, make)
 
 
 STRINGS = (
@@ -689,7 +694,7 @@ def of_block(place: Place) -> Iterator[Mutation]:
 
     for i, statement in enumerate(block):
         if len(block) > 1 and not is_docstring(statement):
-            yield mutation("line too many", 1.5, lambda b, i=i: b[:i] + b[i + 1 :], statement)
+            yield mutation("line too many", 1, lambda b, i=i: b[:i] + b[i + 1 :], statement)
         if i + 1 < len(block):
             swapped = lambda b, i=i: [*b[:i], b[i + 1], b[i], *b[i + 2 :]]  # noqa: E731
             yield mutation("lines exchanged", 2, swapped, statement, block[i + 1])
