@@ -95,14 +95,21 @@ def plain(got: object) -> object:
 
 
 def array_of_list(got: list) -> np.ndarray | None:
-    """The array that a list of numbers stands for; None if its rows differ in length, or hold anything else."""
-    waiting = [got]
+    """The array that a list of numbers stands for; None if its rows differ in length, or hold anything else.
+
+    Truth values beside numbers are outputs of several kinds, and no array.
+    """
+    waiting, truths = [got], set()
     while waiting:
         for part in waiting.pop():
             if issubclass(type(part), list):
                 waiting.append(part)
             elif not issubclass(type(part), bool | int | float | np.generic | np.ndarray):
                 return None
+            else:
+                truths.add(np.asarray(part).dtype.kind == "b")
+    if len(truths) > 1:
+        return None
     try:
         array = np.array(got)
     except (ValueError, OverflowError):
