@@ -83,7 +83,7 @@ CASES = [
            "      returns   [[0.25, 0.75]]\n      expected  [[0.98127, 1.4813]]\n  Hint: Do all of them sum to one?"),
     (transposed, "✘ share: expected shape (1, 2), got (2, 1)\n" + HERE +
            "      returns   [[0.25], [0.75]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Look at line 2:  return right(n).T\n"  "PLACEHOLDER"),
+           "  Hint: No case is right. Do the one above by hand, and print what each of your lines gives."),
     (lambda n: n + 9, "✘ share: 2 of 2 values are not right\n" + HERE +
            "      returns   [[10, 12]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: A right answer has a property that yours lacks: shares are not over two."),

@@ -69,6 +69,8 @@ def kind(answer, question=QUESTION):
         lambda n: torch.from_numpy(iou(n)).float().requires_grad_(True),
         lambda n: np.ma.masked_array(iou(n)),
         lambda n: np.asfortranarray(iou(n)),
+        lambda n: iou(n).tolist(),
+        lambda n: list(iou(n)),
         lambda n: iou(n) + 1e-7,
     ],
 )
@@ -80,17 +82,26 @@ def test_right_answers_pass_in_any_real_array(answer):
 @pytest.mark.parametrize(
     "expected, right, wrong",
     [
-        (np.array([1, 2]), (np.array([1, 2], np.uint8), torch.tensor([1, 2])), (np.array([1.0, 2.0]),)),
+        (
+            np.array([1, 2]),
+            (np.array([1, 2], np.uint8), torch.tensor([1, 2]), np.array([1.0, 2.0])),
+            (np.array([1.0, 2.5]),),
+        ),
         (np.array([True, False]), (torch.tensor([True, False]),), (np.array([1, 0]), np.array([1.0, 0.0]))),
         (np.array([1.0, 2.0]), (np.array([1, 2]), np.array([1, 2], np.float16)), (np.array([True, True]),)),
-        (np.int64(3), (3, np.uint8(3), np.array(3), torch.tensor(3)), (3.0, True)),
+        (np.int64(3), (3, np.uint8(3), np.array(3), torch.tensor(3), 3.0), (3.5, np.nan, True)),
         (np.float64(3), (3, 3.0, np.float32(3), torch.tensor(3.0)), (True, 3 + 0j, "3", Fraction(3))),
         (np.bool_(True), (True, np.True_), (1, 1.0)),
-        ((np.float64(1), np.ones(2)), ((1.0, np.ones(2)), [1, torch.ones(2)]), ((1.0, np.ones(2) + 0j),)),
+        ((np.bool_(True), np.int64(2)), ((True, 2), [True, 2.0], [np.True_, np.int64(2)]), ([1, 2],)),
+        (
+            (np.float64(1), np.ones(2)),
+            ((1.0, np.ones(2)), [1, torch.ones(2)], [1, np.ones(2)]),
+            ((1.0, np.ones(2) + 0j),),
+        ),
     ],
 )
 def test_dtypes(expected, right, wrong):
-    """Real numbers come in any real dtype; integers are integers; truth values are truth values."""
+    """Real numbers come in any real dtype; integers may be whole floats; truth values are truth values."""
     for got in right:
         assert compare(PLAIN, expected, got) is None
     for got in wrong:
@@ -166,8 +177,9 @@ def itself(n):
         (lambda n: "right", "kind", "got str"),
         (lambda n: (x for x in iou(n)), "kind", "got generator"),
         (lambda n: Odd(), "kind", "got Odd"),
-        (lambda n: [0.5] * 1000, "kind", "got a list of 1000"),
-        (lambda n: iou(n).tolist(), "kind", "expected one array or number, got a tuple or list of 2"),
+        (lambda n: (0.5,) * 1000, "kind", "got a tuple of 1000"),
+        (lambda n: [0.5] * 1000, "shape", "expected shape (2,), got (1000,)"),
+        (lambda n: [[0.5], [0.5, 0.5]], "kind", "expected an array or a number, got list"),
         (lambda n: (iou(n), iou(n)), "kind", "got a tuple or list of 2"),
         (lambda n: iou(n) + 0j, "dtype", "got dtype complex128"),
         (lambda n: iou(n).astype(object), "dtype", "got dtype object"),
@@ -195,6 +207,7 @@ def test_each_kind_of_problem_is_said(answer, expected_kind, says):
 def test_tuples_are_judged_part_by_part():
     both = Question(name="00_test.both", reference=lambda x: (x.sum(), x.mean(0)), inputs=lambda r: (r.random((3, 2)),))
     assert kind(lambda x: (x.sum(), x.mean(0)), both) is None
+    assert kind(lambda x: x.sum(axis=0), replace(both, reference=lambda x: tuple(x.sum(axis=0)))) is None
     assert problem(lambda x: x.sum(), both).says == "expected a tuple of 2, got one array or number"
     assert problem(lambda x: (x.sum(), x.mean(0), 1), both).kind == "length"
     assert problem(lambda x: (x.sum(), x.mean(1)), both).says == "output 2 of 2: expected shape (2,), got (3,)"
