@@ -88,7 +88,7 @@ def written(folder: str, end: str) -> list[str]:
 def modules() -> list[str]:
     """Every module of labkit that says what it is and that a reader of the reference may want."""
     found = [info.name for info in pkgutil.walk_packages(labkit.__path__, "labkit.")]
-    hidden = re.compile(r"_kernels$|labkit\.course\.(topics|grading|explorers|jupyter)\b|\.ros2_types$|\._")
+    hidden = re.compile(r"_kernels$|labkit\.course\.(checker|topics|grading|explorers|jupyter)\b|\.ros2_types$|\._")
     return ["data_gen", *(name for name in sorted(found) if not hidden.search(name))]
 
 

@@ -180,12 +180,12 @@ def new_question(course: Path, name: str, points: int = 2) -> list[Path]:
     notebook, module = read(solution), folder / f"{function}.py"
     graded = [cell.metadata.nbgrader.grade_id for cell in notebook.cells if "nbgrader" in cell.metadata]
     cells = "\n".join([cell.source for cell in notebook.cells if cell.cell_type == "code"] + graded)
-    shared = (folder / "__init__.py").read_text()
+    shared = (folder / "__init__.py").read_text(encoding="utf-8")
     free = not (module.exists() or is_used(function, cells) or is_used(function, shared))
     expected = f"a name that neither the questions of {topic} nor the cells of its solution have already"
     require("name", free, expected, repr(name))
     answers = course / "tests" / "alternatives" / f"t{topic}.py"
-    right = answers.read_text() if answers.exists() else filled(NO_ALTERNATIVES, topic)
+    right = answers.read_text(encoding="utf-8") if answers.exists() else filled(NO_ALTERNATIVES, topic)
     add_task(notebook, topic, function, points)
     files = {
         module: filled(QUESTION, topic, function, points=points).encode(),
@@ -219,7 +219,7 @@ def new_lab(course: Path, topic: str) -> list[Path]:
     taken = sorted(other for other in there if other[:2] == topic[:2])
     require("topic", not taken, f"a number that is free, not that of {', '.join(taken)}", repr(topic))
     readme = course / "README.md"
-    table, link, rest = readme.read_text().rpartition("](labs/")
+    table, link, rest = readme.read_text(encoding="utf-8").rpartition("](labs/")
     last, line_end, rest = rest.partition("\n")
     files = {
         topic_folder(course, topic) / "__init__.py": filled(TOPIC, topic).encode(),
@@ -234,10 +234,10 @@ def left_to_do(course: Path) -> list[str]:
     found = []
     for pattern in ("labkit/course/topics/t*/*.py", "tests/alternatives/t*.py", "README.md"):
         for path in sorted(course.glob(pattern)):
-            for number, line in enumerate(path.read_text().splitlines(), start=1):
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
                 found += [f"{path.relative_to(course)}:{number}: {todo}" for todo in todos(line)]
     for path in sorted(course.glob("solutions/*/*.ipynb")):
-        for cell in json.loads(path.read_text())["cells"]:
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
             place = f"{path.relative_to(course)}, cell {cell['id']}"
             found += [f"{place}: {todo}" for line in "".join(cell["source"]).splitlines() for todo in todos(line)]
     return found
