@@ -1,4 +1,4 @@
-"""Submissions as students hand them in. honest.txt holds kinds of honest ones, of 04_iou.iou; `honest` reads it."""
+"""Submissions as students hand them in: kinds of honest ones to 04_iou.iou in honest.txt, to other tasks in labs.txt."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,10 +35,15 @@ def code(source: str, grade_id: str = "") -> dict:
     return {"cell_type": "code", "metadata": mark, "source": source, "outputs": [], "execution_count": None}
 
 
-def honest() -> list[Honest]:
-    """Read honest.txt: "=== NAME | REFUSED WORDS" begins a submission, "--- GRADE ID" a cell."""
+def in_other_labs() -> list[Honest]:
+    """The submissions of labs.txt, whose names begin with their question: "02_crf.energy: async"."""
+    return [Honest(one.name, (*OWN["setup"], *one.cells), one.refused) for one in honest("labs.txt")]
+
+
+def honest(file: str = "honest.txt") -> list[Honest]:
+    """Read a file: "=== NAME | REFUSED WORDS" begins a submission, "--- GRADE ID" a cell."""
     found = []
-    for text in ("\n" + Path(__file__).with_name("honest.txt").read_text()).split("\n=== ")[1:]:
+    for text in ("\n" + Path(__file__).with_name(file).read_text()).split("\n=== ")[1:]:
         head, *cells = (
             text.split("\n--- ") if "\n---\n" not in text else text.replace("\n---\n", "\n--- \n").split("\n--- ")
         )
