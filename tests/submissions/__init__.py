@@ -1,4 +1,4 @@
-"""Submissions as students hand them in: kinds of honest ones to 04_iou.iou in honest.txt, to other tasks in labs.txt."""
+"""Submissions as students hand them in: honest ones to 04_iou.iou in honest.txt, to other tasks in labs.txt."""
 
 from dataclasses import dataclass
 from pathlib import Path
