@@ -171,7 +171,7 @@ def views_of(question: Question, cases: Sequence[Case], outputs: Sequence[object
 def outputs_exchanged(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
     """Two outputs exchanged, one in the place of another, or another number of outputs than is asked for."""
     pairs = [(case, got) for case, got in zip(cases, outputs, strict=True) if not isinstance(got, Problem)]
-    asked, came = ({len(parts(output)) for output in column} for column in zip(*pairs, strict=True))
+    asked, came = {len(parts(case.expected)) for case, _ in pairs}, {len(parts(got)) for _, got in pairs}
     if len(asked) != 1 or len(came) != 1:
         return
     (count,), (given,) = asked, came
