@@ -536,8 +536,8 @@ STRINGS = (
     ("left", "right"),
 )
 STRINGS += (("little", "big"), ("edge", "constant", "reflect", "symmetric", "wrap"), ("<", ">", "="))
-TYPES = ("int", "float", "bool", "np.uint8", "np.uint16", "np.uint32", "np.int16", "np.int32", "np.int64", "np.float32")
-TYPES += ("np.float64", "complex")
+TYPES = ("int", "float", "bool", "complex", "np.uint8", "np.uint16", "np.uint32", "np.int8", "np.int16", "np.int32")
+TYPES += ("np.int64", "np.float16", "np.float32", "np.float64")
 
 
 def names(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
