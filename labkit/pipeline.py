@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
 from labkit.labels import IGNORE, TARGET
 from labkit.learning.engines import open_engine
 from labkit.learning.inference import FunctionEngine, check_probabilities
+from labkit.notices import notices
 from labkit.support.validation import (
     check_finite,
     check_height,
@@ -34,13 +35,16 @@ WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
 class Perception:
     """What a robot knows after one frame.
 
-    labels: uint8 (H, W). probabilities: (H, W, C) in 0..1, or None where labels came without. points: every pixel in
-    the base frame, (H, W, 3), metres, NaN without depth. pixels: the pixels of each target, indices v * W + u, the
-    largest target first. clouds: their points, an (N, 3) for each target. scene: all points of the workspace, (M, 3).
-    certainty: for each target the mean probability of its class over its pixels, 1 without probabilities. plan: the
-    grasps ranked by their score times that certainty, or the reason why there is none. seconds: time spent by stage.
+    frame: what was looked at, with the table's height that counts. target_class: what was looked for. labels: uint8
+    (H, W). probabilities: (H, W, C) in 0..1, or None where labels came without. points: every pixel in the base frame,
+    (H, W, 3), metres, NaN without depth. pixels: the pixels of each target, indices v * W + u, the largest target
+    first. clouds: their points, an (N, 3) for each target. scene: all points of the workspace, (M, 3). certainty: for
+    each target the mean probability of its class over its pixels, 1 without probabilities. plan: the grasps ranked by
+    their score times that certainty, or the reason why there is none. seconds: time spent by stage.
     """
 
+    frame: RGBDFrame
+    target_class: int
     labels: UInt8[np.ndarray, "H W"]
     probabilities: Float[np.ndarray, "H W C"] | None
     points: Float[np.ndarray, "H W 3"]
@@ -50,6 +54,11 @@ class Perception:
     certainty: tuple[float, ...]
     plan: GraspPlan
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def notices(self) -> tuple[str, ...]:
+        """What looks wrong about this frame or what was found in it, in sentences; none if all is as it should be."""
+        return notices(self.frame, self)
 
     def __repr__(self) -> str:
         targets = f"clouds of {', '.join(str(len(cloud)) for cloud in self.clouds) or 'no'} points"
@@ -177,7 +186,8 @@ class Pipeline:
                 of_target = probabilities[..., self.target_class].reshape(-1)
                 certainty = tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
             plan = rank(plan, certainty)
-        return Perception(labels, probabilities, points, pixels, clouds, scene, certainty, plan, seconds)
+        known = labels, probabilities, points, pixels, clouds, scene, certainty, plan, seconds
+        return Perception(frame, self.target_class, *known)
 
     def targets(
         self, labels: UInt8[np.ndarray, "H W"], points: Float[np.ndarray, "H W 3"], table_z: float

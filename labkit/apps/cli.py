@@ -236,11 +236,13 @@ def perceive(
     if plane is not None and camera_pose is not None:
         raise ValueError("plane: expected either --plane auto or --camera-pose, got both")
     T_base_cam = Settings(camera_pose=camera_pose).T_base_cam()
-    frame = own.read_frame(color, depth, own.read_intrinsics(intrinsics), depth_scale)
+    camera = own.read_intrinsics(intrinsics)
+    frame = own.read_frame(color, depth, camera, depth_scale)
+    known = {"T_base_cam": T_base_cam, "table_z": table_z, "distortion": camera.distortion}
     if mask is None:
-        seen = own.perceive(frame, load_model(weights_path(model)), T_base_cam=T_base_cam, table_z=table_z)
+        seen = own.perceive(frame, load_model(weights_path(model)), **known)
     else:
-        seen = own.perceive(frame, labels=own.read_mask(mask, frame.size), T_base_cam=T_base_cam, table_z=table_z)
+        seen = own.perceive(frame, labels=own.read_mask(mask, frame.size), **known)
     typer.echo(own.describe(seen))
     for path in own.save(seen, out):
         typer.echo(f"wrote {path}")

@@ -21,6 +21,7 @@ from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import Plane, back_project, fit_plane, invert_transform
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
+from labkit.notices import notices
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
@@ -39,10 +40,15 @@ NEAR = 0.45  # metres around the targets that the view shows
 
 @dataclass(frozen=True, eq=False)
 class Intrinsics:
-    """A camera's matrix K, (3, 3), and its depth unit in metres, if the file says it."""
+    """A camera's matrix K, (3, 3), and if the file says them its depth unit in metres, size and lens coefficients.
+
+    size: width and height of the pictures that it is the camera of.
+    """
 
     K: Float[np.ndarray, "3 3"]
     depth_scale: float | None = None
+    size: tuple[int, int] | None = None
+    distortion: tuple[float, ...] = ()
 
 
 def read_intrinsics(text: str) -> Intrinsics:
@@ -67,6 +73,12 @@ def read_intrinsics(text: str) -> Intrinsics:
     except json.JSONDecodeError:
         yaml = re.search(r"camera_matrix:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
         numbers = numbers_of(yaml[1] if yaml else content)
+        distortion = re.search(r"distortion_coefficients:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
+        sides = dict(re.findall(r"^image_(width|height):\s*(\d+)", content, re.MULTILINE))
+        facts = {
+            "size": (int(sides["width"]), int(sides["height"])) if len(sides) == 2 else None,
+            "distortion": tuple(numbers_of(distortion[1])) if distortion else (),
+        }
     except (AttributeError, KeyError, TypeError, ValueError):
         numbers = []
     if len(numbers) not in (4, 9):
@@ -74,7 +86,7 @@ def read_intrinsics(text: str) -> Intrinsics:
             f"intrinsics: found no camera matrix in {path}; expected fx, fy, cx, cy (or ppx, ppy), cam_K, "
             "intrinsic_matrix, camera_matrix, or four or nine numbers"
         )
-    return Intrinsics(_matrix(numbers))
+    return Intrinsics(_matrix(numbers), **facts)
 
 
 def _matrix(numbers: list[float]) -> Float[np.ndarray, "3 3"]:
@@ -96,7 +108,9 @@ def _from_json(facts: dict) -> Intrinsics:
     else:
         cx, cy = (facts[new] if new in facts else facts[old] for new, old in (("cx", "ppx"), ("cy", "ppy")))
         K = _matrix([float(value) for value in (facts["fx"], facts["fy"], cx, cy)])
-    return Intrinsics(K, None if scale is None else 0.001 * float(scale))
+    size = (int(facts["width"]), int(facts["height"])) if {"width", "height"} <= facts.keys() else None
+    distortion = tuple(float(k) for k in facts.get("coeffs", ()))
+    return Intrinsics(K, None if scale is None else 0.001 * float(scale), size, distortion)
 
 
 def read_mask(path, size: tuple[int, int]) -> np.ndarray:
@@ -129,6 +143,12 @@ def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None =
     if raw.shape != rgb.shape[:2]:
         sizes = " and ".join(f"{w} x {h}" for h, w in (rgb.shape[:2], raw.shape))
         raise ValueError(f"depth: expected the size of the colour picture, got {sizes}; align depth to colour first")
+    size = rgb.shape[1::-1]
+    if intrinsics.size not in (None, size):
+        raise ValueError(
+            f"intrinsics: expected a calibration of pictures of {size[0]} x {size[1]}, got one of "
+            f"{intrinsics.size[0]} x {intrinsics.size[1]}"
+        )
     metres = raw.astype(np.float32) * np.float32(scale)
     seen = metres[raw > 0]
     if not seen.size:
@@ -175,19 +195,21 @@ def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A frame in the base frame, what was perceived in it, and the table's plane if it was fitted."""
+    """A frame in the base frame, what was perceived in it, what looks wrong, and the table's plane if it was fitted."""
 
     frame: RGBDFrame
     perception: Perception
+    notices: tuple[str, ...] = ()
     plane: Plane | None = None
 
 
-def perceive(frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z: float = 0.0) -> Seen:
+def perceive(frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z: float = 0.0, distortion=()) -> Seen:
     """Run the chain on a frame that is given in the camera's own frame.
 
     model: a network, or None with `labels`, somebody else's. T_base_cam: the camera's pose; without it the largest
     plane of the depth picture is taken for the table, and `table_z` for 0. All that was seen over the table is the
-    workspace. Raises ValueError if no plane can be found. Topics 06 and 07.
+    workspace. distortion: the lens's coefficients, which are not undone, but noticed. Raises ValueError if no plane can
+    be found. Topics 06 and 07.
     """
     plane = None
     if T_base_cam is None:
@@ -195,12 +217,13 @@ def perceive(frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z
     else:
         frame = replace(frame, T_base_cam=T_base_cam, table_z=table_z)
     pipeline = Pipeline(model, workspace=WORKSPACE)
-    return Seen(frame, pipeline.run(frame) if labels is None else pipeline.locate(frame, labels), plane)
+    perception = pipeline.run(frame) if labels is None else pipeline.locate(frame, labels)
+    return Seen(frame, perception, notices(frame, perception, distortion), plane)
 
 
 def describe(seen: Seen) -> str:
-    """Say what was found, in lines for a terminal: the table, each target, where and how wide to close."""
-    p, lines = seen.perception, []
+    """Say what was found, in lines for a terminal: what looks wrong, the table, each target, how to grasp."""
+    p, lines = seen.perception, [f"notice: {sentence}" for sentence in seen.notices]
     if seen.plane is not None:
         height = seen.frame.T_base_cam[2, 3]
         tilt = np.degrees(np.arcsin(np.clip(-seen.frame.T_base_cam[2, 2], -1.0, 1.0)))
@@ -233,6 +256,7 @@ def grasps_json(seen: Seen) -> dict:
         "T_base_cam": seen.frame.T_base_cam.tolist(),
         "table_z": seen.frame.table_z,
         "reason": p.plan.reason,
+        "notices": list(seen.notices),
         "targets": [
             {"points": len(cloud), "centroid": cloud.mean(axis=0, dtype=np.float64).tolist(), "certainty": certainty}
             for cloud, certainty in zip(p.clouds, p.certainty, strict=True)

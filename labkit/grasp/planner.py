@@ -77,7 +77,8 @@ class Gripper:
             value = getattr(self, field.name)
             fits = np.ndim(value) == 0 and 0.0 <= value < 1.0 and (value > 0.0 or field.name == "tips_below_grasp")
             require(field.name, fits, "metres above 0 and below 1", f"{value}; multiply millimetres by 0.001")
-        for smaller, larger in (("tip_thickness", "root_thickness"), ("pad_width", "finger_width")):
+        at_most = {"tip_thickness": "root_thickness", "pad_width": "finger_width", "root_above_tips": "palm_above_tips"}
+        for smaller, larger in at_most.items():
             value, most = getattr(self, smaller), getattr(self, larger)
             require(smaller, value <= most, f"at most {larger}, {most}", value)
 

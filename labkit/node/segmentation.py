@@ -109,6 +109,7 @@ class SegmentationNode:
         self._news = threading.Condition()
         transport.on_restart(self.restart)
         self._distortion_said = False
+        self._notices, self._noticed = (), -np.inf  # of the last frame that was looked at twice, and when
         checks = {
             "rgb": (Image, lambda message: convert.check_image(message, ("rgb8", *convert.COLOUR))),
             "depth": (Image, lambda message: convert.check_image(message, convert.DEPTH)),
@@ -203,15 +204,18 @@ class SegmentationNode:
             self._fail(header, error)
             return False
         self.counts.answered += 1
-        plan = perception.plan
+        plan, now = perception.plan, time.monotonic()
+        if now - self._noticed > HEARTBEAT:  # what looks wrong seldom changes from frame to frame, and takes its time
+            self._notices, self._noticed = perception.notices, now
         self._report(
             header,
-            "answered",
+            "; ".join(["answered", *self._notices]),
             {
                 "milliseconds": f"{1000.0 * (time.monotonic() - arrived):.2f}",
                 "of these in the pipeline": f"{1000.0 * sum(perception.seconds.values()):.2f}",
                 "grasp": f"best of {len(plan.grasps)}" if plan.grasps else f"none: {plan.reason}",
             },
+            level=1 if self._notices else 0,
         )
         return True
 

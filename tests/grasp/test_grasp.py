@@ -379,7 +379,7 @@ def test_bad_arguments_are_named(changed, says):
 
 
 GRIPPERS = {"max_opening": 140, "palm_length": 0.0, "finger_width": np.nan, "tips_below_grasp": -0.01}
-GRIPPERS |= {"tip_thickness": 0.03, "pad_width": 0.03}
+GRIPPERS |= {"tip_thickness": 0.03, "pad_width": 0.03, "root_above_tips": 0.05}  # with the Panda's other measures
 
 
 @pytest.mark.bad_input

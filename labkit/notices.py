@@ -1,0 +1,136 @@
+"""What may be right but looks wrong: sentences with numbers, the same for every door (topics 06 and 08).
+
+What cannot be right is refused (`labkit.support.validation`). A calibration that does not fit its picture, a pose that
+does not fit the table, or a picture unlike the training's can be meant so; then the result stands, and this is said.
+"""
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from labkit.frame import RGBDFrame
+from labkit.geometry import back_project_to_base, fit_plane
+from labkit.labels import CLASSES, SURFACE
+
+NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
+RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
+FLAT = 0.3  # share of the points near the table's height that lie on it, at least
+FAR = 1.6  # metres at which depth cameras do not see small things any more
+SHIFT = 3  # pixels between colour and depth that go unnoticed
+REACH = 16  # pixels within which a shift is looked for
+
+
+def notices(frame: RGBDFrame, perception=None, distortion=()) -> tuple[str, ...]:
+    """Say what looks wrong about a frame, and about what was perceived in it (a `labkit.pipeline.Perception`).
+
+    distortion: the lens's coefficients, if a calibration states them. Each sentence holds its numbers; nothing is said
+    of what is as it should be.
+
+    >>> K = np.array([[9.0, 0.0, 20.0], [0.0, 9.0, 3.0], [0.0, 0.0, 1.0]])
+    >>> frame = RGBDFrame(np.zeros((6, 8, 3), np.uint8), np.zeros((6, 8), np.float32), K, np.eye(4))
+    >>> for sentence in notices(frame):
+    ...     print(sentence)
+    the principal point (20.0, 3.0) lies outside the picture of 8 x 6: is the calibration another picture's?
+    there is no depth: the picture is taken as it is, and nothing can be placed in space
+    """
+    said = [_principal_point(frame.K, frame.size)]
+    if np.any(distortion):
+        said += [f"the lens's distortion, {', '.join(f'{k:.3g}' for k in distortion)}, is not undone: rectify first"]
+    if (frame.depth > 0.0).any():
+        said += [*_table(frame, perception), _shifted(frame.rgb, frame.depth)]
+    else:
+        said += ["there is no depth: the picture is taken as it is, and nothing can be placed in space"]
+    if perception is not None:
+        said += _targets(frame, perception)
+    return tuple(sentence for sentence in said if sentence)
+
+
+def _principal_point(K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> str:
+    (cx, cy), (w, h) = K[:2, 2], size
+    where = f"the principal point ({cx:.1f}, {cy:.1f}) lies"
+    if not (0.0 <= cx <= w - 1 and 0.0 <= cy <= h - 1):
+        return f"{where} outside the picture of {w} x {h}: is the calibration another picture's?"
+    if abs(2.0 * cx / w - 1.0) > 0.4 or abs(2.0 * cy / h - 1.0) > 0.4:
+        return (
+            f"{where} far from the middle of the picture of {w} x {h}: is the calibration one of "
+            f"{round(2.0 * cx)} x {round(2.0 * cy)}?"
+        )
+    return ""
+
+
+def _table(frame: RGBDFrame, perception) -> list[str]:
+    """Compare the largest plane near the table's height with the pose, table_z and the labels."""
+    step = max(1, round(np.sqrt(frame.depth.size / 10_000)))
+    if perception is None:
+        points = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[::step, ::step].reshape(-1, 3)
+    else:
+        points = perception.points[::step, ::step].reshape(-1, 3)
+    table_z = frame.table_z or 0.0
+    near = np.abs(points[:, 2] - table_z) < NEAR  # NaN is not near
+    P = points[near]
+    if len(P) < 100:
+        return [f"only {len(P) / len(points):.0%} of the picture has depth within {NEAR} m of the table's height"]
+    try:
+        plane = fit_plane(P, tries=100, viewer=(0.0, 0.0, 1e3))
+    except ValueError:  # points on a line
+        return ["no plane fits the depth near the table's height"]
+    share, lean = plane.inliers.mean(), np.degrees(np.arccos(np.clip(plane.normal[2], -1.0, 1.0)))
+    if share < FLAT:
+        return [f"only {share:.0%} of the points near the table's height lie on one plane: is it noise, or no table?"]
+    said = []
+    rise = float(P[plane.inliers, 2].mean()) - table_z
+    if lean > LEAN or abs(rise) > RISE:
+        likely = "T_base_cam is likely wrong" if lean > LEAN else f"table_z is likely {table_z + rise:.3f} m"
+        said.append(
+            f"the table that depth shows lies {1000.0 * rise:+.0f} mm off table_z = {table_z:.3f} m and leans by "
+            f"{lean:.1f} degrees: {likely}"
+        )
+    away = float(np.median(frame.depth[::step, ::step].reshape(-1)[near][plane.inliers]))
+    if away > FAR:
+        said.append(f"the table is {away:.2f} m away: is depth in another unit (depth_scale)?")
+    if perception is not None and perception.probabilities is not None:
+        labels = perception.labels[::step, ::step].reshape(-1)[near][plane.inliers]
+        surface = np.mean(labels == SURFACE)
+        if perception.probabilities.shape[2] == len(CLASSES) and surface < 0.5:
+            said.append(
+                f"this picture is unlike the training's: {surface:.0%} of the table's pixels are called surface; depth "
+                f"is {1000.0 * plane.residual:.1f} mm off its plane (root mean square)"
+            )
+    return said
+
+
+def _shifted(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"]) -> str:
+    """Look for the shift at which jumps of depth lie on edges of colour best."""
+    step = max(1, round(rgb.shape[1] / 640))
+    smooth = cv2.GaussianBlur(rgb, (0, 0), float(step)).astype(np.float32)[::step, ::step]
+    colour = np.sqrt(sum((cv2.Sobel(smooth, cv2.CV_32F, *way) ** 2).sum(axis=2) for way in ((1, 0), (0, 1))))
+    colour = np.minimum(colour, np.percentile(colour, 97))
+    d = np.ascontiguousarray(np.nan_to_num(depth[::step, ::step]))
+    around = np.ones((3, 3), np.uint8)
+    near, far = cv2.erode(np.where(d > 0.0, d, d.max()), around), cv2.dilate(d, around)
+    jumps = (far > 1.03 * near).astype(np.float32)[REACH:-REACH, REACH:-REACH]
+    if jumps.sum() < 100:
+        return ""
+    score = cv2.matchTemplate(colour, jumps, cv2.TM_CCORR)  # [REACH, REACH] is no shift
+    score -= np.median(score)
+    dy, dx = np.array(np.unravel_index(score.argmax(), score.shape)) - REACH
+    if max(abs(dx), abs(dy)) == REACH:  # no peak, but a slope
+        return ""
+    here = score[REACH - 2 : REACH + 3, REACH - 2 : REACH + 3].max()
+    if max(abs(dx), abs(dy)) * step <= SHIFT or score.max() < 1.15 * here:
+        return ""
+    return f"depth lies ({-dx * step}, {-dy * step}) pixels off the colours: is it aligned to colour, of one moment?"
+
+
+def _targets(frame: RGBDFrame, perception) -> list[str]:
+    said = []
+    labelled = perception.labels == perception.target_class
+    blind = np.count_nonzero(labelled & ~(frame.depth > 0.0))
+    if blind > 0.5 * np.count_nonzero(labelled):
+        said.append(f"{blind} of {np.count_nonzero(labelled)} pixels labelled target have no depth")
+    w, h = frame.size
+    for number, pixels in enumerate(perception.pixels, start=1):
+        v, u = np.divmod(pixels, w)
+        if u.min() == 0 or v.min() == 0 or u.max() == w - 1 or v.max() == h - 1:
+            said.append(f"target {number} touches the picture's border: a part of it is unseen")
+    return said

@@ -1,0 +1,153 @@
+"""What looks wrong is said with its numbers, at every door; a picture that is as it should be is left in peace."""
+
+import json
+import re
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from scenes import box, scene
+from scipy.spatial.transform import Rotation
+
+from labkit.apps import own_data, perceive
+from labkit.frame import RGBDFrame
+from labkit.geometry.sensor import DepthSensor, StereoSensor
+from labkit.labels import TARGET, one_hot
+from labkit.node.actors import Camera
+from labkit.node.bus import Bus
+from labkit.node.messages import Diagnostics, Topics
+from labkit.node.segmentation import SegmentationNode
+from labkit.notices import notices
+from labkit.pipeline import Pipeline
+from labkit.sim.world import World
+
+
+@pytest.fixture(scope="module")
+def frame() -> RGBDFrame:
+    """Two boxes in the middle of a table."""
+    spec = scene(box("left", 0.5, 0.08), box("right", 0.55, -0.09, (0.04, 0.05, 0.1)))
+    with World(spec) as world:
+        return world.render()
+
+
+def moved(frame: RGBDFrame, up: float = 0.0, degrees: float = 0.0) -> RGBDFrame:
+    """The frame with a wrong pose."""
+    T = frame.T_base_cam.copy()
+    T[:3, :3] = T[:3, :3] @ Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+    T[2, 3] += up
+    return replace(frame, T_base_cam=T)
+
+
+def shifted(frame: RGBDFrame, right: int, down: int) -> RGBDFrame:
+    return replace(frame, depth=np.roll(frame.depth, (down, right), (0, 1)))
+
+
+@pytest.mark.parametrize("sensor", [None, DepthSensor(), StereoSensor()])
+def test_nothing_is_said_of_a_calibrated_picture(frame, sensor):
+    for seed in range(5):
+        seen = frame if sensor is None else sensor.apply(frame, np.random.default_rng(seed))
+        assert notices(seen) == () and Pipeline().locate(seen, frame.labels).notices == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda f: moved(f, up=0.1),
+            r"lies \+100 mm off table_z = 0\.000 m .* leans by 0\.0 .*table_z is likely 0\.100",
+        ),
+        (lambda f: moved(f, up=-0.02), r"lies -20 mm off table_z .* table_z is likely -0\.020 m"),
+        (lambda f: moved(f, degrees=10.0), r"leans by (9\.9|10\.0) degrees: T_base_cam is likely wrong"),
+        (lambda f: replace(f, table_z=0.05), r"lies -50 mm off table_z = 0\.050 m .* table_z is likely 0\.000 m"),
+        (lambda f: replace(f, depth=4.0 * f.depth), r"only \d+% of the picture has depth within 0\.25 m"),
+        (lambda f: shifted(f, 12, 0), r"depth lies \(12, 0\) pixels off the colours"),
+        (lambda f: shifted(f, 0, -5), r"depth lies \(0, -5\) pixels off the colours"),
+        (lambda f: replace(f, K=f.K + np.outer([1, 0, 0], [0, 0, 200.0])), r"outside the picture of 320 x 240"),
+        (lambda f: replace(f, K=np.diag([0.5, 0.5, 1.0]) @ f.K), r"\(80\.0, 59\.5\) lies far .*one of 160 x 119\?"),
+        (lambda f: replace(f, depth=np.zeros_like(f.depth)), r"there is no depth: the picture is taken as it is"),
+    ],
+    ids=["up", "down", "leaning", "table_z", "unit", "shift", "shift_up", "outside", "half_size", "no_depth"],
+)
+def test_what_looks_wrong_is_said_with_its_numbers(frame, change, said):
+    found = notices(change(frame))
+    assert any(re.search(said, sentence) for sentence in found), found
+
+
+def test_noise_is_no_table(frame):
+    rng = np.random.default_rng(0)
+    noise = replace(frame, depth=(frame.depth + rng.uniform(-0.15, 0.15, frame.depth.shape)).astype(np.float32))
+    assert any("lie on one plane: is it noise, or no table?" in sentence for sentence in notices(noise))
+
+
+def test_a_unit_that_puts_the_camera_far_over_its_own_table_is_noticed(frame):
+    far, _ = perceive.on_table(replace(frame, depth=3.0 * frame.depth))
+    assert any("m away: is depth in another unit (depth_scale)?" in sentence for sentence in notices(far))
+
+
+def test_a_picture_unlike_the_trainings_is_told_by_its_table(frame):
+    def model(rgb):
+        p = np.zeros((*rgb.shape[:2], 4))
+        p[..., 3] = 1.0
+        return p
+
+    (said,) = Pipeline(model).run(frame).notices
+    assert said.startswith("this picture is unlike the training's: 0% of the table's pixels are called surface")
+
+
+def test_targets_without_depth_and_targets_at_the_border_are_noticed(frame):
+    blind = replace(frame, depth=np.where(frame.labels == TARGET, np.float32(0.0), frame.depth))
+    n = np.count_nonzero(frame.labels == TARGET)
+    assert f"{n} of {n} pixels labelled target have no depth" in Pipeline().locate(blind, frame.labels).notices
+    columns = np.nonzero(frame.labels == TARGET)[1]
+    for last, touches in ((columns.max(), True), (columns.max() + 2, False)):
+        cut = np.s_[:, : last + 1]
+        part = RGBDFrame(frame.rgb[cut], frame.depth[cut], frame.K, frame.T_base_cam, table_z=frame.table_z)
+        found = Pipeline().locate(part, frame.labels[cut]).notices
+        assert any("touches the picture's border: a part of it is unseen" in each for each in found) == touches
+
+
+def test_the_same_sentence_comes_from_the_pipeline_perceive_training_and_the_node(frame, tmp_path, capsys):
+    wrong = shifted(frame, 12, 0)
+    sentence = "depth lies (12, 0) pixels off the colours: is it aligned to colour, of one moment?"
+    assert sentence in Pipeline().locate(wrong, frame.labels).notices
+
+    seen = perceive.perceive(wrong, labels=frame.labels, T_base_cam=frame.T_base_cam, distortion=(0.1, 0.0))
+    assert f"notice: {sentence}" in perceive.describe(seen).splitlines()
+    assert "notice: the lens's distortion, 0.1, 0, is not undone: rectify first" in perceive.describe(seen)
+    assert sentence in perceive.grasps_json(seen)["notices"]
+
+    depth = np.round(1000.0 * wrong.depth).astype(np.uint16)
+    for kind, image in {"color": wrong.rgb, "depth": depth, "mask": frame.labels}.items():
+        (tmp_path / kind).mkdir()
+        cv2.imwrite(str(tmp_path / kind / "a.png"), image)
+    (tmp_path / "camera.txt").write_text(" ".join(map(str, (frame.K[0, 0], frame.K[1, 1], *frame.K[:2, 2]))))
+    assert own_data.PictureFolder(tmp_path)[0].labels is not None
+    assert sentence in capsys.readouterr().err
+
+    bus, heard = Bus(), []
+    bus.subscribe(Topics().diagnostics, Diagnostics, heard.append)
+    node = SegmentationNode(Pipeline(lambda rgb: one_hot(frame.labels, 4)), bus)
+    Camera(bus).publish(wrong)
+    assert node.spin_once() and heard[-1].level == 1 and sentence in heard[-1].message
+    node = SegmentationNode(Pipeline(lambda rgb: one_hot(frame.labels, 4)), bus)
+    Camera(bus).publish(frame)
+    assert node.spin_once() and (heard[-1].level, heard[-1].message) == (0, "answered")
+
+
+def test_a_calibration_of_another_size_is_refused(frame, tmp_path):
+    cv2.imwrite(str(tmp_path / "color.png"), frame.rgb)
+    cv2.imwrite(str(tmp_path / "depth.png"), np.round(1000 * frame.depth).astype(np.uint16))
+    facts = {"fx": 600, "fy": 600, "ppx": 320, "ppy": 180, "width": 640, "height": 360, "coeffs": [0.1, -0.2, 0, 0, 0]}
+    (tmp_path / "camera.json").write_text(json.dumps(facts))
+    camera = perceive.read_intrinsics(str(tmp_path / "camera.json"))
+    assert camera.size == (640, 360) and camera.distortion == (0.1, -0.2, 0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="intrinsics: expected a calibration of pictures of 320 x 240, got one of 640"):
+        perceive.read_frame(tmp_path / "color.png", tmp_path / "depth.png", camera)
+    (tmp_path / "ros.yaml").write_text(
+        "image_height: 240\nimage_width: 320\n"
+        "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [300, 0, 160, 0, 300, 120, 0, 0, 1]\n"
+        "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0.25, 0, 0, 0, 0]\n"
+    )
+    camera = perceive.read_intrinsics(str(tmp_path / "ros.yaml"))
+    assert camera.size == (320, 240) and camera.distortion[0] == 0.25 and camera.K[0, 2] == 160.0
