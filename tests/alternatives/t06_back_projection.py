@@ -134,10 +134,10 @@ def undistort__halving(pixels, K, k):
     low, high = np.zeros(len(x)), np.ones(len(x))
     for _ in range(60):
         middle = (low + high) / 2
-        s2 = (middle[:, None] * x * 1.3) ** 2 @ np.ones(2)
-        too_far = middle * 1.3 * (1 + k[0] * s2 + k[1] * s2**2) > 1
+        s2 = (middle[:, None] * x * 1.5) ** 2 @ np.ones(2)
+        too_far = middle * 1.5 * (1 + k[0] * s2 + k[1] * s2**2) > 1
         low, high = np.where(too_far, low, middle), np.where(too_far, middle, high)
-    return c + f * x * 1.3 * high[:, None]
+    return c + f * x * 1.5 * high[:, None]
 
 
 def undistort__newton(pixels, K, k):

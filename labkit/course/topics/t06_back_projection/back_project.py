@@ -128,3 +128,15 @@ def holes_without_z_alone(depth, K):
     P = np.nan_to_num(back_project(depth, K))
     P[..., 2:] = holes(depth)
     return P
+
+
+@wrong(QUESTION, "np.meshgrid with indexing='ij' stands on its side, and reshape does not turn it: which axis is u?")
+def grid_on_its_side(depth, K):
+    u, v = (grid.reshape(depth.shape) for grid in np.meshgrid(*map(np.arange, depth.shape[::-1]), indexing="ij"))
+    q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
+    return holes(depth) * q
+
+
+@wrong(QUESTION, "An image of points is asked for, one at each pixel's place: what stands where there is no reading?")
+def list_of_points(depth, K):
+    return (holes(depth) * rays(depth.shape, K))[depth > 0.0]

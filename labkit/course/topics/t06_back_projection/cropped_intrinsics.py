@@ -77,3 +77,24 @@ def resized_first_about_centres(K, left, top, scale):
 def half_pixel_with_the_other_sign(K, left, top, scale):
     half = (1.0 - scale) / 2.0
     return with_centre(K, scale, scale * (K[0, 2] - left) + half, scale * (K[1, 2] - top) + half)
+
+
+@wrong(QUESTION, "A resize multiplies u and v: which rows of K make them, and which entry must stay 1?")
+def whole_matrix_scaled(K, left, top, scale):
+    new = cropped_intrinsics(K, left, top, scale)
+    new[2, 2] = scale
+    return new
+
+
+@wrong(QUESTION, "With twice as many pixels, how many pixels is the focal length?")
+def focal_lengths_kept(K, left, top, scale):
+    new = cropped_intrinsics(K, left, top, scale)
+    new[[0, 1], [0, 1]] = K[0, 0], K[1, 1]
+    return new
+
+
+@wrong(QUESTION, "fx and fy may differ: which entry of K is fy?")
+def one_focal_length(K, left, top, scale):
+    new = cropped_intrinsics(K, left, top, scale)
+    new[1, 1] = new[0, 0]
+    return new

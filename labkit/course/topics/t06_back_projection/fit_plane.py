@@ -16,14 +16,19 @@ def fit_plane(P, sigma):
 
 
 def _points_near_a_plane(rng):
-    """Draw points of a slanted plane, longer than wide, half of them three times as noisy as the others."""
-    N = int(rng.integers(30, 40))
+    """Draw points of a slanted plane, longer than wide, half of them three times as noisy as the others.
+
+    The normal as np.linalg.eigh gives it points down in most draws.
+    """
+    N, any_sign = int(rng.integers(30, 40)), rng.random() < 0.3
     sigma = np.where(rng.random(N) < 0.5, 0.02, 0.06) * rng.uniform(0.8, 1.2, N)
     local = rng.uniform(-0.5, 0.5, (N, 3)) * (1.0, 0.4, 0.0) + sigma[:, None] * rng.normal(size=(N, 3))
-    T = pose(rng)
-    while not 0.3 < abs(T[2, 2]) < 0.9:
+    while True:
         T = pose(rng)
-    return local @ T[:3, :3].T + T[:3, 3], sigma
+        P = local @ T[:3, :3].T + T[:3, 3]
+        points_down = np.linalg.eigh(np.cov(P.T, aweights=sigma**-2.0))[1][2, 0] < 0.0
+        if 0.3 < abs(T[2, 2]) < 0.9 and (any_sign or points_down):
+            return P, sigma
 
 
 QUESTION = Question(
@@ -131,3 +136,29 @@ def d_before_the_turn(P, sigma):
     centre = np.average(P, axis=0, weights=sigma**-2.0)
     n = np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 0]
     return up(n, centre)[0], float(n @ centre)
+
+
+@wrong(QUESTION, "In which direction do points of a plane scatter least, and in which most?")
+def largest_spread_by_its_sign(P, sigma):
+    """A level direction, whose z is 0, becomes no direction at all."""
+    centre, axes = centre_and_axes(P, sigma)
+    n = axes[:, 2] * np.sign(axes[2, 2])
+    return n, float(n @ centre)
+
+
+@wrong(QUESTION, "np.linalg.svd returns V transposed, so the directions are its rows: yours is a column.")
+def column_of_the_transposed_directions(P, sigma):
+    centre, _ = centre_and_axes(P, sigma)
+    return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][:, 2], centre)
+
+
+@wrong(QUESTION, "np.linalg.eig promises no order: is your first axis always the one of least spread?")
+def first_axis_of_eig(P, sigma):
+    centre, w = np.average(P, axis=0, weights=sigma**-2.0), 1.0 / sigma**2
+    return up(np.linalg.eig((P - centre).T * w @ (P - centre))[1][:, 0], centre)
+
+
+@wrong(QUESTION, "The weights are in your mean: are they in the squares that the plane makes least, too?")
+def scatter_without_weights(P, sigma):
+    centre = np.average(P, axis=0, weights=sigma**-2.0)
+    return up(np.linalg.eigh((P - centre).T @ (P - centre))[1][:, 0], centre)

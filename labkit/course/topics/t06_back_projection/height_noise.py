@@ -100,3 +100,14 @@ def deviations_taken_for_variances(u, v, d, K, T_base_cam, sigma_pixel, sigma_de
 def depth_along_a_unit_ray(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     length = np.linalg.norm(columns(u, v, d, K)[2])
     return np.linalg.norm(shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth / length))
+
+
+@wrong(QUESTION, "By how much does a translation change the difference of two points? Noise is a difference.")
+def translation_added(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    J = np.vstack([np.stack(columns(u, v, d, K), axis=1), np.ones(3)])
+    return np.linalg.norm(T_base_cam[2] @ J * (sigma_pixel, sigma_pixel, sigma_depth))
+
+
+@wrong(QUESTION, "That is the noise along the camera's z axis: which row of T makes heights of camera coordinates?")
+def along_the_optical_axis(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    return sigma_depth

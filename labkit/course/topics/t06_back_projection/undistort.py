@@ -11,7 +11,7 @@ def undistort(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     seen = (pixels - c) / f
     ideal = seen
-    for _ in range(30):
+    for _ in range(60):
         r2 = (ideal**2).sum(axis=1, keepdims=True)
         ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * ideal
@@ -26,9 +26,10 @@ def distort(pixels, K, k):
 
 
 def _seen_pixels(rng):
-    """Draw a camera, a lens that bends in or out, and pixels that it sees up to 35 degrees off its axis."""
-    K, k = camera(rng, 120, 160), np.array([rng.choice([-0.25, 0.3]), rng.uniform(0.04, 0.1)])
-    angle, r = rng.uniform(0.0, 2.0 * np.pi, 9), rng.uniform(0.2, 0.7, 9)
+    """Draw a camera, a lens that bends in or out, and pixels that it sees up to 42 degrees off its axis."""
+    K, k = camera(rng, 120, 160), np.array([rng.choice([-0.3, 0.4]), rng.choice([0.0, 0.1])])
+    angle, r = rng.uniform(0.0, 2.0 * np.pi, 9), rng.uniform(0.2, 0.9, 9)
+    r[:2] = 0.9
     ideal = K[:2, 2] + np.diagonal(K)[:2] * np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
     return distort(ideal, K, k), K, k
 
@@ -42,16 +43,16 @@ QUESTION = Question(
     by_hand=(
         # 0.5 (1 + 0.4 / 4 + 0.05 / 16) = 0.5515625; another root, a complex one, has a smaller real part
         (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
-        # 0.5 (1 - 0.5 / 4 + 0.07 / 16) = 0.4396875 and 0.7 (1 - 0.5 * 0.49 + 0.07 * 0.2401) = 0.5402649; guesses come
-        # near slowly here
-        (np.array([[187.9375, 0.0], [100.0, 216.10596]]), K_LARGE, np.array([-0.5, 0.07])),
-        (np.array([[3.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
-        # 0.5 (1 + 0.7 / 4 - 0.3 / 16) = 0.578125 and 0.7 (1 + 0.7 * 0.49 - 0.3 * 0.2401) = 0.889679; beyond 53 degrees
-        # this lens folds, so each has a second, larger root
-        (np.array([[215.625, 0.0], [277.9358, 0.0], [100.0, 231.25]]), K_LARGE, np.array([0.7, -0.3])),
-        # 0.9 (1 - 0.25 * 0.81) = 0.71775 and 0.5 (1 - 0.25 / 4) = 0.46875; k2 is 0, and Newton's way needs care
-        (np.array([[243.55, 0.0], [100.0, 187.5]]), K_LARGE, np.array([-0.25, 0.0])),
+        # 0.9 (1 - 0.3 * 0.81) = 0.6813 and 0.7 (1 - 0.3 * 0.49) = 0.5971; k2 is 0, guesses come near slowly, and beyond
+        # 46 degrees this lens folds, so that each pixel has a second root
+        (np.array([[236.26, 0.0], [100.0, 238.84]]), K_LARGE, np.array([-0.3, 0.0])),
+        (np.array([[2.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
+        # 0.9 (1 + 0.4 * 0.81 + 0.1 * 0.6561) = 1.250649
+        (np.array([[350.1298, 0.0], [100.0, 500.2596]]), K_LARGE, np.array([0.4, 0.1])),
+        # 0.5 (1 - 0.3 / 4 + 0.1 / 16) = 0.465625
+        (np.array([[193.125, 0.0], [100.0, 186.25]]), K_LARGE, np.array([-0.3, 0.1])),
     ),
+    random_cases=8,
     rtol=1e-6,
     atol=1e-3,  # a thousandth of a pixel, as the lab promises
     points=4,
@@ -108,7 +109,7 @@ def powers_too_low(pixels, K, k):
 def one_radius_for_all(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     seen = ideal = (pixels - c) / f
-    for _ in range(30):
+    for _ in range(60):
         r2 = (ideal**2).sum()
         ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * ideal
@@ -127,3 +128,45 @@ def k2_beside_r_squared(pixels, K, k):
 @wrong(QUESTION, "Rows have a focal length of their own: v = fy y_d + cy, and fy is the middle entry of K.")
 def one_focal_length(pixels, K, k):
     return undistort(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), k)
+
+
+@wrong(QUESTION, "A series is right for small r alone: put your pixels into the lens, do the given ones come out?")
+def by_a_series(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = (pixels - c) / f
+    r2 = (seen**2).sum(axis=1, keepdims=True)
+    return c + f * seen * (1.0 - k[0] * r2 + (3.0 * k[0] ** 2 - k[1]) * r2**2)
+
+
+for _rounds in (2, 3, 5, 10):
+
+    def too_few_rounds(pixels, K, k, rounds=_rounds):
+        f, c = np.diagonal(K)[:2], K[:2, 2]
+        seen = ideal = (pixels - c) / f
+        for _ in range(rounds):
+            r2 = (ideal**2).sum(axis=1, keepdims=True)
+            ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+        return c + f * ideal
+
+    too_few_rounds.__name__ += f"_{_rounds}"
+    wrong(QUESTION, "By how many pixels would one more round change your answer? A thousandth counts.")(too_few_rounds)
+
+
+@wrong(QUESTION, "Newton divides by the slope of what he wants to be 0: what is the derivative of k1 r^3?")
+def newton_with_a_wrong_slope(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    x = (pixels - c) / f
+    seen = r = np.linalg.norm(x, axis=1, keepdims=True)
+    for _ in range(5):
+        r = r - (r + k[0] * r**3 + k[1] * r**5 - seen) / (1.0 + 2.0 * k[0] * r + 4.0 * k[1] * r**3)
+    return c + f * x * np.where(seen > 0.0, r / np.where(seen > 0.0, seen, 1.0), 1.0)
+
+
+@wrong(QUESTION, "k2 stands beside r to the fourth: which power of r does yours have?")
+def k2_beside_r_cubed(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = ideal = (pixels - c) / f
+    for _ in range(100):
+        r = np.linalg.norm(ideal, axis=1, keepdims=True)
+        ideal = seen / (1.0 + k[0] * r**2 + k[1] * r**3)
+    return c + f * ideal

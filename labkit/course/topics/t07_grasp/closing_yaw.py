@@ -32,7 +32,7 @@ QUESTION = Question(
         (np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]),),  # long along the diagonal
         (np.array([[5.0, -2.0, 1.0], [-2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]),),
     ),
-    random_cases=6,
+    random_cases=10,
     atol=1e-4,
     points=3,
     properties=(
@@ -104,3 +104,24 @@ def variances_as_a_direction(Sigma):
 @wrong(QUESTION, "Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?")
 def smaller_of_the_two_variances(Sigma):
     return 0.0 if Sigma[0, 0] < Sigma[1, 1] else np.pi / 2
+
+
+@wrong(QUESTION, "From above one sees x and y: which rows and columns of Sigma are they?")
+def seen_from_the_side(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma[1:, 1:])[1][:, 0])
+
+
+@wrong(QUESTION, "Is the direction (1, -2) the same as (1, 2)? Only both signs together may change.")
+def signs_dropped(Sigma):
+    return yaw_of(np.abs(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]))
+
+
+@wrong(QUESTION, "Of -1 / -2 and 1 / 2, arctan sees the same quotient: which function takes both numbers?")
+def arctan_of_the_quotient(Sigma):
+    with np.errstate(divide="ignore"):
+        return 0.5 * np.arctan(2.0 * Sigma[0, 1] / (Sigma[0, 0] - Sigma[1, 1])) + np.pi / 2
+
+
+@wrong(QUESTION, "Modulo pi / 2 takes closing along x for closing along y: which turn brings an axis back to itself?")
+def modulo_a_right_angle(Sigma):
+    return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) % (np.pi / 2)

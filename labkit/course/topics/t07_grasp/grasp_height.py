@@ -13,8 +13,8 @@ def grasp_height(P, table_z, palm, tips, clearance):
 
 
 def _heights(rng):
-    """Draw a cloud of which each of the three bounds is sometimes the one that counts."""
-    P, kind = cloud(rng), rng.integers(3)
+    """Draw a cloud of which each of the three bounds is sometimes the one that counts; half lie below the base."""
+    P, kind = cloud(rng) - (0.0, 0.0, rng.choice([0.0, 1.0])), rng.integers(3)
     table_z = float(P[:, 2].min() - rng.uniform(0.01, 0.03)) if kind else float(P[:, 2].min() + 0.002)
     high = np.ptp(P[:, 2])
     palm = float(high * (0.6 if kind == 1 else 1.5))
@@ -35,7 +35,7 @@ QUESTION = Question(
         (_upright(0.375, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # only its upper part was seen
         (_upright(-0.5, -0.25), -0.5, 0.5, 0.0625, 0.03125),  # a table below the robot's base
     ),
-    random_cases=8,
+    random_cases=16,
     atol=1e-5,
     points=2,
     properties=(
@@ -81,3 +81,29 @@ def least_of_the_bounds(P, table_z, palm, tips, clearance):
 @wrong(QUESTION, "The object's top is a height in the base frame. You take how tall the object is.")
 def tallness_for_the_top(P, table_z, palm, tips, clearance):
     return max(np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong(QUESTION, "clearance is air between the tips and the table: to which of the three bounds does it belong?")
+def clearance_below_the_palm_too(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm + clearance, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong(QUESTION, "A table may stand lower than the robot's base: what lies at height 0?")
+def never_below_the_base(P, table_z, palm, tips, clearance):
+    return max(0.0, P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong(QUESTION, "All three bounds are heights of the tips: to which of yours do you add no tips?")
+def origin_without_the_palms_bound(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min() + tips, table_z + clearance + tips)
+
+
+@wrong(QUESTION, "P has x and y as well: what is the largest number in all of it?")
+def extremes_of_all_coordinates(P, table_z, palm, tips, clearance):
+    return max(P.max() - palm, P.min(), table_z + clearance) + tips
+
+
+@wrong(QUESTION, "A percentile leaves out the highest points: what does the palm meet?")
+def percentiles_for_the_ends(P, table_z, palm, tips, clearance):
+    low, high = np.percentile(P[:, 2], (2, 98))
+    return max(high - palm, low, table_z + clearance) + tips

@@ -132,3 +132,24 @@ def position_of_the_inverse(position, approach, closing):
     T = grasp_pose(position, approach, closing)
     T[:3, 3] = -T[:3, :3].T @ position
     return T
+
+
+@wrong(QUESTION, "T times (0, 0, 0, 1) is the grasp's origin: does it pick a row of T, or a column?")
+def position_in_the_last_row(position, approach, closing):
+    T = grasp_pose(position, approach, closing)
+    T[:3, 3], T[3, :3] = 0.0, position
+    return T
+
+
+@wrong(
+    QUESTION, "Leaving out z suits a hand from above alone: take off what lies along the approach, wherever it points."
+)
+def closing_made_level_and_x_a_unit(position, approach, closing):
+    y, z = unit(closing * (1.0, 1.0, 0.0)), unit(approach)
+    return pose(unit(np.cross(y, z)), y, z, position)
+
+
+@wrong(QUESTION, "How long is the approach that you are given, and how long must z be?")
+def approach_left_long(position, approach, closing):
+    y = unit(closing - (closing @ approach) / (approach @ approach) * approach)
+    return pose(np.cross(y, approach), y, approach, position)

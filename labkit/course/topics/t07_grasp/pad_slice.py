@@ -19,7 +19,14 @@ def _cloud_and_grasp(rng):
     P, T = cloud(rng), leaning_grasp(rng)
     P -= P.mean(axis=0)  # near the base's origin: whoever forgets the grasp's place still meets some points
     T[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3)
+    T[:3, 3] += rng.choice([0.0, 0.1]) * T[:3, 1]  # in some cases all of it lies on one side
     x, y, _ = ((P - T[:3, 3]) @ T[:3, :3]).T
+    nearest = np.sort(np.abs(x))
+    kind = rng.random()
+    if kind < 0.3:  # nothing between the pads
+        return P, T, float(nearest[0] / 2.0)
+    if kind < 0.6:  # one point
+        return P, T, float(nearest[:2].mean())
     half = np.abs(x)[np.abs(y).argsort()[2]] + 0.003  # three points at least, but seldom the outermost
     return P, T, float(half)
 
@@ -37,9 +44,10 @@ QUESTION = Question(
         (_L, FACING_X, 0.125),
         (_L, FACING_X, 0.5),
         (_L[:1], FACING_X, 0.25),
+        (np.array([[3.0, 1.0, 0.5], [5.0, 1.0, 0.5], [2.0, 5.0, 0.5]]), FACING_X, 0.25),  # all on one side
         (_L[3:4], FACING_X, 0.25),  # nothing between the pads
     ),
-    random_cases=6,
+    random_cases=14,
     points=4,
     properties=(Property("a width is not negative", lambda arguments, out: bool(out[1] >= 0.0)),),
     forbidden=("scipy", "cv2"),
@@ -109,3 +117,34 @@ def half_of_the_width(P, T_base_grasp, half):
 def position_taken_off_after_the_turn(P, T_base_grasp, half):
     x, y, _ = (P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T
     return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong(QUESTION, "Beside the pads your y becomes 0: may a point that is not in the slice be one of the outermost?")
+def zero_beside_the_pads(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y * (np.abs(x) <= half))
+
+
+@wrong(QUESTION, "What does the task say of a slice without points? Your middle is NaN there.")
+def nan_for_an_empty_slice(P, T_base_grasp, half):
+    middle, width = pad_slice(P, T_base_grasp, half)
+    return (middle if (np.abs(in_grasp(P, T_base_grasp)[0]) <= half).any() else np.nan), width
+
+
+@wrong(QUESTION, "Your middle is a y of the base frame. In which frame do the jaws close along y?")
+def middle_in_the_base_frame(P, T_base_grasp, half):
+    between = np.abs(in_grasp(P, T_base_grasp)[0]) <= half
+    return middle_and_width(P[between, 1])[0], pad_slice(P, T_base_grasp, half)[1]
+
+
+@wrong(QUESTION, "Twice the largest |y|: is the thing as wide on one side of the middle of the jaws as on the other?")
+def twice_the_larger_side(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return middle_and_width(y)[0], 2.0 * np.abs(y).max(initial=0.0)
+
+
+@wrong(QUESTION, "The pads are broad along x: which coordinate says whether a point lies between them?")
+def cut_along_y(P, T_base_grasp, half):
+    _, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[np.abs(y) <= half])

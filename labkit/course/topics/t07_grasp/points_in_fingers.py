@@ -14,7 +14,13 @@ def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
 
 
 def _scene_round_a_grasp(rng):
-    """Draw a grasp that leans near the base's origin, and points all round it, more on one side than on the other."""
+    """Draw a grasp that leans near the base's origin, and points all round it, more on one side than on the other.
+
+    In half of the draws the grasp faces x and all is a multiple of an eighth, so that many points lie on a border.
+    """
+    if rng.random() < 0.5:
+        P = rng.integers((-8, -8, -4), (9, 7, 12), (120, 3)) / 8.0 + FACING_X[:3, 3]
+        return P, FACING_X.copy(), 1.0, 0.25, 0.25, float(rng.choice([0.125, 0.25]))
     T = leaning_grasp(rng)
     T[:3, 3] = rng.uniform(0.005, 0.02, 3)  # little: whoever forgets it or takes it off too late still counts some
     in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (120, 3))
@@ -41,7 +47,7 @@ QUESTION = Question(
         (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
     ),
-    random_cases=5,
+    random_cases=12,
     points=3,
     properties=(
         Property(
@@ -130,3 +136,20 @@ def fingers_astride_their_pads(P, T_base_grasp, width, half, thickness, tips):
 @wrong(QUESTION, "A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
 def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, np.inf, tips)
+
+
+@wrong(QUESTION, "That is a share of the points: how many are they?")
+def share_of_the_points(P, *others):
+    return points_in_fingers(P, *others) / len(P) if len(P) else np.nan
+
+
+@wrong(QUESTION, "You return the points themselves: how many are they?")
+def the_points(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out = np.abs(y) - width / 2
+    return P[(np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)]
+
+
+@wrong(QUESTION, "thickness counts from the pad outwards: from where does |y| count?")
+def thickness_from_the_middle(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width, half, thickness - width / 2, tips)

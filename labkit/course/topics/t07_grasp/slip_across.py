@@ -28,7 +28,7 @@ QUESTION = Question(
         (FACING_X, np.array([2.03, 1.02, 0.4])),
         (FACING_X, np.array([1.97, 0.98, 0.5])),
     ),
-    random_cases=5,
+    random_cases=6,
     atol=1e-4,
     points=2,
     forbidden=("scipy",),
@@ -85,3 +85,10 @@ def lengths_subtracted(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3])
     pushed = np.abs(off @ T_base_grasp[:3, 1])
     return pushed, np.linalg.norm(off[:2]) - pushed
+
+
+@wrong(QUESTION, "The hand may lean: your slip is what is left over in the base's x and y, not along the hand's pads.")
+def left_of_the_way_seen_from_above(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    pushed = np.abs(off @ T_base_grasp[:3, 1])
+    return pushed, np.sqrt(np.maximum(off[0] ** 2 + off[1] ** 2 - pushed**2, 0.0))
