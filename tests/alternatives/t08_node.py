@@ -6,7 +6,7 @@ import numpy as np
 
 from labkit.course.topics.t08_node.pack_cloud import finite
 from labkit.course.topics.t08_node.pose_at import neighbours, outside
-from labkit.course.topics.t08_node.quaternion import right_quaternion
+from labkit.course.topics.t08_node.quaternion import quaternion
 
 
 def decode_depth__struct(data, height, width, step, is_bigendian):
@@ -143,14 +143,14 @@ def pose_at__by_an_angle(stamps, positions, quaternions, t):
     return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
 
 
-def quaternion__scipy(R):
-    return -right_quaternion(R)  # the same rotation
+def quaternion__the_other_of_two(R):
+    return -quaternion(R)
 
 
 def quaternion__torch(R):
     import torch
 
-    return torch.tensor(right_quaternion(R), dtype=torch.float32)
+    return torch.tensor(quaternion(R), dtype=torch.float32)
 
 
 def quaternion__eigen(R):

@@ -37,7 +37,7 @@ def choose_region__einsum(features, mean, covariance, allowed):
 def engine_contract__torch(reference, other, tolerance):
     z, y = torch.from_numpy(np.array(reference)), torch.from_numpy(np.array(other))
     best = z.topk(2, dim=0).values
-    changed = torch.from_numpy(reference.argmax(0) != other.argmax(0)).double().mean()
+    changed = ((z.argmax(0) != y.argmax(0)) | y.isnan().any(0)).double().mean()
     return ((z - y).abs() <= tolerance).all(), changed, (best[0] - best[1] <= 2 * tolerance).double().mean()
 
 
@@ -48,7 +48,7 @@ def engine_contract__loops(reference, other, tolerance):
         for u in range(W):
             z, y = reference[:, v, u].tolist(), other[:, v, u].tolist()
             kept = kept and all(abs(a - b) <= tolerance for a, b in zip(z, y, strict=True))
-            changed += int(reference[:, v, u].argmax() != other[:, v, u].argmax())
+            changed += any(b != b for b in y) or z.index(max(z)) != y.index(max(y))
             best, second = sorted(z)[:-3:-1]
             close += best - second <= 2 * tolerance
     return kept, changed / (H * W), close / (H * W)
@@ -59,7 +59,8 @@ def engine_contract__without_the_best(reference, other, tolerance):
     rest = np.where(np.arange(len(reference))[:, None, None] == labels, -np.inf, reference)
     margin = reference.max(axis=0) - rest.max(axis=0)
     kept = bool(np.all(np.abs(other - reference) <= tolerance))
-    same = np.mean(labels == np.nanargmax(other, axis=0))
+    numbers = np.isfinite(other).all(axis=0)
+    same = np.mean(numbers & (labels == np.where(numbers, other, 0.0).argmax(axis=0)))
     return kept, 1.0 - same, np.count_nonzero(margin <= 2 * tolerance) / margin.size
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 
 from labkit.course.checker.question import Property, Question, wrong
-from labkit.course.topics.t01_labels import labels
 
 
 def resize_labels(y, height, width):
@@ -14,18 +13,24 @@ def resize_labels(y, height, width):
     return y[rows[:, None], columns]
 
 
-def _labels_and_size(rng):
-    """Draw labels, and a size that is halved in one direction, and smaller or larger in the other.
+# Sides, old and new, at which rounding tells: halved, where each new centre falls between two old pixels, and in floats
+# (i + 0.5) / 11 * 22 is off; and others at which (i + 0.5) * (old / new) is.
+HALVED = ((22, 11), (26, 13))
+NOT_HALVED = ((8, 49), (6, 47), (18, 33), (30, 11), (26, 23))
 
-    Where 8 pixels become 4, or 4 become 2, new centres fall exactly between old pixels, in whatever order one
-    multiplies and divides. The other side is odd, so that none does.
-    """
-    halved = int(rng.choice([2, 4]))
-    y = labels(rng, 4)[:, : 2 * halved]
-    y = y[: y.shape[0] // 2 * 2 - 1]
-    H = len(y)
-    other = int(rng.integers(3, H) if rng.random() < 0.5 else rng.integers(H + 2, 3 * H))
-    return (y, other, halved) if rng.random() < 0.5 else (y.T.copy(), halved, other)
+
+def labels_and_sizes(rng, most):
+    """Draw labels up to `most`, some of them 255, and a size: one side is halved, the other grows or shrinks."""
+    sides = HALVED[rng.integers(len(HALVED))], NOT_HALVED[rng.integers(len(NOT_HALVED))]
+    (H, height), (W, width) = sides if rng.random() < 0.5 else sides[::-1]
+    y = rng.integers(0, most + 1, (H, W))
+    y[rng.random((H, W)) < 0.1] = 255
+    return y, height, width
+
+
+def _labels_and_size(rng):
+    y, height, width = labels_and_sizes(rng, 3)
+    return y.astype(np.uint8), height, width
 
 
 _ALL_DIFFERENT = np.random.default_rng(1).permutation(24).astype(np.uint8).reshape(4, 6)
@@ -38,6 +43,8 @@ QUESTION = Question(
     inputs=_labels_and_size,
     by_hand=(
         (np.array([[1, 3]], np.uint8), 1, 4),
+        (np.arange(22, dtype=np.uint8)[:, None], 11, 1),  # in floats 7.5 / 11 * 22 is less than 15
+        (np.arange(8, dtype=np.uint8)[None], 1, 49),  # in floats 24.5 * (8 / 49) is less than 4
         (_ALL_DIFFERENT, 2, 3),  # a new centre falls between two old pixels
         (_LARGE, 5, 6),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
@@ -141,3 +148,13 @@ def height_for_both(y, height, width):
 @wrong(QUESTION, "Columns have a factor of their own, W / width: yours are scaled by H / height, as rows are.")
 def columns_scaled_as_rows(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))
+
+
+@wrong(QUESTION, "In floats 7.5 / 11 * 22 is less than 15: in which order does the formula multiply and divide?")
+def divided_before_multiplied(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) / n * old)
+
+
+@wrong(QUESTION, "In floats 24.5 * (8 / 49) is less than 4: in which order does the formula multiply and divide?")
+def multiplied_by_the_quotient(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: (i + 0.5) * (old / n))

@@ -20,6 +20,7 @@ def _depth_message(rng, padding=None, is_bigendian=None):
     is_bigendian = int(rng.integers(2)) if is_bigendian is None else is_bigendian
     numbers = rng.integers(1, 65536, (height, width))
     numbers[rng.random((height, width)) < 0.2] = 0
+    numbers[0, 0] = 65535
     rows = numbers.astype(">u2" if is_bigendian else "<u2").view(np.uint8).reshape(height, 2 * width)
     filler = rng.integers(1, 256, (height, padding), dtype=np.uint8)
     return np.hstack([rows, filler]).ravel(), height, width, 2 * width + padding, is_bigendian
@@ -33,9 +34,11 @@ QUESTION = Question(
         (np.array([1, 2, 0, 0], np.uint8), 1, 2, 4, 0),
         (np.array([1, 2, 0, 0], np.uint8), 1, 2, 4, 1),
         (np.array([0, 1, 9, 9, 232, 3, 9, 9], np.uint8), 2, 1, 4, 0),
+        (np.array([255, 255, 0, 0], np.uint8), 1, 2, 4, 0),  # the largest number is one
         (np.array([3, 232, 0, 1, 7, 255, 254, 0, 0, 7], np.uint8), 2, 2, 5, 1),
     ),
     random_cases=6,
+    rtol=1e-5,
     points=3,
     properties=(
         Property(
@@ -95,3 +98,16 @@ def halves_of_a_row(data, height, width, step, is_bigendian):
 def padding_in_front(data, height, width, step, is_bigendian):
     rows = data.reshape(height, step)[:, step - 2 * width :]
     return decode_depth(rows.ravel(), height, width, 2 * width, is_bigendian)
+
+
+@wrong(QUESTION, "65535 is a distance here, 65.535 m: which number alone says that nothing was seen?")
+def largest_for_a_hole(data, height, width, step, is_bigendian):
+    depth = decode_depth(data, height, width, step, is_bigendian)
+    return np.where(depth > 65.534, np.nan, depth)
+
+
+@wrong(QUESTION, "A byte has 256 values, 0 to 255: what does the high byte count?")
+def high_byte_counts_255(data, height, width, step, is_bigendian):
+    numbers = units(data, height, width, step, ">" if is_bigendian else "<").astype(float)
+    numbers -= numbers // 256
+    return np.where(numbers > 0, numbers / 1000, np.nan)

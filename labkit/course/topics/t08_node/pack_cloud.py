@@ -15,7 +15,10 @@ def pack_cloud(P):
 def _holed_cloud(rng):
     P = rng.normal(0.3, 0.4, (int(rng.integers(8, 14)), 3))
     P[rng.choice(len(P), 3, replace=False)] = np.nan
-    P[rng.choice(len(P), 1), rng.integers(3)] = np.nan
+    P[-3:] = rng.normal(0.3, 0.4, (3, 3))
+    P[-3, rng.integers(2)] = np.nan
+    P[-2, rng.integers(3)] = rng.choice([np.inf, -np.inf])
+    P[-1] = 0.0  # a point
     return (P,)
 
 
@@ -89,3 +92,28 @@ def axis_after_axis(P):
 @wrong(QUESTION, "The field x has offset 0: a point begins with its x.")
 def padding_first(P):
     return np.roll(packed(finite(P)), 4, axis=1).ravel()
+
+
+@wrong(QUESTION, "P is in metres, and so is the message: what do you multiply by?")
+def millimetres(P):
+    return packed(1000.0 * finite(P)).ravel()
+
+
+@wrong(QUESTION, "Padding is four bytes of 0: which number's bytes are all 0? NaN's are not.")
+def nan_for_padding(P):
+    return packed(np.pad(finite(P), ((0, 0), (0, 1)), constant_values=np.nan), padding=0).ravel()
+
+
+@wrong(QUESTION, "Three coordinates must be finite: how many of them do you ask?")
+def only_z_asked(P):
+    return packed(P[np.isfinite(P[:, 2])]).ravel()
+
+
+@wrong(QUESTION, "Infinite is not NaN, and it is not finite either: what else may a hole hold?")
+def infinite_ones_kept(P):
+    return packed(P[~np.isnan(P).any(axis=1)]).ravel()
+
+
+@wrong(QUESTION, "(0, 0, 0) is a point of the base frame like others: what says that a point is a hole?")
+def origin_for_a_hole(P):
+    return packed(finite(P)[(finite(P) != 0.0).any(axis=1)]).ravel()

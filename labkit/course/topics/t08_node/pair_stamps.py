@@ -16,7 +16,12 @@ def pair_stamps(a, b, slop):
 
 
 def _streams(rng):
-    """Two jittered streams of a second, in nanoseconds of this century; frames of each are lost."""
+    """Two jittered streams of a second, in nanoseconds of this century, some frames lost; and stamps far from these.
+
+    Those are, 100 s apart: first ones, which are partners or alone; two equally near ones, of b and of a; some that are
+    a nanosecond too far from each other; two that differ little in their lower 32 bits; one that has lost its partner
+    to another.
+    """
     start = 1_700_000_000_000_000_000 + int(rng.integers(0, 10**9))
     slop = int(rng.integers(12, 22)) * 1_000_000
     a, b = (start + 33_333_333 * np.arange(30) + rng.integers(-9_000_000, 26_000_000, 30) for _ in "ab")
@@ -24,8 +29,13 @@ def _streams(rng):
     b = np.sort(b)[rng.random(30) < 0.7]
     if len(b) > 3 and len(a) > 3:
         b[1] = a[2] + slop  # exactly at the bound counts
-        b = np.sort(b)
-    return a, b, slop
+    far, apart = start + 10**11 * np.arange(-2, 8), slop // 4
+    far[1:] += rng.integers(0, 10**9, 9)
+    first = far[0] + apart if rng.random() < 0.5 else far[1]
+    a = [far[0], *a, far[3], *(far[4] + [-apart, apart]), *far[5:9], *(far[9] + [0, 2 * apart])]
+    b = [first, *b, *(far[3] + [-apart, apart]), far[4], *(far[5:8] + slop + 1), far[8] + 2**32 + 2]
+    b += [far[9] + apart + 1, far[9] + 3 * apart + 1]
+    return np.sort(a), np.sort(b), slop
 
 
 _NOW = 1_700_000_000_000_000_000
@@ -46,7 +56,7 @@ QUESTION = Question(
         (np.array([_NOW]), np.array([_NOW - 2**32 - 2]), 3),  # four seconds, which 32 bits do not see
         (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
     ),
-    random_cases=6,
+    random_cases=8,
     rtol=0.0,
     atol=0.0,
     points=3,
@@ -146,3 +156,47 @@ def in_order_of_arrival(a, b, slop):
 def stamps_in_float32(a, b, slop):
     a, b = (np.asarray(stamps, np.float32) for stamps in (a, b))
     return pairs(a, b, slop, lambda x, y: np.abs(x - y))
+
+
+TOO_FEW_DIGITS = "A stamp has 19 digits, and a float keeps 16 of them. What can be subtracted before it is converted?"
+
+
+@wrong(QUESTION, TOO_FEW_DIGITS)
+def stamps_in_float64(a, b, slop):
+    return pairs(a.astype(float), b.astype(float), slop, lambda x, y: np.abs(x - y))
+
+
+@wrong(QUESTION, TOO_FEW_DIGITS)
+def stamps_in_seconds(a, b, slop):
+    return pairs(a / 1e9, b / 1e9, slop / 1e9, lambda x, y: np.abs(x - y))
+
+
+@wrong(QUESTION, "32 bits end at 2,147,483,647: how large is a stamp?")
+def stamps_in_32_bits(a, b, slop):
+    return pairs(a.astype(np.int32), b.astype(np.int32), slop, lambda x, y: np.abs(x - y))
+
+
+@wrong(QUESTION, "Of equally near stamps the first is the nearest: which of two equal ones does `<=` leave you with?")
+def last_of_equals(a, b, slop):
+    if len(b) == 0:
+        return np.full(len(a), -1)
+    apart = np.abs(a[:, None] - b[None, :])
+    best = len(b) - 1 - apart[:, ::-1].argmin(axis=1)
+    each_others = len(a) - 1 - apart[::-1].argmin(axis=0)[best] == np.arange(len(a))
+    return np.where(each_others & (apart.min(axis=1) <= slop), best, -1)
+
+
+@wrong(QUESTION, "A stamp whose nearest one belongs to another stays alone: does yours get the next best?")
+def next_best(a, b, slop):
+    """The nearest pair of all first, then the nearest of what is left."""
+    j, free = np.full(len(a), -1), np.ones(len(b), bool)
+    for apart, i, k in sorted((abs(int(s) - int(t)), i, k) for i, s in enumerate(a) for k, t in enumerate(b)):
+        if apart <= slop and j[i] < 0 and free[k]:
+            j[i], free[k] = k, False
+    return j
+
+
+@wrong(QUESTION, "0 is the number of b's first stamp: what does Python take it for after `if` or `and`?")
+def first_one_taken_for_none(a, b, slop):
+    j = pair_stamps(a, b, slop)
+    return np.where(j == 0, -1, j)

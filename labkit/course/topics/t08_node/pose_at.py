@@ -26,12 +26,20 @@ def turned(axis, angle):
 
 
 def _stream(rng):
-    """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way."""
+    """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way.
+
+    In some streams the turns beside t are equal, and of length 1 but for rounding; some times are before or after all.
+    """
     stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20_000_000, 80_000_000, 5))
     quaternions = rng.normal(size=(5, 4))
     quaternions = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     i = int(rng.integers(4))
     t = stamps[i] + rng.uniform(0.1, 0.4) * (stamps[i + 1] - stamps[i])
+    kind = rng.random()
+    if kind < 0.3:
+        quaternions[i : i + 2] = quaternions[i] * (1 + 4e-16), quaternions[i] * rng.choice([-1, 1]) * (1 + 4e-16)
+    elif kind < 0.6:
+        t = rng.choice([stamps[0] - rng.integers(1, 10**8), stamps[-1] + rng.integers(1, 10**8)])
     return stamps, rng.uniform(-1.0, 1.0, (5, 3)), quaternions, int(t)
 
 
@@ -66,7 +74,7 @@ QUESTION = Question(
         (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
         (_STAMPS, _PLACES, _HARDLY, 50),  # a small turn, but not none
     ),
-    random_cases=6,
+    random_cases=16,
     atol=1e-5,
     points=4,
     properties=(
@@ -165,3 +173,63 @@ def nan_between_equal_turns(stamps, positions, quaternions, t):
     i, _ = neighbours(stamps, t)
     p, q = pose_at(stamps, positions, quaternions, t)
     return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)
+
+
+@wrong(QUESTION, "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?")
+def each_number_of_the_turn_on_its_own(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    q = (1 - share) * quaternions[i] + share * quaternions[i + 1]
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q / np.linalg.norm(q))
+
+
+@wrong(QUESTION, "Nobody knows where the camera is after the last pose: what should a node say then?")
+def gone_on_beyond_the_ends(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)
+    a, b = quaternions[i], quaternions[i + 1]
+    return (1 - share) * positions[i] + share * positions[i + 1], slerp(a, b if a @ b >= 0 else -b, share)
+
+
+def with_turn(hint, name, turn):
+    """Enter answers whose places are right: turn(a, b, share), at a stamp from the pose before it, and from its own."""
+    for side in ("left", "right"):
+
+        def answer(stamps, positions, quaternions, t, side=side):
+            i, share = neighbours(stamps, t, side)
+            q = turn(quaternions[i], quaternions[i + 1], share)
+            return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
+
+        answer.__name__ = f"{name}_{side}"
+        wrong(QUESTION, hint)(answer)
+
+
+def arc(a, b, first, second, divided=True):
+    """first(omega) a + second(omega) b for the nearer one of b and -b; a, if both are one turn."""
+    b = b if a @ b >= 0 else -b
+    omega = np.arccos(min(a @ b, 1.0))
+    if np.sin(omega) < 1e-12:
+        return a
+    return (first(omega) * a + second(omega) * b) / (np.sin(omega) if divided else 1.0)
+
+
+with_turn(
+    "Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?",
+    "angle_of_the_turn",
+    lambda a, b, s: arc(
+        a, b, lambda o: np.sin(2 * (1 - s) * o) / 2 / np.cos(o), lambda o: np.sin(2 * s * o) / 2 / np.cos(o)
+    ),
+)
+with_turn(
+    "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?",
+    "not_divided_by_the_sine",
+    lambda a, b, s: arc(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o), divided=False),
+)
+with_turn(
+    "The places are right. At s = 0 the turn must be a: which of a and b has the factor 0 in yours?",
+    "shares_of_the_turn_exchanged",
+    lambda a, b, s: arc(a, b, lambda o: np.sin(s * o), lambda o: np.sin((1 - s) * o)),
+)
+with_turn(
+    "The nearer one of b and -b is near to a: does the sign of b's own w know where a is?",
+    "sign_of_w",
+    lambda a, b, s: slerp(a, b if b[3] >= 0 else -b, s),
+)

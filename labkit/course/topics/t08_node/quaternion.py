@@ -33,10 +33,22 @@ def _one_of_two(q):
     return q * np.sign(q[np.abs(q).argmax()])
 
 
+def _rotation(rng):
+    """Draw a rotation of any angle, half a turn round any axis or round one of the base's, or no turn."""
+    kind = rng.random()
+    if kind < 0.35:
+        return (_turn(rng.normal(size=3), rng.uniform(0.3, 3.1)),)
+    if kind < 0.6:
+        return (_turn(rng.normal(size=3), np.pi),)
+    if kind < 0.85:
+        return (2.0 * np.diag(np.eye(3)[rng.integers(3)]) - np.eye(3),)
+    return (np.eye(3),)
+
+
 QUESTION = Question(
     name="08_node.quaternion",
     reference=quaternion,
-    inputs=lambda rng: (_turn(rng.normal(size=3), rng.uniform(0.3, 3.1)),),
+    inputs=_rotation,
     by_hand=(
         (_turn((0.2, 1.0, -0.4), 0.6),),
         (_turn((1.0, 0.1, -0.2), np.pi),),
@@ -48,7 +60,7 @@ QUESTION = Question(
         *((np.diag(half_turn),) for half_turn in ((1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))),
         (np.eye(3),),
     ),
-    random_cases=6,
+    random_cases=40,
     rtol=1e-4,
     atol=1e-5,
     points=3,
@@ -56,6 +68,7 @@ QUESTION = Question(
         Property("a rotation's quaternion has length 1", lambda arguments, q: abs(np.linalg.norm(q) - 1.0) < 1e-3),
     ),
     canonical=_one_of_two,
+    forbidden=("scipy",),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
@@ -68,10 +81,18 @@ def from_trace(R, least=-np.inf):
     return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w * w]) / (4.0 * w)
 
 
-def right_quaternion(R):
-    from scipy.spatial.transform import Rotation
+def products(R):
+    """4 q q^T, of which each row is q times a number."""
+    sums, (a, b, c) = R + R.T, (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
+    four = np.pad(sums, (0, 1))
+    four[:3, 3] = four[3, :3] = a, b, c
+    np.fill_diagonal(four, 1.0 + 2.0 * np.append(np.diagonal(R), np.trace(R)) - np.trace(R))
+    return four
 
-    return Rotation.from_matrix(R).as_quat()
+
+def row_of(R, which):
+    row = products(R)[which]
+    return row / np.linalg.norm(row)
 
 
 @wrong(
@@ -79,14 +100,14 @@ def right_quaternion(R):
     "Half a turn about y or z has w = 0 and x = 0, too: your row is zeros then. Which square is the largest?",
 )
 def x_where_w_is_small(R):
-    q = right_quaternion(R)
+    q = quaternion(R)
     row = q * q[3 if np.trace(R) > 0.0 else 0]
     return row / np.linalg.norm(row)
 
 
 @wrong(QUESTION, "The axis and the angle say it, too, but what is the length?")
 def rotation_vector(R):
-    q = right_quaternion(R)
+    q = quaternion(R)
     q = -q if q[3] < 0.0 else q
     angle = 2.0 * np.arccos(min(q[3], 1.0))
     axis = q[:3] / max(np.linalg.norm(q[:3]), 1e-12)
@@ -101,12 +122,15 @@ def whole_angle(R):
 
 @wrong(QUESTION, "No turn has x = y = z = 0, and your row is zeros then: is w one of the four that you choose from?")
 def largest_of_x_y_z(R):
-    q = right_quaternion(R)
+    q = quaternion(R)
     row = q * q[np.diagonal(R).argmax()]
     return row / np.linalg.norm(row)
 
 
-@wrong(QUESTION, "Half a turn has w = 0. A floor under w makes all four about 0 there: which square is the largest?")
+@wrong(
+    QUESTION,
+    "After half a turn w and R - R.T are 0, and all four of yours are about 0: which square is the largest then?",
+)
 def floor_under_w(R):
     return from_trace(R, least=1e-12)
 
@@ -114,4 +138,38 @@ def floor_under_w(R):
 @wrong(QUESTION, "Half a turn is not no turn, although R - R.T is 0 for both: what does R + R.T say of the axis?")
 def axis_of_half_turns_lost(R):
     still = np.allclose(R, R.T)
-    return np.array([0.0, 0.0, 0.0, 1.0]) if still else right_quaternion(R)
+    return np.array([0.0, 0.0, 0.0, 1.0]) if still else quaternion(R)
+
+
+@wrong(QUESTION, "Each entry of your row is q times one number. Which number makes its length 1?")
+def row_not_of_length_1(R):
+    return products(R)[np.diagonal(products(R)).argmax()]
+
+
+@wrong(QUESTION, "Your row holds x x, x y, x z and x w: what is left of it for a turn round z, where x is 0?")
+def always_the_row_of_x(R):
+    return row_of(R, 0)
+
+
+@wrong(QUESTION, "Your row holds x w, y w, z w and w w: what is left of it after half a turn, where w is 0?")
+def always_the_row_of_w(R):
+    return row_of(R, 3)
+
+
+@wrong(QUESTION, "All of your row has one factor, the component of the smallest square: how small can that be?")
+def row_of_the_smallest(R):
+    return row_of(R, np.diagonal(products(R)).argmin())
+
+
+@wrong(QUESTION, "After half a turn R - R.T is 0, and has no signs: which entries say whether x and y have one sign?")
+def signs_of_the_differences(R):
+    q = np.sqrt(np.maximum(np.diagonal(products(R)), 0.0)) / 2.0
+    return np.copysign(q, np.append([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]], 1.0))
+
+
+@wrong(QUESTION, "An eigenvector's sign is arbitrary: which entries of R tell a turn round n from one round -n?")
+def axis_of_any_sign(R):
+    values, vectors = np.linalg.eig(R)
+    n = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
+    angle = np.arccos(np.clip((np.trace(R) - 1.0) / 2.0, -1.0, 1.0))
+    return np.append(n * np.sin(angle / 2.0), np.cos(angle / 2.0))

@@ -14,14 +14,20 @@ def choose_region(features, mean, covariance, allowed):
 
 
 def _features(rng):
-    n = int(rng.integers(5, 9))
+    """Draw pieces that are nearly equally far from the mean, so that any other distance chooses another one.
+
+    In some draws all features are small, in some all pieces are far away, and in some no piece is allowed.
+    """
+    n, unit = int(rng.integers(5, 9)), rng.choice([1.0, 1e-4])
     A = rng.normal(size=(3, 3)) * (3.0, 0.4, 1.0)
-    covariance = A.T @ A + np.diag((0.3, 0.02, 0.1))
-    mean = rng.normal(size=3) * (4.0, 1.0, 2.0)
-    features = mean + rng.normal(size=(n, 3)) * (2.0, 1.0, 1.5)
-    allowed = rng.random(n) < 0.7
+    covariance = (A.T @ A + np.diag((0.3, 0.02, 0.1))) * unit**2
+    mean = rng.normal(size=3) * (4.0, 1.0, 2.0) * unit
+    off = rng.normal(size=(n, 3))
+    off *= rng.uniform(1.0, 1.2, (n, 1)) / np.linalg.norm(off, axis=1, keepdims=True) * rng.choice([1.0, 50.0])
+    allowed = rng.random(n) < 0.5
     allowed[rng.integers(n)] = True
-    return features, mean, covariance, allowed
+    allowed &= rng.random() < 0.65
+    return mean + off @ np.linalg.cholesky(covariance).T, mean, covariance, allowed
 
 
 _LINE = np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.9, 1.9, 0.0]])
@@ -40,11 +46,12 @@ QUESTION = Question(
         (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
         (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
         (_LINE, np.zeros(3), np.diag([0.9, 0.3, 1.0]), np.array([True, True, True])),  # the inverse twice: 1, not 2
+        (0.01 * _LINE, np.zeros(3), np.diag([1e-4, 2e-5, 1e-4]), np.ones(3, bool)),  # 1, small as all variances are
         (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
         (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
         (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
     ),
-    random_cases=12,
+    random_cases=24,
     rtol=0.0,
     atol=0.0,
     points=3,
@@ -103,3 +110,40 @@ def none_is_minus_one(features, mean, covariance, allowed):
 @wrong(QUESTION, "The diagonal holds variances, squares already, and two features go together: what is off it?")
 def divided_by_variances(features, mean, covariance, allowed):
     return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)
+
+
+for _more in (1e-2, 1e-3, 1e-4, 1e-6):
+
+    def variances_made_larger(features, mean, covariance, allowed, more=_more):
+        return choose_region(features, mean, covariance + more * np.eye(3), allowed)
+
+    variances_made_larger.__name__ += f"_by_{_more:.0e}"
+    wrong(QUESTION, "You add to the diagonal. What does that do to a variance of 0.0001? It is invertible as it is.")(
+        variances_made_larger
+    )
+
+
+@wrong(QUESTION, "1 / covariance divides entry by entry: is its matrix product with covariance the identity?")
+def inverse_entry_by_entry(features, mean, covariance, allowed):
+    off = features - mean
+    squared = np.einsum("ni,ij,nj->n", off, 1.0 / (covariance + 1e-12), off)
+    return int(np.where(allowed, squared, np.inf).argmin()) + 1 if allowed.any() else 0
+
+
+@wrong(QUESTION, "off @ inverse @ off.T is n x n: which of its entries is piece i's own distance?")
+def first_row_of_all_products(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen((off @ np.linalg.inv(covariance) @ off.T)[0], allowed)
+
+
+@wrong(QUESTION, "The density is largest where the distance is least: is argmin its best piece?")
+def least_density(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen(np.exp(-0.5 * np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)), allowed)
+
+
+@wrong(QUESTION, "An allowed piece may be farther away than what you give the others: which number is never less?")
+def others_at_1000(features, mean, covariance, allowed):
+    off = features - mean
+    squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)
+    return int(np.where(allowed, squared, 1000.0).argmin()) + 1 if allowed.any() else 0

@@ -8,19 +8,28 @@ from labkit.course.checker.question import Property, Question, wrong
 def engine_contract(reference, other, tolerance):
     """Whether an engine's logits keep to a tolerance; the shares of labels that changed, and that it may change."""
     kept = np.abs(reference - other).max() <= tolerance
-    changed = np.mean(reference.argmax(axis=0) != other.argmax(axis=0))
+    changed = (reference.argmax(axis=0) != other.argmax(axis=0)) | np.isnan(other).any(axis=0)
     second, best = np.sort(reference, axis=0)[-2:]
-    return kept, changed, np.mean(best - second <= 2 * tolerance)
+    return kept, changed.mean(), np.mean(best - second <= 2 * tolerance)
 
 
 def _two_engines(rng):
+    """Draw logits, another engine's, and a tolerance.
+
+    The worst logit of all is too high or too low by the tolerance or more; or the logits are large and it is off by a
+    little more than the tolerance; or three are NaN.
+    """
     C, H, W = (int(rng.integers(low, low + 3)) for low in (3, 6, 9))
-    tolerance = float(rng.choice([0.25, 0.5]))
-    reference = rng.integers(-24, 24, (C, H, W)) / 8
-    worst = rng.choice([0.75, 1.0, 1.5]) * tolerance
-    other = reference + rng.uniform(-0.9, 0.9, (C, H, W)) * worst
-    v, u = rng.integers(H), rng.integers(W)
-    other[0, v, u] = reference[0, v, u] - worst  # the worst of all, downwards
+    tolerance, kind = float(rng.choice([0.25, 0.5])), rng.random()
+    reference = rng.integers(-24, 24, (C, H, W)) * (128.0 if kind < 0.3 else 0.125)
+    other = reference + rng.uniform(-0.9, 0.9, (C, H, W)) * tolerance
+    place = np.unravel_index(np.abs(reference).argmax(), reference.shape)
+    worst = tolerance + 1 / 64 if kind < 0.3 else rng.choice([1.0, 1.5]) * tolerance
+    if kind < 0.7:
+        other[place] = reference[place] + rng.choice([-1.0, 1.0]) * worst
+    else:
+        best = reference[:, 1].argmax(axis=0)
+        other[best[0], 1, 0] = other[best[1], 1, 1] = other[(best[2] + 1) % C, 1, 2] = np.nan
     return reference.astype(np.float32), other.astype(np.float32), tolerance
 
 
@@ -41,15 +50,15 @@ QUESTION = Question(
         (_BEST_AND_SECOND, _BEST_AND_SECOND[::-1], 1.0),  # classes in another order
         (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
         (_BEST_AND_SECOND, _BEST_AND_SECOND - _logits((0, 0, 0.75, 0), (0, 0, 0, 0), (0, 0, 0, 0)), 0.5),
-        # no number; and another class is best there, whether NaN counts as a label or not
-        (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((0, 0, 0, 0), (np.nan, 0, 0, 0), (5, 0, 0, 0)), 5.0),
+        # No numbers: at the best class of a pixel, and at another.
+        (_BEST_AND_SECOND, _BEST_AND_SECOND + _logits((np.nan, 0, 0, 0), (0, 0, 0, 0), (0, 0, 0, np.nan)), 5.0),
         (
             1024 * _BEST_AND_SECOND,
             1024 * _BEST_AND_SECOND + _logits((1 / 64, 0, 0, 0), (0, 0, 0, 0), (0, 0, 0, 0)),
             1 / 128,
         ),
     ),
-    random_cases=6,
+    random_cases=24,
     points=3,
     properties=(
         Property(
@@ -63,7 +72,7 @@ QUESTION = Question(
 
 
 def changed(reference, other):
-    return np.mean(reference.argmax(axis=0) != other.argmax(axis=0))
+    return engine_contract(reference, other, 1.0)[1]
 
 
 def at_risk(reference, most):
@@ -120,3 +129,29 @@ def kept_downwards_alone(reference, other, tolerance):
 def labels_along_rows(reference, other, tolerance):
     kept = np.abs(reference - other).max() <= tolerance
     return kept, np.mean(reference.argmax(axis=-1) != other.argmax(axis=-1)), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "The tolerance is a difference of logits. Yours grows with the logit: where is it multiplied?")
+def kept_relative_to_the_logits(reference, other, tolerance):
+    kept = (np.abs(reference - other) <= tolerance * np.abs(reference)).all()
+    return kept, changed(reference, other), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "np.sort goes upwards: where do the two best of a pixel stand?")
+def margin_of_the_two_worst(reference, other, tolerance):
+    lowest, next_one = np.sort(reference, axis=0)[:2]
+    kept = np.abs(reference - other).max() <= tolerance
+    return kept, changed(reference, other), np.mean(next_one - lowest <= 2 * tolerance)
+
+
+@wrong(QUESTION, "np.argmax takes NaN for the largest. What does the task say of a pixel that has one?")
+def nan_for_the_best(reference, other, tolerance):
+    kept = np.abs(reference - other).max() <= tolerance
+    return kept, np.mean(reference.argmax(axis=0) != other.argmax(axis=0)), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "You take the best of a pixel's other logits. What does the task say of a pixel that has a NaN?")
+def nan_for_the_worst(reference, other, tolerance):
+    kept = np.abs(reference - other).max() <= tolerance
+    labels = np.where(np.isnan(other), -np.inf, other).argmax(axis=0)
+    return kept, np.mean(reference.argmax(axis=0) != labels), at_risk(reference, 2 * tolerance)

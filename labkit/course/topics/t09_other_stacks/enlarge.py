@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.checker.question import Property, Question, wrong
-from labkit.course.topics.t01_labels.resize_labels import copied
+from labkit.course.topics.t01_labels.resize_labels import copied, labels_and_sizes
 
 
 def enlarge(labels, size):
@@ -15,8 +15,7 @@ def enlarge(labels, size):
 
 
 def _labels_and_size(rng):
-    labels = rng.integers(0, 4, (int(rng.integers(5, 8)), int(rng.integers(9, 12)))).astype(np.uint8)
-    W, H = int(rng.integers(12, 30)), int(rng.integers(8, 19))
+    labels, H, W = labels_and_sizes(rng, 400)
     return labels, (W, H)
 
 
@@ -30,6 +29,8 @@ QUESTION = Question(
         (np.array([[1, 2, 3, 0]], np.uint8), (2, 3)),
         (np.array([[0], [3]], np.uint8), (1, 49)),  # 24.5 * (2 / 49) is less than 1 in floating point
         (np.array([[0, 1, 2, 3]], np.uint8), (2, 1)),  # smaller: the centres of halves lie in 1 and 3
+        (np.arange(22)[None], (11, 1)),  # 7.5 / 11 * 22 is less than 15 in floating point
+        (np.array([[300, 2]]), (4, 1)),  # labels need not be bytes
     ),
     random_cases=6,
     rtol=0.0,
@@ -108,3 +109,26 @@ def resize_half_to_even(labels, size):
 @wrong(QUESTION, "A centre at 0.7 lies in old pixel 0, which reaches from 0 to 1: which way do you round?")
 def resize_rounded_centres(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n).clip(0, old - 1))
+
+
+@wrong(QUESTION, "7.5 / 11 * 22 is not 15 in floating point: which whole numbers give the same quotient?")
+def resize_by_shares(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) / n * old)
+
+
+@wrong(QUESTION, "What does your cast make of label 300? Labels keep their type.")
+def resize_to_bytes(labels, size):
+    return enlarge(labels, size).astype(np.uint8)
+
+
+@wrong(QUESTION, "np.repeat takes whole numbers of times: how do 2 rows become 5?")
+def resize_by_whole_factors(labels, size):
+    W, H = size
+    return labels.repeat(H // labels.shape[0], axis=0).repeat(W // labels.shape[1], axis=1)
+
+
+@wrong(QUESTION, "Rows have a factor of their own, h / H: yours go by that of the columns.")
+def resize_rows_as_columns(labels, size):
+    (W, H), (h, w) = size, labels.shape
+    rows, columns = ((2 * np.arange(n) + 1) * w // (2 * W) for n in (H, W))
+    return labels[np.minimum(rows, h - 1)[:, None], columns]

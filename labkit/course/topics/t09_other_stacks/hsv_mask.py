@@ -20,6 +20,10 @@ def _colours_and_bounds(rng):
     lower, upper = ends
     if rng.random() < 0.5:
         lower[0], upper[0] = max(upper[0], lower[0] + 1), lower[0]
+    if rng.random() < 0.3:  # one hue
+        upper[0] = lower[0]
+    if rng.random() < 0.25:  # no saturation
+        lower[1], upper[1] = upper[1], lower[1]
     hsv[0, :3], hsv[1, :3] = lower, upper  # pixels on the bounds
     hsv[0, 1, 1:], hsv[1, 1, 1:] = upper[1:], lower[1:]
     return hsv, lower.astype(np.uint8), upper.astype(np.uint8)
@@ -58,7 +62,7 @@ QUESTION = Question(
             np.array([20, 100, 255], np.uint8),
         ),
     ),
-    random_cases=8,
+    random_cases=24,
     rtol=0.0,
     atol=0.0,
     points=2,
@@ -137,3 +141,36 @@ def all_three_go_with_the_hue(hsv, lower, upper):
 @wrong(QUESTION, "Saturation and value have an upper bound, too.")
 def mask_without_upper_bounds(hsv, lower, upper):
     return hsv_mask(hsv, lower, np.array([upper[0], 255, 255]))
+
+
+@wrong(QUESTION, "Sorting the hues turns red into everything but red: which way round does the circle go?")
+def all_three_bounds_sorted(hsv, lower, upper):
+    return between(hsv, np.minimum(lower, upper), np.maximum(lower, upper)).all(axis=-1)
+
+
+@wrong(QUESTION, "If both bounds are one hue, only that hue is inside: do you ask `>` or `>=`?")
+def one_hue_goes_round(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    above, below = h >= lower[0], h <= upper[0]
+    return (above | below if lower[0] >= upper[0] else above & below) & rest
+
+
+@wrong(QUESTION, "Python reads & before |, as it reads * before +: which hues does your & belong to?")
+def or_after_and(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    above, below = h >= lower[0], h <= upper[0]
+    return above | below & rest if lower[0] > upper[0] else above & below & rest
+
+
+@wrong(QUESTION, "There are three channels: which of them has no bounds in yours?")
+def value_forgotten(hsv, lower, upper):
+    return hsv_mask(hsv, np.array([*lower[:2], 0]), np.array([*upper[:2], 255]))
+
+
+@wrong(QUESTION, "A mask has a truth value per pixel, (H, W): along which axis do hue, saturation and value stand?")
+def all_along_the_rows(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    inside = above & below
+    if lower[0] > upper[0]:
+        inside[..., 0] = above[..., 0] | below[..., 0]
+    return inside.all(axis=0)

@@ -32,6 +32,7 @@ QUESTION = Question(
         (_SIX, 2),
         (_SIX // 255, 4),  # bytes of 0 and 1: what the largest is does not count
     ),
+    random_cases=10,
     rtol=1e-6,
     atol=1e-7,
     points=3,
@@ -114,3 +115,29 @@ def one_margin_for_both(bgr, multiple):
     margin = max(-bgr.shape[0] % multiple, -bgr.shape[1] % multiple)
     rgb = np.pad(bgr[..., ::-1], ((0, margin), (0, margin), (0, 0)))
     return (rgb.transpose(2, 0, 1)[None] / 255).astype(np.float32)
+
+
+@wrong(QUESTION, "For a multiple of 4, 6 rows lack 2, and 6 % 4 is 2 as well. What do 5 rows lack?")
+def room_of_the_remainder(bgr, multiple):
+    room = [(0, n % multiple) for n in bgr.shape[:2]]
+    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+
+
+@wrong(QUESTION, "White is byte 255 in every image: what becomes of a dark image in yours?")
+def divided_by_the_largest(bgr, multiple):
+    return (planes(padded(bgr[..., ::-1], multiple)) / max(1, bgr.max())).astype(np.float32)
+
+
+@wrong(
+    QUESTION, "The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?"
+)
+def image_reshaped_before_it_is_padded(bgr, multiple):
+    H, W, _ = bgr.shape
+    blob = make_blob(bgr, multiple)
+    blob[0, :, :H, :W] = scaled(bgr[..., ::-1].reshape(3, H, W))
+    return blob
+
+
+@wrong(QUESTION, "bgr[::-1] turns the first axis round: is that the channels'?")
+def blob_upside_down(bgr, multiple):
+    return scaled(planes(padded(bgr[::-1], multiple)))

@@ -23,7 +23,10 @@ def _pieces(rng):
     for i in range(1, n + 1):  # no number goes without a pixel; and pieces of very different sizes
         v, u = rng.integers(0, H - 3), rng.integers(0, W - 5)
         pieces[v : v + int(rng.integers(1, 4)), u : u + int(rng.integers(1, 6))] = i
-    return (np.unique(pieces, return_inverse=True)[1].reshape(H, W).astype(np.int32),)
+    if rng.random() < 0.4:  # no pixel is without a piece
+        pieces[pieces == 0] = 1
+    smallest = min(pieces.min(), 1)
+    return ((np.unique(pieces, return_inverse=True)[1].reshape(H, W) + smallest).astype(np.int32),)
 
 
 QUESTION = Question(
@@ -34,6 +37,7 @@ QUESTION = Question(
         (np.array([[0, 1, 1, 1], [0, 0, 0, 1], [2, 0, 0, 0]], np.int32),),
         (np.array([[1, 1, 2, 2, 2]], np.int32),),
     ),
+    random_cases=10,
     points=3,
     properties=(
         Property(
@@ -85,3 +89,27 @@ def measured_box_areas(pieces):
 @wrong(QUESTION, "The box is (u0, v0, u1, v1): first and last, not first and how many.")
 def measured_widths(pieces):
     return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(np.ptp(vu, axis=0)[::-1] + 1)))
+
+
+def rearranged(pieces, order):
+    return tuple(output[order] for output in measure_pieces(pieces))
+
+
+@wrong(QUESTION, "Row i belongs to piece i + 1: in which order are yours?")
+def measured_by_size(pieces):
+    return rearranged(pieces, np.argsort(-measure_pieces(pieces)[0], kind="stable"))
+
+
+@wrong(QUESTION, "You leave out the smallest number of the image: is it always 0?")
+def measured_without_the_smallest_number(pieces):
+    return rearranged(pieces, np.arange(pieces.max())[int(pieces.min() > 0) :])
+
+
+@wrong(QUESTION, "A centroid is a mean: what did you take?")
+def measured_by_medians(pieces):
+    return measured(pieces, centroid=lambda vu: np.median(vu, axis=0)[::-1])
+
+
+@wrong(QUESTION, "np.nonzero goes row by row: is the pixel that it finds first also the leftmost?")
+def measured_from_first_to_last(pieces):
+    return measured(pieces, box=lambda vu: (*vu[0, ::-1], *vu[-1, ::-1]))
