@@ -65,9 +65,10 @@ def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sent
     """All sentences that are true of an answer, the surest first; arguments are those of `diagnose`."""
     yield from listed(question, cases, outputs)
     yield from exceptions(question, cases, outputs)
-    yield from found_in_the_program(pieces, findings)
     pairs = wrong_ones_first(question, cases, outputs)
-    if not pairs or alike(question, pairs[0][0].expected, pairs[0][1]):
+    values_are_right = bool(pairs) and alike(question, pairs[0][0].expected, pairs[0][1])
+    yield from found_in_the_program(pieces, findings, values_are_right)
+    if not pairs or values_are_right:
         return
     yield from outputs_exchanged(question, cases, outputs)
     for name, view in views_of(question, cases, outputs):
@@ -135,12 +136,17 @@ def output_of(misconception: Misconception, args: tuple) -> object:
 # ----------------------------------------------------------------------------------- the student's own program
 
 
-def found_in_the_program(pieces: Sequence[tuple[str, str]], findings: Sequence[Finding]) -> Iterator[Sentence]:
-    """What instruments show, then what repair finds, then that an argument is changed, with the student's lines."""
+def found_in_the_program(
+    pieces: Sequence[tuple[str, str]], findings: Sequence[Finding], values_are_right: bool
+) -> Iterator[Sentence]:
+    """What instruments show, then what repair finds, with the student's lines.
+
+    That an argument is changed is told at once where that is all that is wrong, and else at last.
+    """
     shown = [f for f in findings if f.kind in WATCHES and f.kind != "writes"]
     repairs = [f for f in findings if f.kind not in WATCHES]
     written = [f for f in findings if f.kind == "writes"]
-    for finding in (*shown, *repairs[:1], *written):
+    for finding in (*written, *shown, *repairs[:1]) if values_are_right else (*shown, *repairs[:1], *written):
         equal = [f for f in repairs if f.kind == finding.kind and f.width == finding.width and f != finding][:1]
         says = said(finding)
         if finding in repairs and equal:

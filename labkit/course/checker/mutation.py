@@ -85,7 +85,7 @@ AROUND = (
     ("reversed", 2, "_[::-1] | _[:, ::-1] | _[..., ::-1]"),
     ("slice", 2, "_[1:] | _[:-1] | _[0] | _[-1] | _[:, 0] | _[:, -1] | _[..., 0] | _[:3] | _[:3, :3] | _[..., :3]"),
     ("bound", 2, "np.maximum(_, 0) | np.maximum(_, 1) | np.minimum(_, 1) | np.clip(_, 0, 1)"),
-    ("period", 2, "_ % np.pi | _ % (2 * np.pi) | _ % 256"),
+    ("period", 2, "_ % np.pi | _ % (2 * np.pi)"),
     (
         "sum",
         2,
@@ -683,6 +683,8 @@ def of_statements(function: ast.stmt) -> Iterator[Mutation]:
                 yield from of_block(Place(node, field))
         if isinstance(node, ast.AugAssign):
             yield from augmented(node)
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
+            yield from targets_exchanged(node.targets[0])
 
 
 def of_block(place: Place) -> Iterator[Mutation]:
@@ -754,6 +756,19 @@ def first_line(statement: ast.stmt) -> Span:
     if last is None:
         return Span(statement.lineno, statement.col_offset, statement.lineno, statement.col_offset + 4)
     return Span(statement.lineno, statement.col_offset, last.end_lineno, last.end_col_offset)
+
+
+def targets_exchanged(targets: ast.Tuple) -> Iterator[Mutation]:
+    """`W, H = y.shape` for `H, W = y.shape`."""
+    place = Place(targets, "elts")
+    for i, j in itertools.combinations(range(len(targets.elts)), 2):
+
+        def make(elts, i=i, j=j):
+            new = list(elts)
+            new[i], new[j] = new[j], new[i]
+            return new
+
+        yield Mutation("order", 1, (place,), (make,), (span_of(targets.elts[i]), span_of(targets.elts[j])))
 
 
 def augmented(node: ast.AugAssign) -> Iterator[Mutation]:
