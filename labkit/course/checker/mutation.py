@@ -443,6 +443,9 @@ def calls(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
             return ast.copy_location(ast.Call(function, n.args, n.keywords), n)
 
         yield Recipe("function", other, 1, make, (node.func,))
+    if called in ("isclose", "allclose") and len(node.args) > 1:
+        equal = lambda n: ast.copy_location(ast.Compare(n.args[0], [ast.Eq()], [n.args[1]]), n)  # noqa: E731
+        yield Recipe("function", "==", 1, equal, (node.func,))
     for i, j in itertools.combinations(range(len(node.args)), 2):
 
         def make(n, i=i, j=j):
