@@ -13,11 +13,10 @@ import sys
 import tempfile
 from collections.abc import Sequence
 
-from labkit.course.checker.comparison import compare, expected_cases
+from labkit.course.checker.comparison import Case, expected_cases
 from labkit.course.checker.finding import Finding, read, write
-from labkit.course.checker.instruments import readings
+from labkit.course.checker.look import look
 from labkit.course.checker.question import Question
-from labkit.course.checker.repair import repairs
 
 FRESH_SEEDS = 20
 MEMORY = 3 << 30  # bytes of address space
@@ -47,21 +46,22 @@ def main() -> None:
     """Read a task from standard input, and write the findings to standard output."""
     module, pieces, seed = pickle.load(sys.stdin.buffer)
     question = importlib.import_module(module).QUESTION
-    public = [(case.args, case.expected) for case in expected_cases(question, seed)]
-
-    def fresh():
-        seeds = range(seed + 1, seed + 1 + FRESH_SEEDS)
-        drawn = (case for s in seeds for case in expected_cases(question, s) if not case.by_hand)
-        return [(case.args, case.expected) for case in drawn]
-
-    def right(expected, got):
-        return compare(question, expected, got) is None
-
+    public = pairs(expected_cases(question, seed))
     answer = os.dup(1)
     shut_in()
-    found = readings(pieces, question.function, public, right)
-    found += repairs(pieces, question.function, public, fresh, right)
+    found = look(question, pieces, public, lambda: pairs(fresh_cases(question, seed)))
     os.write(answer, write(found).encode())
+
+
+def fresh_cases(question: Question, seed: int) -> list[Case]:
+    """Random cases of FRESH_SEEDS other public seeds."""
+    seeds = range(seed + 1, seed + 1 + FRESH_SEEDS)
+    return [case for s in seeds for case in expected_cases(question, s) if not case.by_hand]
+
+
+def pairs(cases: Sequence[Case]) -> list[tuple[tuple, object]]:
+    """Arguments and expected outputs alone."""
+    return [(case.args, case.expected) for case in cases]
 
 
 def shut_in() -> None:

@@ -102,7 +102,7 @@ def array_of_list(got: list) -> np.ndarray | None:
     waiting, truths = [got], set()
     while waiting:
         for part in waiting.pop():
-            if issubclass(type(part), list):
+            if issubclass(type(part), list | tuple):
                 waiting.append(part)
             elif not issubclass(type(part), bool | int | float | np.generic | np.ndarray):
                 return None

@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
+from labkit.course.checker.diagnosis import found_in_the_program
 from labkit.course.checker.judge import Problem, parts
 from labkit.course.checker.program import Program
 from labkit.course.checker.question import PACKAGES
@@ -23,7 +24,7 @@ from labkit.course.grading.channel import Changed, WorkerLost
 from labkit.course.grading.isolated import Run, public_cases, secret_cases
 from labkit.course.grading.reading import Lab, Submission
 from labkit.course.grading.sandbox import Limits
-from labkit.course.grading.tell import tellers
+from labkit.course.grading.tell import Told, tellers
 from labkit.course.topics import of_topic
 
 LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at
@@ -127,7 +128,8 @@ class Grading:
         program = self.program(name, lambda other: self.draft(other).right)
         if program.refused:
             return not_gradable(self.lab, name, program.refused)
-        judged, outputs = Run(question, program, self.limits, self.unsafe).judged(public_cases(question))
+        run = Run(question, program, self.limits, self.unsafe)
+        judged, outputs = run.judged(public_cases(question))
         flags = copies.of_the_kit(self.cuts[name][1], question.reference)
         text = "\n\n".join("\n".join(filter(str.strip, piece.splitlines())) for _, piece in program.pieces)
         result = Result(name, 0.0, worth, "", flag="; ".join(flags), program=text)
@@ -139,6 +141,8 @@ class Grading:
         found = tellers.ask(question, outputs)
         flags += [problem.says] if problem.kind in LOOK_AT else []
         flags += [found.failed] if found.failed else []
+        if not found.named and problem.kind != "time":
+            found = looked_at(found, run, problem.kind == "altered")
         return replace(
             result,
             says=f"{problem.says} ({judged.where})",
@@ -169,6 +173,16 @@ class Grading:
         flags = [draft.flag, judged.problem.says if judged.problem.kind in LOOK_AT else ""]
         flag = "; ".join(filter(None, flags))
         return replace(draft, points=0.0, right=False, says=ONLY_HIDDEN, flag=flag, behaviour=WRONG_IN_SECRET)
+
+
+def looked_at(found: Told, run: Run, values_are_right: bool) -> Told:
+    """What to tell when the answer's program has been looked at, too: its line and a question, if there is a place."""
+    pieces = run.program.pieces
+    sentence = next(found_in_the_program(pieces, run.findings(), values_are_right), None)
+    if sentence is None:
+        return found
+    lines = [line for marked in sentence.marked for line in marked.plain()]
+    return replace(found, hint=sentence.says, named=True, shown="\n".join([found.shown, *lines]).strip("\n"))
 
 
 def not_gradable(lab: Lab, name: str, problem: str) -> Result:

@@ -8,6 +8,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from labkit.course.checker.child import fresh_cases, pairs
+from labkit.course.checker.finding import Finding, read
 from labkit.course.checker.judge import Case, Problem, Verdict, expected_cases, verdict
 from labkit.course.checker.program import Program
 from labkit.course.checker.question import PACKAGES, PUBLIC_SEED, Question
@@ -23,6 +25,17 @@ drawing = threading.Lock()  # references are called with Python's warnings off, 
 def _public_cases(topic: str, function: str) -> tuple[Case, ...]:
     with drawing:
         return tuple(expected_cases(of_topic(topic)[function], PUBLIC_SEED))
+
+
+@functools.cache
+def _more_public_cases(topic: str, function: str) -> tuple[Case, ...]:
+    with drawing:
+        return tuple(fresh_cases(of_topic(topic)[function], PUBLIC_SEED))
+
+
+def more_public_cases(question: Question) -> tuple[Case, ...]:
+    """Cases of other public seeds, on which a repair is tried; computed once in a process."""
+    return _more_public_cases(question.topic, question.function)
 
 
 def public_cases(question: Question) -> tuple[Case, ...]:
@@ -59,6 +72,18 @@ class Run:
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
             return Verdict(problem, 0, "some case"), outputs
+
+    def findings(self) -> list[Finding]:
+        """What instruments and repair find in the program, in a worker that gets public cases and nothing else."""
+        question, pieces = self.question, self.program.pieces
+        tolerances = {name: getattr(question, name) for name in ("name", "rtol", "atol", "same_dtype")}
+        public, fresh = pairs(public_cases(question)), pairs(more_public_cases(question))
+        try:
+            with sandbox.fresh_worker(self.packages(), self.limits, self.unsafe) as worker:
+                reply = worker.ask(("look", tolerances, pieces, public, fresh), self.limits.question_s)
+        except WorkerLost:
+            return []
+        return read(reply, pieces) if isinstance(reply, str) else []
 
     def outputs(self, cases: Sequence[Case]) -> list[object]:
         """Call the answer on the arguments of all cases: an output or a Problem for each.

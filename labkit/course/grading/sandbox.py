@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from labkit.course.checker import program
+from labkit.course.checker import look, program
 from labkit.course.grading import bwrap, seccomp, shapes, worker
 from labkit.course.grading.channel import Worker, WorkerLost
 from labkit.support.packages import requirements
@@ -42,6 +42,9 @@ NO_SANDBOX = "graded WITHOUT a sandbox: a submission could read and change anyth
 FAREWELL_S = 10.0  # for the server to kill a child
 # What cuts programs out of notebooks: a stranger's text is parsed in the sandbox, too.
 TOOLS = {"program": os.path.abspath(program.__file__), "shapes": os.path.abspath(shapes.__file__)}
+# What looks for a mistake in a program, loaded where it is asked for: file names by their modules.
+LOOK_FOR_MISTAKES = {f"labkit.course.checker.{name}": f"{name}.py" for name in look.MODULES}
+CHECKER = Path(look.__file__).resolve().parent
 counter = itertools.count(os.getpid())
 
 
@@ -75,6 +78,7 @@ def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
             "threads": None if unsafe else limits.threads,
             "cpu_s": int(limits.question_s) + 5,
             "tools": TOOLS if unsafe else {name: f"/{name}.py" for name in TOOLS},
+            "look": {name: str(CHECKER / file) if unsafe else f"/{file}" for name, file in LOOK_FOR_MISTAKES.items()},
             "filter": "" if unsafe else base64.b64encode(seccomp.program()).decode(),
         }
     )
@@ -274,6 +278,7 @@ def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | N
     shown += [(f"{SITE}/{name}", str(path)) for name, path in sorted(tops.items())]
     shown += [(f"/dev/{name}", f"/dev/{name}") for name in ("null", "urandom", "zero")]
     programs = TOOLS | {"worker": os.path.abspath(worker.__file__)}
+    shown += [(f"/{file}", str(CHECKER / file)) for file in LOOK_FOR_MISTAKES.values()]
     return python, [*dict.fromkeys(shown), *((f"/{name}.py", path) for name, path in programs.items())]
 
 

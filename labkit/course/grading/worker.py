@@ -47,6 +47,8 @@ def encode(value: object) -> bytes:
     >>> encode(True)
     b'V\\xff\\x00\\x00\\x01'
     """
+    if issubclass(type(value), list) and is_regular(value):
+        return encode(as_array(value))
     several = issubclass(type(value), tuple | list)
     if several and len(value) > MOST_PARTS:
         return b"L"
@@ -64,6 +66,16 @@ def encode(value: object) -> bytes:
     return reply if len(reply) <= MOST_BYTES else b"B"
 
 
+def is_regular(value: list) -> bool:
+    """Whether a list stands for one array of numbers, as `comparison.plain` takes it."""
+    import numpy as np
+
+    try:
+        return bool(value) and np.array(value).dtype.kind in "biuf"
+    except (ValueError, TypeError, OverflowError):
+        return False
+
+
 def as_array(value: object):
     """Give a number, an array or a tensor as a plain little-endian array; raises CannotBeSent for anything else."""
     import numpy as np
@@ -71,7 +83,7 @@ def as_array(value: object):
     cls, torch = type(value), sys.modules.get("torch")
     if torch is not None and issubclass(cls, torch.Tensor):
         value = value.detach().cpu().resolve_neg().numpy()
-    elif not issubclass(cls, bool | int | float | complex | np.generic | np.ndarray):
+    elif not issubclass(cls, bool | int | float | complex | np.generic | np.ndarray | list):
         raise CannotBeSent(b"K" + cls.__name__.encode()[:60])
     array = np.array(value, subok=False)
     if array.dtype.kind not in "biuf":
@@ -84,8 +96,8 @@ def as_array(value: object):
 class Session:
     """What a worker is asked to do: to cut programs out of a notebook, to run one, and to call its function."""
 
-    def __init__(self, tools: dict):
-        self.tools, self.namespace, self.pieces = tools, {"__name__": "__main__"}, []
+    def __init__(self, tools: dict, look: dict[str, str]):
+        self.tools, self.look_modules, self.namespace, self.pieces = tools, look, {"__name__": "__main__"}, []
 
     def answer(self, request: tuple) -> bytes:
         """Do what a request asks for, and write the reply: its first word says which method, the rest its arguments."""
@@ -112,6 +124,12 @@ class Session:
             found.append((made.pieces, made.calls, made.refused, list(shapes.shapes_in(text))))
         return b"J" + json.dumps(found).encode()
 
+    def look(self, *task: object) -> bytes:
+        """Look for the mistake in a program, in a worker that has run nothing of it: `look.in_the_sandbox`."""
+        for name, path in self.look_modules.items():
+            look = load(name, path)
+        return b"J" + look.in_the_sandbox(*task).encode()
+
     def run(self, label: str, source: str) -> bytes:
         """Run a piece of a program."""
         self.pieces.append(f"<{label}>")
@@ -129,8 +147,7 @@ class Session:
 
 
 def load(name: str, path: str):
-    """Import a module of the kit's from its file; it needs the standard library alone."""
-    name = f"_{name}"
+    """Import a module of the kit's from its file; it needs the standard library, or also NumPy, and no labkit."""
     spec = importlib.util.spec_from_file_location(name, path)
     sys.modules[name] = module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -188,12 +205,12 @@ def main(options: dict) -> None:
     sys.path += options["path"]
     for package in options["load"]:
         importlib.import_module(package)
-    tools = {name: load(name, path) for name, path in options["tools"].items()}
+    tools = {name: load(f"_{name}", path) for name, path in options["tools"].items()}
     if options["only"] is not None:  # no sandbox: this process is used once
         requests, replies = os.dup(0), os.dup(1)
         sys.meta_path.insert(0, Only(options["only"]))
         limit(options)
-        serve(requests, replies, tools)
+        serve(requests, replies, tools, options["look"])
         return
     control = socket.socket(fileno=os.dup(0))
     control.send(b"r")
@@ -206,7 +223,7 @@ def main(options: dict) -> None:
             control.close()
             limit(options)
             lock_in(options)
-            serve(*pipes, tools)
+            serve(*pipes, tools, options["look"])
             os._exit(0)
         for pipe in pipes:
             os.close(pipe)
@@ -252,14 +269,14 @@ def lock_in(options: dict) -> None:
         raise OSError(ctypes.get_errno(), "the filter of system calls cannot be set")
 
 
-def serve(requests: int, replies: int, tools: dict) -> None:
+def serve(requests: int, replies: int, tools: dict, look: dict[str, str]) -> None:
     """Answer requests until there are no more. The first reply, O, says that the packages are loaded."""
     null = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1, 2):
         os.dup2(null, standard)
     with os.fdopen(requests, "rb") as stream, os.fdopen(replies, "wb", buffering=0) as out:
         send(out, b"O")
-        session = Session(tools)
+        session = Session(tools, look)
         while len(head := stream.read(4)) == 4:
             send(out, session.answer(pickle.loads(stream.read(*struct.unpack("<I", head)))))
 
