@@ -78,7 +78,9 @@ def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
             "threads": None if unsafe else limits.threads,
             "cpu_s": int(limits.question_s) + 5,
             "tools": TOOLS if unsafe else {name: f"/{name}.py" for name in TOOLS},
-            "look": {name: str(CHECKER / file) if unsafe else f"/{file}" for name, file in LOOK_FOR_MISTAKES.items()},
+            "look": {
+                name: str(CHECKER / file) if unsafe else f"/look/{file}" for name, file in LOOK_FOR_MISTAKES.items()
+            },
             "filter": "" if unsafe else base64.b64encode(seccomp.program()).decode(),
         }
     )
@@ -278,7 +280,7 @@ def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | N
     shown += [(f"{SITE}/{name}", str(path)) for name, path in sorted(tops.items())]
     shown += [(f"/dev/{name}", f"/dev/{name}") for name in ("null", "urandom", "zero")]
     programs = TOOLS | {"worker": os.path.abspath(worker.__file__)}
-    shown += [(f"/{file}", str(CHECKER / file)) for file in LOOK_FOR_MISTAKES.values()]
+    shown += [(f"/look/{file}", str(CHECKER / file)) for file in LOOK_FOR_MISTAKES.values()]
     return python, [*dict.fromkeys(shown), *((f"/{name}.py", path) for name, path in programs.items())]
 
 

@@ -1,4 +1,4 @@
-"""A wrong answer in the grader is looked at in a sandbox of its own: its line is told, and nothing that it says is believed."""
+"""The grader looks at a wrong answer in a sandbox of its own: its line is told, and what it says is checked."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,8 @@ import numpy as np
 def iou(n):
     module = sys.modules.get("labkit.course.checker.look")
     if module is not None:
-        entry = {"kind": "axis", "piece": 0, "spans": [{"line": 1, "column": 0, "last_line": 1, "end": 9999}], "value": 0}
+        span = {"line": 1, "column": 0, "last_line": 1, "end": 9999}
+        entry = {"kind": "axis", "piece": 0, "spans": [span], "value": 0}
         module.write = lambda found: json.dumps([entry, {"kind": "<b>", "piece": 0, "spans": [], "value": 0}])
     return n.sum(axis=0)
 """
@@ -37,7 +38,7 @@ def test_the_students_line_is_told():
     told = looked_at(Told(shown="the case"), run_of(WRONG_AXIS), values_are_right=False)
     assert told.named and "axis" in told.hint
     case, line, marks = told.shown.split("\n")
-    assert case == "the case" and "line 5" in line and marks.count("^") == 2 * len("axis=0")
+    assert case == "the case" and "line 5" in line and marks.split() == ["^", "^"]
 
 
 @pytest.mark.parametrize("source", [FORGES, LEAVES, "def iou(n):\n    while True: pass\n", "def iou("])
