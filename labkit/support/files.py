@@ -16,8 +16,6 @@ def write_atomically(path, data: bytes) -> None:
         unfinished.write_bytes(data)
         os.replace(unfinished, path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise OSError(error.errno, f"could not write the file ({os.strerror(error.errno or 0)})", str(path)) from error
-    except BaseException:
+    finally:
         unfinished.unlink(missing_ok=True)
-        raise
