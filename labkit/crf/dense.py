@@ -68,20 +68,19 @@ class GaussianFilter:
     def __init__(self, features: Float[np.ndarray, "H W d"]):
         """features: each channel divided by its standard deviation; ValueError for a range too large to index."""
         d = features.shape[2]
-        elevated, least, largest = lattice.elevate(
-            features.reshape(-1, d).astype(np.float32), elevation(d).astype(np.float32)
-        )
+        elevated = features.reshape(-1, d).astype(np.float32) @ elevation(d).T.astype(np.float32)
         margin = 3 * (d + 1)  # corners and their neighbours stay within it
-        lowest = np.floor(least).astype(np.int64) - margin
-        size = np.ceil(largest).astype(np.int64) + margin - lowest
+        lowest = np.floor(elevated.min(axis=0)).astype(np.int64) - margin
+        size = np.ceil(elevated.max(axis=0)).astype(np.int64) + margin - lowest
         if np.prod(size[:d].astype(np.float64)) > 2.0**62:
             raise ValueError(f"theta: expected larger scales; {d} features span up to {size.max()} lattice steps")
         stride = np.cumprod(np.concatenate([[1], size[: d - 1]]))
         keys, self.weights = lattice.corners_of_pixels(elevated, lowest, stride)
-        self.corner, found, *table = lattice.number_corners(keys)
+        found, corner = np.unique(keys, return_inverse=True)
+        self.corner = 1 + corner.reshape(keys.shape).astype(np.int32)
         # A step along direction j adds d + 1 to coordinate j and takes 1 from all; the last one has no place in keys.
         steps = np.append((d + 1) * stride, 0) - stride.sum()
-        self.near = lattice.neighbour_corners(found, *table, steps)
+        self.near = lattice.neighbour_corners(found, steps)
         self.scale = np.ones(len(keys), np.float32)
         total = np.zeros((len(keys), 1), np.float32)
         self.add_filtered(np.ones_like(total), 1.0, total)

@@ -13,21 +13,6 @@ from numba import njit
 
 
 @njit(cache=True)
-def elevate(features, E):
-    """Map each pixel's features to the plane sum(x) = 0: (N, d + 1), with the least and largest of each coordinate."""
-    N, d = features.shape
-    elevated = np.zeros((N, d + 1), np.float32)
-    least, largest = np.full(d + 1, np.inf, np.float32), np.full(d + 1, -np.inf, np.float32)
-    for n in range(N):
-        for i in range(d + 1):
-            for j in range(d):
-                elevated[n, i] += E[i, j] * features[n, j]
-            least[i] = min(least[i], elevated[n, i])
-            largest[i] = max(largest[i], elevated[n, i])
-    return elevated, least, largest
-
-
-@njit(cache=True)
 def corners_of_pixels(elevated, lowest, stride):
     """Find the simplex around each point of the plane sum(x) = 0: the keys and barycentric weights of its corners."""
     N, d1 = elevated.shape
@@ -73,56 +58,17 @@ def corners_of_pixels(elevated, lowest, stride):
     return keys, weights
 
 
-@njit(cache=True)
-def slot_of(table_keys, key):
-    """Where a key is in the hash table, or where it would go: the first free slot from its hash on."""
-    mask = len(table_keys) - 1
-    slot = ((key * -7046029254386353131) >> 20) & mask
-    while table_keys[slot] >= 0 and table_keys[slot] != key:
-        slot = (slot + 1) & mask
-    return slot
+def neighbour_corners(found, steps):
+    """Look up each corner's two neighbours along each direction: (directions, M + 1, 2), 0 where there is none.
 
-
-@njit(cache=True)
-def number_corners(keys):
-    """Number the distinct keys from 1 in the order of their appearance: (corner of each key, keys, hash table)."""
-    N, d1 = keys.shape
-    corner = np.empty((N, d1), np.int32)
-    found = np.empty(N * d1 + 1, np.int64)
-    table_keys, table_corners = np.full(1 << 14, -1, np.int64), np.zeros(1 << 14, np.int32)
-    M = 0
-    for n in range(N):
-        if 4 * (M + d1) > 2 * len(table_keys):  # half full: twice the size
-            size = 2 * len(table_keys)
-            table_keys, table_corners = np.full(size, -1, np.int64), np.zeros(size, np.int32)
-            for m in range(1, M + 1):
-                slot = slot_of(table_keys, found[m])
-                table_keys[slot], table_corners[slot] = found[m], m
-        for r in range(d1):
-            key = keys[n, r]
-            if n > 0 and keys[n - 1, r] == key:  # pixels side by side often share a simplex
-                corner[n, r] = corner[n - 1, r]
-                continue
-            slot = slot_of(table_keys, key)
-            if table_keys[slot] < 0:
-                M += 1
-                found[M] = key
-                table_keys[slot], table_corners[slot] = key, M
-            corner[n, r] = table_corners[slot]
-    return corner, found[: M + 1].copy(), table_keys, table_corners
-
-
-@njit(cache=True)
-def neighbour_corners(found, table_keys, table_corners, steps):
-    """Look up each corner's two neighbours along each direction: (directions, M + 1, 2), 0 where there is none."""
-    near = np.zeros((len(steps), len(found), 2), np.int32)
-    for j in range(len(steps)):
-        for m in range(1, len(found)):
-            slot = slot_of(table_keys, found[m] + steps[j])
-            if table_keys[slot] >= 0:
-                other = table_corners[slot]
-                near[j, m, 1] = other
-                near[j, other, 0] = m
+    found: the M keys, ascending; corner m + 1 has the key found[m].
+    """
+    near = np.zeros((len(steps), len(found) + 1, 2), np.int32)
+    for j, step in enumerate(steps):
+        place = np.minimum(np.searchsorted(found, found + step), len(found) - 1)
+        m = np.flatnonzero(found[place] == found + step)
+        near[j, 1 + m, 1] = 1 + place[m]
+        near[j, 1 + place[m], 0] = 1 + m
     return near
 
 
