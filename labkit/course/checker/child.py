@@ -76,7 +76,7 @@ def shut_in() -> None:
         os.dup2(null, stream)
 
     def refuse(event: str, args: tuple) -> None:
-        writes = event == "open" and isinstance(args[1], str) and set(args[1]) & set("wax+")
+        writes = event == "open" and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         if writes or event.startswith(FORBIDDEN):
             raise PermissionError(f"an answer does not do this: {event}")
 
