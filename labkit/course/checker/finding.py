@@ -122,7 +122,8 @@ def checked(entry: dict, pieces: Sequence[tuple[str, str]]) -> Finding:
         if not 1 <= span.line <= span.last_line <= len(lines):
             raise ValueError("no such line")
         first, last = lines[span.line - 1].encode(), lines[span.last_line - 1].encode()
-        if not 0 <= span.column <= len(first) or not 0 <= span.end <= len(last):
+        backwards = span.line == span.last_line and span.end < span.column
+        if backwards or not 0 <= span.column <= len(first) or not 0 <= span.end <= len(last):
             raise ValueError("no such column")
     if not spans:
         raise ValueError("no place")

@@ -13,7 +13,7 @@ from types import FrameType, TracebackType
 import numpy as np
 
 from labkit.course.checker.finding import Finding, Span
-from labkit.course.checker.repair import Mutant, SearchIsOver, TimeIsUp, copied, limited, same, silent
+from labkit.course.checker.repair import ENDS, Mutant, copied, limited, same, silent
 
 MOST_S = 2.0  # CPU seconds of all watches together
 MOST_EVENTS = 4000  # lines of which the variables are kept
@@ -33,7 +33,7 @@ def readings(
             for watch in (floating_point, byte_arithmetic, written_argument):
                 if reading := watch(mutant, cases, wrong, right):
                     found.append(reading)
-        except (Exception, TimeIsUp, SearchIsOver):
+        except ENDS:
             pass
     return found
 

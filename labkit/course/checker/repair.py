@@ -36,6 +36,9 @@ class SearchIsOver(BaseException):
     """Raised when the time of the whole search is up."""
 
 
+ENDS = (Exception, SystemExit, KeyboardInterrupt, TimeIsUp, SearchIsOver)  # how a student's program may end
+
+
 class Mutant:
     """A program whose functions can be replaced, one at a time, and called on copies of a case's arguments."""
 
@@ -112,7 +115,7 @@ def repairs(
         try:
             mutant = Mutant(pieces, name)
             return found_in(mutant, cases, fresh, right)
-        except (Exception, TimeIsUp, SearchIsOver):  # nothing can be said about such a program
+        except ENDS:  # nothing can be said about such a program
             return []
 
 
