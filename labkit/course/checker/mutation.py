@@ -370,6 +370,9 @@ def operators(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
             yield Recipe("operator", op.__name__, 1, make, (between(node.left, node.right),))
     yield Recipe("too much", "without the right", 1, lambda n: n.left, (node.right,))
     yield Recipe("too much", "without the left", 1, lambda n: n.right, (node.left,))
+    if isinstance(node.op, ast.Mult) and isinstance(node.left, ast.UnaryOp):
+        make = lambda n: ast.copy_location(ast.UnaryOp(n.left.op, n.right), n)  # noqa: E731
+        yield Recipe("too much", "without the left but its sign", 1, make, (node.left.operand,))
     if not isinstance(node.op, ast.Add | ast.Mult | ast.BitAnd | ast.BitOr):
         yield Recipe("order", "sides", 1, lambda n: ast.copy_location(ast.BinOp(n.right, n.op, n.left), n))
     if isinstance(node.left, ast.BinOp):

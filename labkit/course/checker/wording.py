@@ -50,7 +50,7 @@ SAYS = {
     "complement": "The marked part is the share of the others. Whose share do you need?",
     "reciprocal": "Numerator and denominator are exchanged here. What is divided by what?",
     "shift": "Something has to be subtracted from the marked part before it is used. What is it?",
-    "divided": "The marked part is not yet divided by what it should be. What should it sum to?",
+    "divided": "The marked part is not yet divided by what it should be. What should its sum or its length be?",
     "term": "A term or a factor is missing here, and it is made of your own variables. Which one?",
     "new axis": "An axis is missing here. Which shapes meet in this line, and which entries should meet?",
     "sum": "The marked part should become fewer numbers first: a sum, a mean, a largest or a smallest one. Of what?",
