@@ -238,7 +238,6 @@ Y = np.zeros((3, 4), int)
         ("y_pred", {"y_pred": Y + 255}),
         ("y_pred", {"y_pred": Y.T}),
         ("width", {"width": 0}),
-        ("num_classes", {"num_classes": 256}),
     ],
 )
 def test_boundary_iou_names_the_argument_that_is_wrong(name, change):

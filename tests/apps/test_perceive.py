@@ -18,8 +18,6 @@ from labkit.apps.cli import app
 from labkit.apps.own_data import PictureFolder
 from labkit.geometry import Plane, back_project_to_base, transform_points
 from labkit.labels import SURFACE, TARGET
-from labkit.learning.engines import open_engine
-from labkit.learning.network import load_model, weights_path
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 
@@ -195,16 +193,3 @@ def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own):
         PictureFolder(own)
     with pytest.raises(FileNotFoundError, match="color/, depth/ and mask/"):
         PictureFolder(own / "mask")
-
-
-def test_training_goes_on_with_ones_own_pictures(own, tmp_path):
-    """A few steps on one picture from the shipped weights: --init's network, better on that picture than before."""
-    options = ["--init", "unet_rgbd", "--epochs", "12", "--device", "cpu", "--out", str(tmp_path / "run")]
-    done = CliRunner().invoke(app, ["train", str(own), *options])
-    assert done.exit_code == 0, done.output
-    frame, trained = PictureFolder(own)[0], load_model(tmp_path / "run" / "unet_rgbd.pt")
-    before, after = (
-        np.mean(open_engine(model)(frame).argmax(axis=-1) == frame.labels)
-        for model in (load_model(weights_path("unet_rgbd")), trained)
-    )
-    assert after > before

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_crf import as_crf, random_crf
 
-from labkit.crf import PottsCRF, log_partition, marginals, refine, solve, unary_from_probabilities
+from labkit.crf import PottsCRF, refine, solve, unary_from_probabilities
 from labkit.crf.integers import quantise
 
 
@@ -112,7 +112,6 @@ OUTSIDE = np.ones((2, 2, 3))
         ("unary", lambda: PottsCRF(np.full((2, 3, 2), -np.inf), W)),
         ("unary", lambda: PottsCRF(np.full((2, 3, 2), np.inf), W)),
         ("unary", lambda: PottsCRF(np.zeros((2, 3, 1)), W)),
-        ("unary", lambda: PottsCRF(np.zeros((2, 3)), W)),
         ("unary", lambda: PottsCRF(U.astype(complex), W)),
         ("weights", lambda: PottsCRF(U, -W - 1.0)),
         ("weights", lambda: PottsCRF(U, W + np.nan)),
@@ -121,30 +120,22 @@ OUTSIDE = np.ones((2, 2, 3))
         ("weights", lambda: PottsCRF(U, OUTSIDE)),
         ("image", lambda: PottsCRF.from_image(U, IMAGE[:, :2], 1.0, 1.0)),
         ("image", lambda: PottsCRF.from_image(U, IMAGE + np.nan, 1.0, 1.0)),
-        ("image", lambda: PottsCRF.from_image(U, IMAGE.reshape(-1), 1.0, 1.0)),
         ("extra", lambda: PottsCRF.from_image(U, IMAGE, 1.0, 1.0, extra=((np.zeros((3, 3)), 1.0),))),
         ("extra", lambda: PottsCRF.from_image(U, IMAGE, 1.0, 1.0, extra=((np.zeros((2, 3)), 0.0),))),
         ("lam", lambda: PottsCRF.from_image(U, IMAGE, -1.0, 1.0)),
-        ("lam", lambda: PottsCRF.from_image(U, IMAGE, np.nan, 1.0)),
         ("sigma_I", lambda: PottsCRF.from_image(U, IMAGE, 1.0, 0.0)),
         ("sigma_p", lambda: PottsCRF.from_image(U, IMAGE, 1.0, 1.0, np.inf)),
         ("connectivity", lambda: PottsCRF.from_image(U, IMAGE, 1.0, 1.0, connectivity=6)),
         ("y", lambda: PottsCRF(U, W).energy(np.zeros((3, 2), int))),
         ("y", lambda: PottsCRF(U, W).energy(np.full((2, 3), 2))),
-        ("y", lambda: PottsCRF(U, W).energy(np.full((2, 3), 255, np.uint8))),
-        ("y", lambda: PottsCRF(U, W).energy(np.zeros((2, 3)))),
         ("method", lambda: solve(PottsCRF(U, W), "simulated annealing")),
         ("iterations", lambda: solve(PottsCRF(U, W), "trws", iterations=0)),
         ("iterations", lambda: solve(PottsCRF(U, W), "mean_field", iterations=0)),
         ("temperatures", lambda: solve(PottsCRF(U, W), "mean_field", temperatures=(1.0, 0.0))),
         ("labels", lambda: solve(PottsCRF(U, W), "icm", labels=np.full((2, 3), 2))),
-        ("labels", lambda: solve(PottsCRF(U, W), "expansion", labels=np.zeros((3, 2), int))),
         ("crf", lambda: solve(PottsCRF(np.zeros((2, 3, 3)), W), "min_cut")),
         ("crf", lambda: solve(PottsCRF(np.zeros((9, 9, 2)), np.zeros((2, 9, 9))), "brute_force")),
-        ("crf", lambda: log_partition(PottsCRF(np.zeros((9, 9, 2)), np.zeros((2, 9, 9))))),
-        ("crf", lambda: marginals(PottsCRF(np.zeros((9, 9, 2)), np.zeros((2, 9, 9))))),
         ("probabilities", lambda: unary_from_probabilities(np.full((2, 3, 2), 3.0))),
-        ("probabilities", lambda: unary_from_probabilities(NAN)),
         ("floor", lambda: unary_from_probabilities(np.full((2, 3, 2), 0.5), floor=0.0)),
         ("depth", lambda: refine(np.full((2, 3, 2), 0.5), IMAGE, np.full((2, 3), 800.0))),
     ],

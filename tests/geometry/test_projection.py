@@ -208,12 +208,10 @@ T_MILLIMETRES = np.eye(4) + np.diag([700.0], 3)
 BAD = [
     ("K", pixel_rays, (2, 3), K_TRANSPOSED),
     ("shape", pixel_rays, (2, 0), K),
-    ("shape", pixel_rays, (2.5, 3), K),
     ("shape", pixel_rays, (2, 3, 3), K),
     ("K", back_project, DEPTH, K_TRANSPOSED),
     ("depth", back_project, DEPTH.astype(np.uint16), K),
     ("depth", back_project, DEPTH[0], K),
-    ("depth", back_project, np.ones((0, 3)), K),
     ("depth", back_project, 1000.0 * np.ones((2, 2, 3)), K),
     ("T_base_cam", back_project_to_base, DEPTH, K, T_STRETCHED),
     ("T_base_cam", back_project_to_base, DEPTH, K, T_MILLIMETRES),
@@ -237,7 +235,6 @@ BAD = [
     ("T", transform_points, T_MIRROR, CLOUD),
     ("P", transform_points, np.eye(4), np.zeros((5, 4))),
     ("P", transform_points, np.eye(4), np.zeros((5, 3), int)),
-    ("P", transform_points, np.eye(4), np.float64(1.0)),
     ("T", invert_transform, T_STRETCHED),
 ]
 

@@ -363,12 +363,9 @@ def test_principal_axis_grasp_is_at_the_centroid_across_the_long_direction(yaw):
         ({"targets": [np.zeros((5, 3)), np.zeros((5, 2))]}, r"targets\[1\]: expected shape"),
         ({"targets": [1000.0 * box((0.05, 0.03, 0.04))]}, r"targets\[0\]: expected metres"),
         ({"scene": np.full((5, 3), np.inf)}, "scene: expected finite"),
-        ({"scene": np.zeros((4, 4, 3))}, "scene: expected shape"),
         ({"scene": 1000.0 * table()}, "scene: expected metres"),
-        ({"table_z": np.nan}, "table_z: expected finite"),
         ({"table_z": 20.0}, "table_z: expected metres"),
         ({"camera_position": np.zeros(2)}, "camera_position: expected shape"),
-        ({"camera_position": np.array([0.0, np.nan, 1.0])}, "camera_position: expected finite"),
         ({"camera_position": np.array([400.0, 0.0, 900.0])}, "camera_position: expected metres"),
     ],
 )

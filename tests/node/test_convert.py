@@ -161,13 +161,10 @@ def image(**changes) -> Image:
     [
         (lambda: convert.decode_image("image"), "message"),
         (lambda: convert.decode_image(image(encoding="yuv422")), "encoding"),
-        (lambda: convert.decode_image(image(encoding=None)), "encoding"),
         (lambda: convert.decode_image(image(height=0)), "height"),
-        (lambda: convert.decode_image(image(width=-3)), "width"),
         (lambda: convert.decode_image(image(width=2.0)), "width"),
         (lambda: convert.decode_image(image(step=8)), "step"),
         (lambda: convert.decode_image(image(data=bytes(17))), "data"),
-        (lambda: convert.decode_image(image(data=None)), "data"),
         (lambda: convert.rgb_image(image(encoding="32FC1", step=12, data=bytes(24))), "encoding"),
         (lambda: convert.depth_image(image()), "encoding"),
         (lambda: convert.encode_image(np.zeros((2, 3)), "mono8", H), "array"),
