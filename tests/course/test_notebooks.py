@@ -17,7 +17,7 @@ from notebooks import LABS, LESSONS, ROOT, SOLUTIONS, code, notebook, prose
 from labkit.course.checker.run import Printed, judge
 from labkit.course.checking import describe
 from labkit.course.release import mistakes, release
-from labkit.course.topics import TOPICS, of_topic
+from labkit.course.topics import of_topic
 
 MAX_LINES, MAX_PNG = 25, 150_000
 # Names that are undefined or unused, statements that do nothing or not what they seem, old NumPy, errors of syntax.
@@ -157,21 +157,6 @@ def test_compared_outputs_hold_no_address_and_no_time(path):
     for cell in filter(is_compared, code(path)):
         text = "".join(output.get("text", output.get("data", {}).get("text/plain", "")) for output in cell.outputs)
         assert not re.search(r"0x[0-9a-f]{6,}|\bit/s|\d:\d\d<", text), text[:200]
-
-
-@each([*LESSONS, *SOLUTIONS])
-def test_it_says_early_how_many_minutes_it_takes(path):
-    first = "\n".join(cell.source for cell in notebook(path).cells[: 3 if path in LESSONS else 6])
-    assert re.search(r"\d+ (?:to \d+ )?min", first)
-
-
-@each(LESSONS)
-def test_a_lesson_asks_and_leads_on(path):
-    """Predictions with folded answers, references to read, and the way to the lab."""
-    text = prose(path)
-    assert text.count("<details") >= 5 and text.count("<details") == text.count("</details>")
-    assert f"labs/{max((t for t in TOPICS if path.stem.startswith(t)), key=len)}" in text
-    assert re.search(r"read (?:next|on|more)|further reading|to read|references", text, re.IGNORECASE)
 
 
 # ------------------------------------------------------------------------------------------------ labs

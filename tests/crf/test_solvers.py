@@ -94,15 +94,6 @@ def test_the_default_certifies_its_answer(connectivity):
     assert result.seconds > 0.0 and result.iterations > 0
 
 
-@pytest.mark.parametrize("connectivity", [4, 8])
-def test_for_two_classes_trws_and_the_cut_check_each_other(connectivity):
-    crf = noisy_image(2, 60, 80, 2, 0.45, 1.2, connectivity)
-    cut, messages = solve(crf, "min_cut"), solve(crf, "trws", iterations=400, tolerance=0.0)
-    assert cut.gap < 1e-6
-    assert messages.lower_bound == pytest.approx(cut.energy, rel=1e-4)
-    assert messages.lower_bound <= cut.energy
-
-
 def test_more_iterations_of_trws_do_not_lower_what_is_proven():
     crf = noisy_image(3, 40, 50, 5, 0.3, 2.0)
     bounds = [solve(crf, "trws", iterations=n, tolerance=0.0).lower_bound for n in (1, 3, 10, 30)]

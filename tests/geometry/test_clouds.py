@@ -178,14 +178,6 @@ def test_dense_clouds_agree_with_brute_force_too():
     assert [len(points) for points in cluster(far, 0.01, 1)] == [*sizes, 1]
 
 
-def test_flying_pixels_between_an_object_and_the_wall_are_removed_and_the_object_stays():
-    rows, columns = np.mgrid[:25, :25] * 0.003
-    surface = np.column_stack([columns.ravel(), rows.ravel(), np.full(625, 0.8)])
-    flying = surface[:25] + np.column_stack([np.zeros((25, 2)), 0.02 + 0.3 * np.linspace(0, 1, 25)])
-    cleaned = remove_outliers(np.random.default_rng(21).permutation(np.vstack([surface, flying])))
-    assert len(cleaned) == 625 and (cleaned[:, 2] == 0.8).all()
-
-
 # Bad input
 
 CLOUD, NAN_CLOUD = np.zeros((5, 3)), np.array([[0.0, 0.0, np.nan]])

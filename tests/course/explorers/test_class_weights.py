@@ -27,12 +27,6 @@ def test_scores_of_the_gaussians_are_those_of_drawn_pixels(distance, share, weig
     np.testing.assert_allclose([precision[0], recall[0], overlap[0]], counted, atol=0.03)
 
 
-def test_a_heavier_class_moves_the_boundary_away_from_itself_and_pays_for_recall_with_precision():
-    boundary, precision, recall, overlap = class_weights.gaussian_scores(2.0, 0.02, 2.0**class_weights.EXPONENTS)
-    assert (np.diff(boundary) < 0).all() and (np.diff(recall) > 0).all() and (np.diff(precision) < 0).all()
-    assert 0 < overlap.argmax() < overlap.size - 1
-
-
 @pytest.fixture
 def scenes():
     """Two frames with random probabilities, different in size."""

@@ -48,16 +48,6 @@ def test_the_toy_has_dead_ends_for_single_clicks(start):
     assert np.array_equal(best.labels == 1, widgets.TOY_IMAGE > 120)
 
 
-def test_both_parts_of_the_energy_add_up_to_it():
-    rng = np.random.default_rng(4)
-    crf = PottsCRF.from_image(rng.random((5, 6, 3)), rng.random((5, 6)), 2.0, 0.3)
-    y = rng.integers(0, 3, (5, 6))
-    unary, pairwise = widgets.energy_terms(crf, y)
-    assert unary + pairwise == pytest.approx(crf.energy(y)) and unary == pytest.approx(
-        np.take_along_axis(crf.unary, y[..., None], 2).sum()
-    )
-
-
 @pytest.mark.parametrize("y", [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)])
 def test_the_arcs_drawn_as_cut_add_up_to_the_energy(y):
     psi, w = np.array([[1.0, 4.0], [2.5, 0.5], [3.0, 0.25]]), np.array([0.75, 2.0])
