@@ -150,6 +150,11 @@ def columns_scaled_as_rows(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))
 
 
+@wrong(QUESTION, "The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+def rounded_up_and_clipped(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n).clip(0, old - 1))
+
+
 @wrong(QUESTION, "In floats 7.5 / 11 * 22 is less than 15: in which order does the formula multiply and divide?")
 def divided_before_multiplied(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) / n * old)

@@ -202,9 +202,9 @@ def with_turn(hint, name, turn):
         wrong(QUESTION, hint)(answer)
 
 
-def arc(a, b, first, second, divided=True):
+def arc(a, b, first, second, divided=True, nearer=lambda a, b: b if a @ b >= 0 else -b):
     """first(omega) a + second(omega) b for the nearer one of b and -b; a, if both are one turn."""
-    b = b if a @ b >= 0 else -b
+    b = nearer(a, b)
     omega = np.arccos(min(a @ b, 1.0))
     if np.sin(omega) < 1e-12:
         return a
@@ -231,5 +231,7 @@ with_turn(
 with_turn(
     "The nearer one of b and -b is near to a: does the sign of b's own w know where a is?",
     "sign_of_w",
-    lambda a, b, s: slerp(a, b if b[3] >= 0 else -b, s),
+    lambda a, b, s: arc(
+        *(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o)), nearer=lambda a, b: b if b[3] >= 0 else -b
+    ),
 )
