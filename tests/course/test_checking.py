@@ -164,6 +164,36 @@ def test_html_says_the_same_in_colour_and_escapes_what_students_write():
     assert len(set(re.findall(r"#[0-9a-f]{6}", "".join(colours.values())))) == 3
 
 
+def executed(cells, folder):
+    """The outputs of the cells of a notebook that runs in a kernel of its own."""
+    notebook = new_notebook(cells=[new_code_cell(cell) for cell in cells])
+    NotebookClient(
+        notebook, timeout=250, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
+    ).execute()
+    nbformat.validate(notebook)
+    return [cell.outputs for cell in notebook.cells]
+
+
+def test_the_counterexample_comes_at_once_and_the_marked_line_joins_it(tmp_path):
+    cells = [
+        "import numpy as np\nfrom labkit import check\nfrom labkit.course import checking\n"
+        "from labkit.course.checker import child\nchild.CLOCK_S, checking.LIMIT_S = 200.0, 200.0\n"
+        "seen, show = [], checking.Page.show\n"
+        "checking.Page.show = lambda page, shown: (seen.append(repr(shown)), show(page, shown))",
+        "def iou(n):\n    i = np.diag(n)\n    return i / (n.sum(0) - n.sum(1) - i)",
+        "iou = check('04_iou.iou', iou)\nprint(len(seen), checking.LOOKING in seen[0], 'Look at' in seen[0])",
+        "print(seen[0].splitlines()[:5] == seen[1].splitlines()[:5])",
+    ]
+    *_, (shown, said), (same,) = executed(cells, tmp_path)
+    assert said.text == "2 True False\n" and same.text == "True\n"
+    label = "Look at line 3:  "
+    line = f"  {label}return i / (n.sum(0) - n.sum(1) - i)"
+    text = shown.data["text/plain"]
+    assert f"{line}\n{' ' * line.index('-')}^\n  Hint: Only this operator is wrong." in text
+    assert f"{label}<code>return i / (n.sum(0) <mark>-</mark> n.sum(1) - i)</code>" in shown.data["text/html"]
+    assert checking.LOOKING not in text
+
+
 def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
     """In a real kernel: one display a check, the student's line as it stands in the cell, then the kit's function."""
     cells = [
@@ -180,11 +210,7 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
         "mine = iou\niou = check('04_iou.iou', iou)\nprint(iou is mine)",
         "other = check('04_iou.iou', lambda n: np.diag(n) / n.sum(0))\nprint(other is iou)",
     ]
-    notebook = new_notebook(cells=[new_code_cell(cell) for cell in cells])
-    NotebookClient(
-        notebook, timeout=60, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
-    ).execute()
-    outputs = [cell.outputs for cell in notebook.cells]
+    outputs = executed(cells, tmp_path)
     shown = [[o.data["text/plain"] for o in cell if o.output_type == "display_data"] for cell in outputs]
     assert [len(texts) for texts in shown] == [0, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1]
     assert shown[2][0].startswith("○ iou: not answered yet")
@@ -196,7 +222,6 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
     assert outputs[10][-1].text == "False\n"  # not the notebook's, which is right: it was not asked about
     assert "text/html" in outputs[9][0].data
     assert not [o for cell in outputs for o in cell if o.output_type == "stream" and o.name == "stderr"]
-    nbformat.validate(notebook)
 
 
 FIRST_TRY = "def iou(n):\n    return n / 2"

@@ -1,0 +1,68 @@
+"""Repair on answers that readers of the labs gave: the place that is marked, and that a change there makes it right.
+
+tests/data/answers.json has for each the question, what the reader thought, the source, and what a good reply is: the
+kind of the sentence, and the marked parts with the numbers of their lines.
+"""
+
+import ast
+import json
+from pathlib import Path
+
+import pytest
+
+from labkit.course.checker import child, repair
+from labkit.course.checker.diagnosis import sentences
+from labkit.course.checker.finding import WATCHES
+from labkit.course.checker.mutation import mutations
+from labkit.course.checker.program import Program
+from labkit.course.checker.question import PUBLIC_SEED
+from labkit.course.checker.run import define, judge
+from labkit.course.topics import find
+
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
+ANSWERS = json.loads((Path(__file__).parents[2] / "data/answers.json").read_text())
+UNSEEN = (101, 102, 103)  # seeds that repair does not try
+
+
+def pieces_of(answer: dict) -> tuple[tuple[str, str], ...]:
+    """The program of an answer, as a check cuts it."""
+    return ("quiet", "import numpy as np"), (find(answer["question"]).function, answer["source"])
+
+
+def first_sentence(verdict, pieces, found):
+    """The kind of what is said first if no hand-written hint fits, and the parts that it marks."""
+    said = sentences(verdict.question, verdict.cases, verdict.outputs, pieces, found)
+    sentence = next(sentence for sentence in said if sentence.kind != "misconception")
+    return sentence.kind, [f"{line.number}: {line.text[a:b]}" for line in sentence.marked for a, b in line.parts]
+
+
+def mended(question, pieces, finding) -> bool:
+    """Whether some change of the kind, at the places of a finding, makes the answer right with other seeds."""
+    label, text = pieces[finding.piece]
+    tree = ast.parse(text)
+    for statement in filter(repair.is_function, tree.body):
+        for mutation in mutations(statement):
+            if mutation.kind == finding.kind and mutation.spans == finding.spans:
+                with mutation.applied():
+                    changed = ast.unparse(tree)
+                answer = define(Program((pieces[0], (label, changed))), question.function, 10.0)
+                if callable(answer) and all(judge(question, answer, seed, 20.0).passed for seed in UNSEEN):
+                    return True
+    return False
+
+
+@pytest.mark.parametrize("answer", ANSWERS, ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}")
+def test_an_answer_is_told_what_its_reader_can_use(answer, monkeypatch):
+    """A listed mistake may take the place of any other sentence, which still is true."""
+    monkeypatch.setattr(child, "CLOCK_S", 250.0)  # a busy machine
+    question, pieces = find(answer["question"]), pieces_of(answer)
+    function = define(Program(pieces), question.function)
+    verdict = judge(question, function, PUBLIC_SEED)
+    assert not verdict.passed
+    if not answer["marked"]:
+        assert verdict.sentence.kind in (answer["kind"], "misconception"), verdict.hint
+        return
+    found = child.findings(question, pieces, PUBLIC_SEED)
+    assert first_sentence(verdict, pieces, found) == (answer["kind"], answer["marked"])
+    if answer["kind"] not in WATCHES:
+        assert mended(question, pieces, next(f for f in found if f.kind == answer["kind"]))
