@@ -3,7 +3,6 @@
 import ast
 import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
@@ -263,16 +262,3 @@ def test_clean_removes_what_was_generated_and_nothing_else(checkout):
     assert make(checkout, "clean").returncode == 0
     files = {str(p.relative_to(checkout)) for p in checkout.rglob("*") if p.is_file()}
     assert files == {*kept, "Makefile", "pyproject.toml", "constraints.txt"}
-
-
-def test_the_fresh_run_and_the_container_take_the_same_steps():
-    fresh = runpy.run_path(str(ROOT / "tests/fresh/run"))
-    assert fresh["readme_commands"]() == ["make demo", "make test"]
-    assert fresh["PACKAGES"] == ["python3", "python3-venv", "make", "git"]
-    assert fresh["differing"]([["digest weights a  05", "digest data  1c"], ["digest weights a  06"]]) == [
-        "other data",
-        "other weights a",
-    ]
-    steps = (ROOT / "Containerfile").read_text()
-    assert f"WORKDIR {fresh['HOME']}/labkit\n" in steps and f"--home-dir {fresh['HOME']} " in steps
-    assert steps.endswith('RUN make demo\nCMD ["make", "test"]\n')

@@ -85,14 +85,6 @@ def test_the_command_runs_it_and_says_what_came_out(tmp_path, monkeypatch):
     assert f"{out}: {mask_study.SCENES} lifts, 50.0% succeeded (95 % interval 37.7% to 62.3%)" in done.output
 
 
-def test_bins_take_each_trial_once_and_their_upper_edge_only_at_the_end():
-    rows = [Row(0, "true", 0.0, iou, 1, "lifted") for iou in (0.0, 0.49, 0.5, 0.99, 1.0, 1.2)]
-    assert [[row.iou for row in members] for members in mask_study.by_iou(rows, [0.0, 0.5, 1.0])] == [
-        [0.0, 0.49],
-        [0.5, 0.99, 1.0],
-    ]
-
-
 @pytest.mark.bad_input
 def test_an_unknown_way_of_spoiling_is_said():
     with pytest.raises(ValueError, match="kind: expected one of true, eroded"):

@@ -4,11 +4,9 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import data_gen
-from labkit.apps.node_command import Settings
 from labkit.node.actors import Camera
 from labkit.node.bags import BagWriter
 from labkit.node.messages import DEFAULT_TOPICS, Image
@@ -64,13 +62,3 @@ def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(
 def test_wrong_words_are_one_line_and_status_2(labkit, capsys, arguments, said):
     assert labkit("node", *arguments) == 2
     assert said in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_settings_become_a_pipeline_and_a_node():
-    settings = Settings("smallsegnet", target=1, camera_pose="0.5, 0, 0.8, 1 0 0 0", renamed=("rgb=/a", "mask=/b"))
-    pipeline, options = settings.pipeline(0.1), settings.node()
-    assert pipeline.target_class == 1 and pipeline.table_z == 0.1
-    assert np.allclose(
-        options["T_base_cam"], np.diag([1.0, -1.0, -1.0, 1.0]) + np.outer([0.5, 0, 0.8, 0], [0, 0, 0, 1])
-    )
-    assert (options["topics"].rgb, options["topics"].mask) == ("/a", "/b")

@@ -16,7 +16,7 @@ from data_gen import DepthSensor
 from labkit.apps import perceive
 from labkit.apps.cli import app
 from labkit.apps.own_data import PictureFolder
-from labkit.geometry import Plane, back_project_to_base, transform_points
+from labkit.geometry import back_project_to_base, transform_points
 from labkit.labels import SURFACE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
@@ -158,13 +158,6 @@ def test_a_file_without_a_camera_is_refused(tmp_path, content):
     (tmp_path / "camera.json").write_text(content)
     with pytest.raises(ValueError, match="found no camera matrix"):
         perceive.read_intrinsics(str(tmp_path / "camera.json"))
-
-
-def test_a_camera_that_looks_straight_down_has_a_base_frame_too():
-    plane = Plane(np.array([0.0, 0.0, -1.0]), 0.7, np.ones(3, bool), 0.0)
-    T = perceive.base_on_table(plane)
-    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3)) and np.isclose(np.linalg.det(T[:3, :3]), 1.0)
-    assert np.allclose(transform_points(T, np.array([[0.2, 0.1, 0.7]]))[0, 2], 0.0), "a point of the table"
 
 
 @pytest.fixture

@@ -9,9 +9,8 @@ import pytest
 import data_gen
 from labkit.apps import stack_study
 from labkit.apps.stack_study import FIRST_SEED, SCENES, Row, read, summarise, table, trials_of_scene
-from labkit.labels import CLASSES, SURFACE, TARGET
+from labkit.labels import SURFACE, TARGET
 from labkit.metrics import confusion_matrix, iou
-from labkit.stacks.threshold import HSVRange
 
 COMMITTED = Path(__file__).parents[2] / "lessons" / "09_other_stacks.csv"
 ROW = Row(600_000, "a", 10, 40, 90, 100, 5.0, 1, "lifted")
@@ -37,18 +36,6 @@ def test_a_trial_counts_pixels_and_lifts(trials):
     expected = iou(confusion_matrix(frame.labels, np.where(frame.labels == TARGET, SURFACE, frame.labels), 4))
     assert np.isclose(blind.surface_both / blind.surface_either, expected[SURFACE])
     assert all(row.milliseconds >= 0.0 for row in (true, again, blind))
-
-
-def test_methods_that_guess_give_labels_of_the_kit():
-    frame = data_gen.render(data_gen.sample_scene(630_001, "train"))
-    typical = stack_study.regions.learn_typical(
-        stack_study.target_masks([data_gen.render(data_gen.sample_scene(s, "train")) for s in range(630_000, 630_004)])
-    )
-    for labels in (
-        stack_study.threshold_labels(frame.rgb, HSVRange((0, 0, 0), (90, 255, 255))),
-        stack_study.region_labels(frame.rgb, typical),
-    ):
-        assert labels.dtype == np.uint8 and labels.shape == frame.labels.shape and labels.max() < len(CLASSES)
 
 
 def test_summaries_pool_counts_before_they_divide():

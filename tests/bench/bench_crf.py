@@ -1,4 +1,4 @@
-"""CRF inference: cuts, moves and certificates beside PyMaxflow, GCO and pydensecrf2.
+"""CRF inference: cuts, moves and the dense CRF beside PyMaxflow, GCO and pydensecrf2.
 
 Times are CPU seconds of one thread, the fastest of three calls in turn, medians over seeds. Instances: smooth random
 label fields, logits = 2 snr onehot + 0.75 white + 0.45 correlated noise, RGB in 0..1, sigma_I = 0.12, sigma_p = 1;
@@ -16,7 +16,7 @@ import numpy as np
 import pydensecrf.densecrf as peer_dense
 from scipy.ndimage import gaussian_filter
 
-from labkit.crf import MapResult, PottsCRF, dense_crf, solve
+from labkit.crf import PottsCRF, dense_crf, solve
 from labkit.crf.energy import OFFSETS, pair_slices
 from labkit.crf.exact import grid_max_flow
 from tests.bench.measure import in_turns, table
@@ -191,26 +191,6 @@ def expansion_table(seeds: int) -> str:
     return table(header + " | worst, % (asked: 0.01)", rows)
 
 
-def solved(crf: PottsCRF) -> tuple[float, MapResult]:
-    """CPU milliseconds of the default method, and its result."""
-    return cpu_ms({"labkit": lambda: solve(crf)})[0], solve(crf)
-
-
-def certificate_table(seeds: int) -> str:
-    """Measure the certificate and the time of TRW-S with expansion moves."""
-    rows = []
-    for size in (QVGA, VGA):
-        for connectivity in (4, 8):
-            for hard in (False, True):
-                found = [solved(model(*costs(seed, size, 5, hard), connectivity)) for seed in range(seeds)]
-                ms, gaps = [ms for ms, _ in found], [100.0 * result.gap for _, result in found]
-                case = f"{size[1]}x{size[0]}, {connectivity} neighbours, {'hard' if hard else 'easy'}"
-                limit = "" if hard else 1000 if size == QVGA else 4000
-                cells = [f"{np.median(ms):.0f}", limit, f"{np.median(gaps):.4f}", f"{max(gaps):.4f}"]
-                rows.append([case, *cells, 0.3 if hard else 0.02])
-    return table("trws+expansion, C = 5 | CPU ms | asked | gap, % | largest gap, % | asked", rows)
-
-
 def dense_ways(seed: int, size: tuple[int, int], C: int) -> dict:
     """The ways to run ten iterations of the dense CRF."""
     psi, image, _ = label_field(seed, size, C, 0.55)
@@ -247,7 +227,7 @@ def peer_dense_crf(psi, image):
 
 def main(seeds: int = SEEDS) -> str:
     """Measure all tables and return them in Markdown."""
-    return "\n\n".join([cut_table(seeds), expansion_table(seeds), certificate_table(seeds), dense_table(seeds)])
+    return "\n\n".join([cut_table(seeds), expansion_table(seeds), dense_table(seeds)])
 
 
 if __name__ == "__main__":

@@ -293,13 +293,6 @@ def test_hidden_points_lie_on_the_rays_that_graze_a_wall():
     np.testing.assert_allclose(hidden[behind, 2], camera[2] - share * (camera[2] - top), atol=0.004)
 
 
-def test_what_is_seen_is_not_hidden():
-    camera = np.array([1.0, 0.0, 0.6])
-    fine = np.stack(np.meshgrid(np.arange(0.39, 0.61, 0.002), np.arange(-0.11, 0.11, 0.002)), -1).reshape(-1, 2)
-    ground = np.column_stack([fine, np.full(len(fine), TABLE)])
-    assert len(kernels.hidden_points(ground, 0.5, 0.0, 0.1, 0.004, camera, TABLE + 0.001)) == 0
-
-
 @settings(max_examples=10, deadline=None)
 @given(height=st.floats(0.06, 0.1), azimuth=st.floats(0.0, 2 * np.pi), elevation=st.floats(0.4, 1.1))
 def test_nothing_taller_can_hide_than_the_bound_says(height, azimuth, elevation):

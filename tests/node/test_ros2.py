@@ -223,13 +223,6 @@ def test_a_peer_that_cannot_be_talked_to_is_reported_in_words(peer, caplog):
         )
 
 
-def test_a_listener_that_asks_for_more_is_reported_in_words(peer):
-    """The node offers only the newest mask, and this process asks for every one."""
-    with Inside(quality={"outputs": "best_effort"}) as inside:
-        said = wait_for(lambda: inside.transport.troubles().get(ROS_TOPICS.mask), "the report")
-    assert "a listener asks for more than this node offers: reliability, here best_effort (see qos_outputs)" in said
-
-
 def test_every_frame_is_answered_or_superseded(peer, frame):
     """A camera faster than the node, with reliable inputs: of 200 frames none is lost, and the last one is answered."""
 
@@ -268,15 +261,6 @@ def test_full_size_at_a_camera_s_rate(quality):
         counts, told = camera.counted(), camera.told()
         assert counts["answered"] + counts["dropped"] + counts["lost"] == 91 and counts["failed"] == 0, told
         assert counts["lost"] == 0 or (quality == "best_effort" and "lost on the way" in str(told)), told
-
-
-@pytest.mark.parametrize("distribution, used", [("jazzy", ros2.FAST_DDS_2), ("kilted", ros2.FAST_DDS_3)])
-@pytest.mark.parametrize("chosen", [None, ros2.FAST_DDS_3, ros2.FAST_DDS_2, "FASTDDS_BUILTIN_TRANSPORTS"])
-def test_settings_of_fast_dds_that_the_user_chose_win(chosen, distribution, used, monkeypatch):
-    given = {"ROS_DISTRO": distribution} | ({chosen: "mine"} if chosen else {})
-    monkeypatch.setattr(os, "environ", dict(given))
-    ros2.set_up_shared_memory()
-    assert os.environ == given | ({} if chosen else {used: str(ros2.SETTINGS)})
 
 
 def test_what_the_network_loses_stands_in_diagnostics(peer, frame):
