@@ -1,7 +1,7 @@
-"""Repair on answers that readers of the labs gave: the place that is marked, and that a change there makes it right.
+"""Answers that readers of the labs gave: right ones pass; of wrong ones the marked place is where a change mends them.
 
-tests/data/answers.json has for each the question, what the reader thought, the source, and what a good reply is: the
-kind of the sentence, and the marked parts with the numbers of their lines.
+tests/data/right.json has right ones in unusual ways; tests/data/answers.json wrong ones, each with its question, what
+the reader thought, and what a good reply is: the kind of the sentence, and the marked parts with their lines' numbers.
 """
 
 import ast
@@ -20,7 +20,9 @@ from labkit.course.checker.run import define, judge
 from labkit.course.topics import find
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
-ANSWERS = json.loads((Path(__file__).parents[2] / "data/answers.json").read_text())
+ANSWERS, RIGHT = (
+    json.loads((Path(__file__).parents[2] / "data" / name).read_text()) for name in ("answers.json", "right.json")
+)
 UNSEEN = (101, 102, 103)  # seeds that repair does not try
 
 
@@ -66,3 +68,11 @@ def test_an_answer_is_told_what_its_reader_can_use(answer, monkeypatch):
     assert first_sentence(verdict, pieces, found) == (answer["kind"], answer["marked"])
     if answer["kind"] not in WATCHES:
         assert mended(question, pieces, next(f for f in found if f.kind == answer["kind"]))
+
+
+@pytest.mark.parametrize("name", sorted({answer["question"] for answer in RIGHT}))
+def test_right_answers_pass_however_they_are_written(name):
+    for answer in RIGHT:
+        if answer["question"] == name:
+            function = define(Program(pieces_of(answer)), find(name).function)
+            assert judge(find(name), function, PUBLIC_SEED).passed, answer["how"]
