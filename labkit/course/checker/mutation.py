@@ -468,7 +468,8 @@ def calls(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
         yield Recipe(kind, f"without {keyword.arg}", 1, without, (keyword,))
         if keyword.arg == "axis":
             for axis in AXES:
-                yield Recipe("axis", f"axis={axis}", 1, with_option("axis", axis), (keyword,))
+                if axis != ast.unparse(keyword.value):
+                    yield Recipe("axis", f"axis={axis}", 1, with_option("axis", axis), (keyword,))
     if called in TAKES_AXIS:
         given = {keyword.arg for keyword in node.keywords}
         if "axis" not in given and len(node.args) < (1 if method else 2):
