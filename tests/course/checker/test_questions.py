@@ -219,7 +219,8 @@ def test_weak_cases_let_mutants_through_and_are_found_out():
     """The net catches what it should: symmetric counts do not tell rows from columns, general ones do."""
     by_row = Question(name="00_test.shares", reference=shares, inputs=lambda rng: (rng.random((3, 4)),))
     found = grade(by_row, {})
-    assert (found.right, found.false_rejects, found.false_accepts, found.equivalent) == (1, (), (), ())
+    assert (found.right, found.false_rejects, found.false_accepts) == (1, (), ())
+    assert not any("1 -> 0" in name for name in found.equivalent)
     symmetric = replace(by_row, inputs=lambda rng: (np.full((3, 3), rng.integers(3)) + np.eye(3),))
     assert any("1 -> 0" in name for name in grade(symmetric, {}).equivalent)
     rarely = replace(by_row, inputs=lambda rng: (np.eye(3) + (rng.random() < 0.05) * np.arange(9).reshape(3, 3),))
