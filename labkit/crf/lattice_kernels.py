@@ -99,19 +99,3 @@ def lattice_filter(values, scale, corner, weights, near, out):
             lattice_point = old[corner[n, r]]
             for c in range(C):
                 pixel[c] += w * lattice_point[c]
-
-
-@njit(cache=True)
-def softmax(z, q):
-    """q = softmax of each row of z."""
-    N, C = z.shape
-    for n in range(N):
-        top = z[n, 0]
-        for c in range(1, C):
-            top = max(top, z[n, c])
-        total = np.float32(0.0)
-        for c in range(C):
-            q[n, c] = np.exp(z[n, c] - top)
-            total += q[n, c]
-        for c in range(C):
-            q[n, c] /= total
