@@ -396,6 +396,11 @@ def grade(
     comment: Annotated[
         tuple[str, str] | None, typer.Option(help="A group of wrong answers, see class.html, and what all in it read.")
     ] = None,
+    everybody: Annotated[str | None, typer.Option(help="A question whose points everybody gets.")] = None,
+    drop: Annotated[str | None, typer.Option(help="A question that does not count.")] = None,
+    points: Annotated[str | None, typer.Option(help="A question and what it is worth now, such as iou=3.")] = None,
+    reason: Annotated[str, typer.Option(help="Why; goes into course.toml, and to students.")] = "",
+    undo: Annotated[str | None, typer.Option(help="A question whose change is taken back.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
     tidy: Annotated[
         bool, typer.Option("--tidy", help="Remove pages and grades of students whose submission is gone.")
@@ -409,12 +414,14 @@ def grade(
 
     if sys.platform != "linux":
         raise ValueError(f"labkit grade needs Linux, this is {sys.platform}: grade on Linux, in WSL or in a container")
+    from labkit.course.grading.changes import change_of
     from labkit.course.grading.outputs import terminal_table
     from labkit.course.grading.run import grade_course
     from labkit.course.grading.sandbox import NO_SANDBOX
 
     workers = workers or os.cpu_count() or 1
-    how = {"workers": workers, "force": force, "unsafe": unsafe, "tidy": tidy}
+    how = {"workers": workers, "force": force, "unsafe": unsafe, "tidy": tidy, "undone": undo}
+    how["change"] = change_of(topic, everybody, drop, points, reason)
     graded = grade_course(topic, course, submissions, out, seed, new_round, comment, **how)
     typer.echo(terminal_table(graded.lab, graded.records))
     for student, failure in graded.failures.items():

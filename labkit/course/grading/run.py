@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labkit.course.grading.batch import Batch, Record, grade_batch, secret_for
+from labkit.course.grading.changes import Change, add_change, changed, read_changes, undo
 from labkit.course.grading.gradebook import write_gradebook
 from labkit.course.grading.outputs import write_outputs
 from labkit.course.grading.overview import add_comment, read_comments, standings
@@ -45,6 +46,8 @@ def grade_course(
     new_round: bool = False,
     comment: tuple[str, str] | None = None,
     limits: Limits | None = None,
+    change: Change | None = None,
+    undone: str | None = None,
     tidy: bool = False,
     progress: bool = True,
     **how,
@@ -53,20 +56,26 @@ def grade_course(
 
     course: folder with labs/ and gradebook.db. submissions: course/submitted by default; out: course/grades/TOPIC.
     seed: the secret one; new_round: take another one, and grade everybody anew. comment: (group, text), for the pages
-    of all whose answers belong to that group of wrong ones. tidy: remove what there is of students without a
-    submission. how: workers, force, unsafe, as `Batch` has them.
-    Raises ValueError for a topic, lab, folder or group that there is not, for another seed than the round's, and where
-    no sandbox can be made.
+    of all whose answers belong to that group of wrong ones. change: one more for course.toml; undone: a question whose
+    change is taken out of it. tidy: remove what there is of students without a submission. how: workers, force, unsafe,
+    as `Batch` has them. Raises ValueError for a topic, lab, folder, group or change that there is not, for another seed
+    than the round's, and where no sandbox can be made.
     """
     course = Path(course)
     lab = read_lab(course, topic)
     read = read_submissions(course / "submitted" if submissions is None else Path(submissions), lab)
     out = course / "grades" / topic if out is None else Path(out)
+    if undone is not None:
+        undo(course, lab, undone)
+    if change is not None:
+        add_change(course, lab, change)
+    changes = read_changes(course, lab)
     with private():
         secret = secret_for(out, seed, new_round)
         renamed = rename_students(course, out, topic, read)
         batch = Batch(lab, read, out, secret, limits=limits or Limits(), **how)
-        records, graded_now = grade_batch(batch, progress)
+        earned, graded_now = grade_batch(batch, progress)
+        lab, records = changed(lab, earned, changes)
         comments = read_comments(out)
         if comment is not None:
             groups = [group.name for standing in standings(lab, records) for group in standing.groups]

@@ -1,0 +1,172 @@
+"""What an instructor changes after a lab was released: points for everybody, other points, a question less.
+
+Changes stand in course.toml beside labs/, where `labkit grade` writes them and anybody can read, edit or delete them:
+
+    [[change]]
+    lab = "04_iou"
+    question = "iou"
+    everybody = true     # or: drop = true, or: points = 3
+    date = 2026-10-05
+    reason = "the task did not say what an empty class gets"
+
+Records keep what was earned; a change is applied to them each time that tables, pages and the gradebook are written.
+"""
+
+import copy
+import datetime
+import json
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from labkit.course.grading.batch import Record
+from labkit.course.grading.grade import Result
+from labkit.course.grading.reading import Lab, grade_id
+from labkit.support.files import write_atomically
+
+FILE = "course.toml"
+KINDS = ("everybody", "drop", "points")
+BLOCK = re.compile(r"(?ms)^\[\[change\]\].*?(?=^\s*\[|\Z)")
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change to a question of a lab. points: what it is worth now, None if that stays."""
+
+    lab: str
+    question: str
+    date: datetime.date
+    reason: str
+    everybody: bool = False
+    drop: bool = False
+    points: float | None = None
+
+    @property
+    def fields(self) -> dict:
+        """What stands in the file."""
+        kind = {"points": self.points} if self.points is not None else {"drop" if self.drop else "everybody": True}
+        return {"lab": self.lab, "question": self.question, **kind, "date": self.date, "reason": self.reason}
+
+
+def as_toml(change: Change) -> str:
+    """A change as a block of the file."""
+    values = {
+        name: str(value) if isinstance(value, datetime.date) else json.dumps(value, ensure_ascii=False)
+        for name, value in change.fields.items()
+    }
+    return "\n".join(["[[change]]", *(f"{name} = {value}" for name, value in values.items()), ""])
+
+
+def change_of(lab: str, everybody: str | None, drop: str | None, points: str | None, reason: str) -> Change | None:
+    """The change that a command asks for, None if for none; points: as "iou=3". ValueError for several at a time."""
+    asked = [question for question in (everybody, drop, points) if question is not None]
+    if not asked:
+        return None
+    if len(asked) > 1 or not reason.strip():
+        raise ValueError("expected one of --everybody, --drop and --points at a time, and a --reason")
+    question, _, number = asked[0].partition("=") if points else (asked[0], "", "0")
+    if not re.fullmatch(r"\d+(\.\d+)?", number):
+        raise ValueError(f"points: expected QUESTION=NUMBER, such as iou=3, got {asked[0]!r}")
+    kind = {"points": float(number)} if points else {"everybody" if everybody else "drop": True}
+    return Change(lab, question, datetime.date.today(), reason.strip(), **kind)
+
+
+def read_changes(course: Path, lab: Lab) -> list[Change]:
+    """The changes to a lab in course.toml, none if there is no file.
+
+    Raises ValueError, with the file and the line, for what cannot be used.
+    """
+    path = Path(course) / FILE
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    try:
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path}: {error}") from None
+    found = []
+    for block in BLOCK.finditer(text):
+        line = text.count("\n", 0, block.start()) + 1
+        (data,) = tomllib.loads(block[0])["change"]
+        if fault := fault_of(data, lab):
+            raise ValueError(f"{path}, line {line}: {fault}")
+        if data["lab"] == lab.topic:
+            found.append(Change(**data))
+    return found
+
+
+def fault_of(data: dict, lab: Lab) -> str:
+    """What of a change cannot be used, "" if nothing; questions of other labs are not looked for."""
+    known = {"lab": str, "question": str, "date": datetime.date, "reason": str}
+    for name, kind in known.items():
+        if not isinstance(data.get(name), kind):
+            return f"expected {name}, {'a date such as 2026-10-05' if name == 'date' else 'a text'}, in this [[change]]"
+    if odd := data.keys() - known.keys() - set(KINDS):
+        return f"expected {', '.join((*known, *KINDS))} in a [[change]], got {min(odd)}"
+    kinds = [kind for kind in KINDS if kind in data]
+    if len(kinds) != 1 or (kinds[0] != "points" and data[kinds[0]] is not True):
+        return "expected one of everybody = true, drop = true and points = NUMBER in this [[change]]"
+    points = data.get("points", 0)
+    if isinstance(points, bool) or not isinstance(points, int | float) or not 0 <= points < 1e6:
+        return f"expected points, a number that is not negative, got {points}"
+    if data["lab"] == lab.topic and data["question"] not in lab.points:
+        return f"question: expected one of {', '.join(lab.points)}, got {data['question']}"
+    return ""
+
+
+def add_change(course: Path, lab: Lab, change: Change) -> None:
+    """Write a change into course.toml, in the place of an earlier one to its question; ValueError if it is none."""
+    if fault := fault_of(change.fields, lab):
+        raise ValueError(fault)
+    undo(course, lab, change.question, missing=True)
+    path = Path(course) / FILE
+    before = path.read_text(encoding="utf-8").rstrip() + "\n\n" if path.is_file() and path.stat().st_size else ""
+    write_atomically(path, (before + as_toml(change)).encode())
+
+
+def undo(course: Path, lab: Lab, question: str, missing: bool = False) -> None:
+    """Take the change to a question out of course.toml; ValueError if there is none, unless it may be missing."""
+    changes = read_changes(course, lab)
+    if not any(change.question == question for change in changes):
+        if missing:
+            return
+        raise ValueError(f"undo: there is no change to {question} of {lab.topic} in {Path(course) / FILE}")
+    path = Path(course) / FILE
+    text = path.read_text(encoding="utf-8")
+
+    def kept(block: re.Match) -> str:
+        (data,) = tomllib.loads(block[0])["change"]
+        return "" if (data["lab"], data["question"]) == (lab.topic, question) else block[0]
+
+    write_atomically(path, BLOCK.sub(kept, text).encode())
+
+
+def changed(lab: Lab, records: Sequence[Record], changes: Sequence[Change]) -> tuple[Lab, list[Record]]:
+    """A lab and what was earned in it under changes; of several to one question the last counts."""
+    by_question = {change.question: change for change in changes}
+    if not by_question:
+        return lab, list(records)
+    points, notebook = dict(lab.points), copy.deepcopy(lab.notebook)
+    for name, change in by_question.items():
+        points[name] = 0.0 if change.drop else points[name] if change.points is None else float(change.points)
+    for cell in notebook["cells"]:
+        name = (grade_id(cell) or "").removeprefix("check_")
+        if name in by_question and "points" in cell["metadata"]["nbgrader"]:
+            cell["metadata"]["nbgrader"]["points"] = points[name]
+    now = []
+    for record in records:
+        results = (under(result, by_question.get(result.question), points) for result in record.results)
+        now.append(replace(record, results=tuple(results)))
+    return replace(lab, points=points, notebook=notebook), now
+
+
+def under(result: Result, change: Change | None, points: dict[str, float]) -> Result:
+    """A result under the change to its question."""
+    if change is None:
+        return result
+    worth = points[result.question]
+    earned = worth if result.right or change.everybody else 0.0
+    says = result.says
+    if change.points is None:
+        says += f". {'It does not count' if change.drop else 'Everybody has these points'}: {change.reason}"
+    return replace(result, points=earned, max_points=worth, says=says)
