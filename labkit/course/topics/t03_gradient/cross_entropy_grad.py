@@ -25,6 +25,7 @@ QUESTION = Question(
         (SURE, np.array([0, 2], np.uint8)),  # the darker pixel counts: one maximum for both is not enough
     ),
     random_cases=6,
+    atol=2e-4,  # logits near 1000 have errors of 3e-5 in single precision
     points=2,
     properties=(
         Property(

@@ -34,15 +34,17 @@ def _one_of_two(q):
 
 
 def _rotation(rng):
-    """Draw a rotation of any angle, half a turn round any axis or round one of the base's, or no turn."""
-    kind = rng.random()
-    if kind < 0.35:
-        return (_turn(rng.normal(size=3), rng.uniform(0.3, 3.1)),)
-    if kind < 0.6:
-        return (_turn(rng.normal(size=3), np.pi),)
+    """Draw a rotation of any angle, half a turn, one round an axis of the base, or one that is hardly any."""
+    kind, axis, flat = rng.random(), rng.normal(size=3), np.arange(3) != rng.integers(3)
+    if kind < 0.3:
+        return (_turn(axis, rng.uniform(0.3, 3.1)),)
+    if kind < 0.45:
+        return (_turn(axis, np.pi),)
+    if kind < 0.65:
+        return (_turn(axis * flat, np.pi),)
     if kind < 0.85:
-        return (2.0 * np.diag(np.eye(3)[rng.integers(3)]) - np.eye(3),)
-    return (np.eye(3),)
+        return (_turn(~flat, rng.uniform(0.3, np.pi)),)
+    return (_turn(axis, 10.0 ** rng.uniform(-9.0, -7.0)),)
 
 
 QUESTION = Question(
