@@ -34,17 +34,19 @@ def _one_of_two(q):
 
 
 def _rotation(rng):
-    """Draw a rotation of any angle, half a turn, one round an axis of the base, or one that is hardly any."""
+    """Draw a rotation of any angle, half a turn, one round an axis of the base, or none or hardly any."""
     kind, axis, flat = rng.random(), rng.normal(size=3), np.arange(3) != rng.integers(3)
-    if kind < 0.3:
+    if kind < 0.25:
         return (_turn(axis, rng.uniform(0.3, 3.1)),)
-    if kind < 0.45:
+    if kind < 0.5:
         return (_turn(axis, np.pi),)
-    if kind < 0.65:
+    if kind < 0.6:
         return (_turn(axis * flat, np.pi),)
-    if kind < 0.85:
-        return (_turn(~flat, rng.uniform(0.3, np.pi)),)
-    return (_turn(axis, 10.0 ** rng.uniform(-9.0, -7.0)),)
+    if kind < 0.7:
+        return (np.diag(np.where(flat, -1.0, 1.0)),)
+    if kind < 0.8:
+        return (_turn(~flat, rng.uniform(0.3, 3.1)),)
+    return (_turn(axis, rng.choice([0.0, 1e-8])),)
 
 
 QUESTION = Question(
