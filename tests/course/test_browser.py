@@ -91,6 +91,39 @@ def test_a_blank_filled_in_lab_04_gets_its_tick(jupyterlab, page, tmp_path):
     assert page.errors == []
 
 
+def answered(page, answer: str):
+    """Write an answer into lab 04's blank for iou, run it and its check; gives the output of the check."""
+    editor = cell_with(page, "def iou(").locator(".cm-content")
+    editor.click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(answer)
+    page.keyboard.press("Shift+Enter")
+    page.keyboard.press("Shift+Enter")
+    return cell_with(page, 'iou = check("04_iou.iou"').locator(".jp-OutputArea-output")
+
+
+def test_a_wrong_answer_gets_its_case_at_once_and_its_marked_line_after(jupyterlab, page, tmp_path):
+    """Then a loop that does not end, and a syntax error, which leaves the answer before it as it was."""
+    open_notebook(page, jupyterlab, "labs/04_iou/04_iou.ipynb")
+    page.locator(".jp-CodeCell .cm-content").first.click()
+    page.keyboard.press("Shift+Enter")
+    wait_until_idle(page)
+    output = answered(page, "def iou(n):\n    tp = np.diag(n)\n    return tp / (n.sum(axis=0) + n.sum(axis=1) + tp)")
+    output.filter(has_text="returns").filter(has_text="Looking for the place").wait_for()
+    page.screenshot(path=tmp_path / "case.png")
+    marked = output.locator("mark")
+    marked.wait_for()
+    assert marked.text_content() == "+"
+    assert "Only this operator is wrong" in output.text_content() and "returns" in output.text_content()
+    assert output.filter(has_text="Looking for the place").count() == 0
+    page.screenshot(path=tmp_path / "hint.png")
+    answered(page, "def iou(n):\n    while True:\n        n = n + 0").filter(has_text="A loop does not end").wait_for()
+    wait_until_idle(page)
+    answered(page, "def iou(n)\n    return n")
+    page.locator(".jp-OutputArea-output", has_text="SyntaxError").first.wait_for()
+    page.screenshot(path=tmp_path / "syntax.png")
+
+
 def test_a_slider_moved_in_lesson_02_changes_the_picture(jupyterlab, page, tmp_path):
     """Run the lesson as far as its first explorer, and press an arrow key on the slider."""
     lesson = nbformat.read(ROOT / "lessons/02_crf.ipynb", as_version=4)
