@@ -105,15 +105,17 @@ def answered(page, answer: str):
 def test_a_wrong_answer_gets_its_case_at_once_and_its_marked_line_after(jupyterlab, page, tmp_path):
     """Then a loop that does not end, and a syntax error, which leaves the answer before it as it was."""
     open_notebook(page, jupyterlab, "labs/04_iou/04_iou.ipynb")
-    page.locator(".jp-CodeCell .cm-content").first.click()
+    cell_with(page, "from labkit import check").locator(".cm-content").click()
     page.keyboard.press("Shift+Enter")
-    wait_until_idle(page)
-    output = answered(page, "def iou(n):\n    tp = np.diag(n)\n    return tp / (n.sum(axis=0) + n.sum(axis=1) + tp)")
+    output = answered(
+        page,
+        "import numpy as np\ndef iou(n):\n    tp = np.diag(n)\n    return tp - (n.sum(axis=0) + n.sum(axis=1) - tp)",
+    )
     output.filter(has_text="returns").filter(has_text="Looking for the place").wait_for()
     page.screenshot(path=tmp_path / "case.png")
     marked = output.locator("mark")
     marked.wait_for()
-    assert marked.text_content() == "+"
+    assert marked.text_content() == "-"
     assert "Only this operator is wrong" in output.text_content() and "returns" in output.text_content()
     assert output.filter(has_text="Looking for the place").count() == 0
     page.screenshot(path=tmp_path / "hint.png")

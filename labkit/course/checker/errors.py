@@ -105,6 +105,8 @@ def signature(found: re.Match, args: dict) -> str:
 @when(r"NameError: name '(\w+)' is not defined")
 def no_such_name(found: re.Match, args: dict) -> str:
     """A name that nobody defined."""
+    if found[1] in ("np", "numpy"):
+        return "NumPy is not imported: run the cell with `import numpy as np`, which stands at the top of the lab."
     near = difflib.get_close_matches(found[1], [*args, "np"], 1, 0.7)
     return (
         f"No cell defines {found[1]}: do you mean {near[0]}?"
