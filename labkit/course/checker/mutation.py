@@ -326,6 +326,9 @@ def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
             "not", "~", 1, template("~_" if not isinstance(parent, ast.If | ast.IfExp | ast.While) else "not _")
         )
         return
+    called = getattr(getattr(parent, "func", None), "attr", "")
+    if called.startswith("is"):  # whatever keeps NaN and infinity would be right there by accident
+        return
     yield from missing_around(node)
     yield from missing_terms(node, scope)
     if not isinstance(node, ast.Name):
