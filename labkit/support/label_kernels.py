@@ -1,25 +1,7 @@
-"""Two loops over label images that are worth compiling: the best class of each pixel, and counting pairs of labels."""
+"""A loop over label images that is worth compiling: counting pairs of labels."""
 
 import numpy as np
 from numba import njit
-
-
-@njit(cache=True)
-def most_probable(probabilities):
-    """Label each pixel of (H, W, C) with the class of highest probability, the first one of equals; uint8.
-
-    argmax over so short an axis takes several times as long.
-    """
-    H, W, C = probabilities.shape
-    labels = np.zeros((H, W), np.uint8)
-    for v in range(H):
-        for u in range(W):
-            best = probabilities[v, u, 0]
-            for c in range(1, C):
-                if probabilities[v, u, c] > best:
-                    best = probabilities[v, u, c]
-                    labels[v, u] = c
-    return labels
 
 
 @njit(cache=True)
