@@ -140,9 +140,12 @@ class Grading:
             return replace(result, says=problem.says)
         found = tellers.ask(question, outputs)
         flags += [problem.says] if problem.kind in LOOK_AT else []
-        flags += [found.failed] if found.failed else []
         if not found.named and problem.kind != "time":
-            found = looked_at(found, run, problem.kind == "altered")
+            try:
+                found = looked_at(found, run, problem.kind == "altered")
+            except Exception as error:  # of what a stranger wrote: it costs this answer a hint
+                found = replace(found, failed=f"its program cannot be looked at: {type(error).__name__}")
+        flags += [found.failed] if found.failed else []
         return replace(
             result,
             says=f"{problem.says} ({judged.where})",

@@ -43,13 +43,19 @@ def test_one_that_ends_or_takes_too_long_says_so(teller, end):
     assert teller.ask(TOPIC, "iou", [end]).failed == "its mistake was not found within 1 s and 1 GB"
 
 
+def broken(*arguments):
+    raise RecursionError
+
+
 def test_an_answer_without_a_hint_is_flagged_and_the_others_are_graded(tmp_path, monkeypatch):
     kit.write_lab(tmp_path, TOPIC)
     right = kit.right_answers(TOPIC)
     kit.submit(tmp_path, "ada", TOPIC, right)
     kit.submit(tmp_path, "ben", TOPIC, right | {"iou": "def iou(n):\n    return n.sum() / np.ones(len(n))\n"})
     monkeypatch.setattr(grading.tellers, "ask", lambda question, outputs: Told(failed="no hint"))
+    monkeypatch.setattr(grading, "looked_at", broken)
     ada, ben = grade_course(TOPIC, tmp_path, seed="secret", progress=False).records
     assert not ada.needs_a_look and ben.needs_a_look
     (result,) = [result for result in ben.results if not result.right]
-    assert result.question == "iou" and result.flag == "no hint" and "values are not right" in result.says
+    assert result.question == "iou" and "values are not right" in result.says
+    assert result.flag == "its program cannot be looked at: RecursionError"
