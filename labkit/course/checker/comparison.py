@@ -150,7 +150,8 @@ def compare(question: Question, expected: object, got: object) -> Problem | None
     expected: from a Case. got: any object. In this order: kind, length of a tuple, dtype, shape, values that are not
     finite where they should be, values. Floating-point outputs may come in any real dtype but bool; integers may be
     whole floats, unless the question asks for the dtype, and truth values must be bool. An array counts as a tuple of
-    its rows where a tuple is expected, and a tuple of numbers as an array where one is. NaN is right where the reference gives NaN.
+    its rows where a tuple is expected, and a tuple of numbers as an array where one is. NaN is right where the
+    reference gives NaN.
     """
     got = plain(got)
     if isinstance(expected, tuple) and isinstance(got, np.ndarray) and got.ndim and len(got) == len(expected):
