@@ -32,7 +32,8 @@ def confusion_matrix(
     y_true, y_pred = _check_pair(y_true, y_pred, num_classes)
     # The kernel is compiled for two dtypes only: the one that labels are kept in, and the one that holds all others.
     dtype = np.uint8 if y_true.dtype == y_pred.dtype == np.uint8 else np.int64
-    pairs, all_bytes = count_pairs(*(np.ascontiguousarray(y, dtype).reshape(-1) for y in (y_true, y_pred)))
+    pairs = np.zeros((256, 256), np.int64)
+    all_bytes = count_pairs(*(np.ascontiguousarray(y, dtype).reshape(-1) for y in (y_true, y_pred)), pairs)
     n = pairs[:num_classes, :num_classes].copy()
     left_out = 0
     if ignore in range(256):

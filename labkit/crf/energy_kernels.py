@@ -1,10 +1,11 @@
 """Loops over the pixel grid, compiled by numba: weights of neighbours, energy, and sweeps of ICM and mean field."""
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pair_exponents(image, scale, extra, offsets, nearness, exponents):
     """Fill exponents[d, v, u] = nearness[d] - |f_p - f_q|^2 / 2 for the pair of pixel (v, u) and the one offsets[d] on.
 
@@ -12,14 +13,14 @@ def pair_exponents(image, scale, extra, offsets, nearness, exponents):
     that leaves the image gets -inf, and so the weight 0.
     """
     H, W, channels = image.shape
-    here, below = np.empty((2, channels + extra.shape[2], W))
-    load_row(image, scale, extra, 0, below)
-    for v in range(H):
+    features = np.empty((2, channels + extra.shape[2], W))
+    here, below = features[0], features[1]
+    for v in range(-1, H):
         here, below = below, here
         if v + 1 < H:
             load_row(image, scale, extra, v + 1, below)
-        for d in range(len(offsets)):
-            down, right = offsets[d]
+        for d in range(len(offsets) if v >= 0 else 0):
+            down, right = offsets[d, 0], offsets[d, 1]
             exponents[d, v] = -np.inf
             if v + down < H:
                 other = below if down else here
@@ -30,7 +31,7 @@ def pair_exponents(image, scale, extra, offsets, nearness, exponents):
                     add_contrast(here[c, first:last], other[c, first + right : last + right], pairs)
 
 
-@njit(cache=True, nogil=True)
+@part
 def load_row(image, scale, extra, v, row):
     """Copy the features of one row of pixels, channel by channel."""
     channels = image.shape[2]
@@ -42,7 +43,7 @@ def load_row(image, scale, extra, v, row):
             row[channels + c, u] = extra[v, u, c]
 
 
-@njit(cache=True, nogil=True)
+@part
 def add_contrast(a, b, pairs):
     """Subtract |a - b|^2 / 2 pair by pair, except where the difference is NaN."""
     for i in range(len(pairs)):
@@ -50,7 +51,7 @@ def add_contrast(a, b, pairs):
         pairs[i] -= 0.5 * difference * difference if difference == difference else 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def energy_by_row(unary, weights, offsets, y):
     """Sum the energy of the labels `y` (H, W) row by row, so that no sum has more terms than a row: (H,)."""
     H, W = y.shape
@@ -60,7 +61,7 @@ def energy_by_row(unary, weights, offsets, y):
         for u in range(W):
             total += unary[v, u, y[v, u]]
         for d in range(len(offsets)):
-            down, right = offsets[d]
+            down, right = offsets[d, 0], offsets[d, 1]
             if v + down < H:
                 for u in range(max(0, -right), W - max(0, right)):
                     total += weights[d, v, u] if y[v, u] != y[v + down, u + right] else 0.0
@@ -68,7 +69,7 @@ def energy_by_row(unary, weights, offsets, y):
     return rows
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def icm_sweep(unary, weights, offsets, labels):
     """Give each pixel in turn the class that is best given its neighbours; return how many changed."""
     H, W, C = unary.shape
@@ -95,7 +96,7 @@ def icm_sweep(unary, weights, offsets, labels):
     return changed
 
 
-@njit(cache=True)
+@kernel
 def mean_field_sweep(unary, weights, offsets, T, q):
     """Update q in place, pixel by pixel: q_p(c) ~ exp(-(psi_p(c) - sum over neighbours of w q_neighbour(c)) / T)."""
     H, W, C = unary.shape

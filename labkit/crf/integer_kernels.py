@@ -3,29 +3,30 @@
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 # offset, magnitude: sums of each pixel's least cost and of its size. typical: sum of the costs above it, each cut off
 # at the weights of the pixel. smallest: of the costs above 0. constant: sum of the costs of the best single class.
 Size = namedtuple("Size", "offset magnitude typical smallest constant")
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def measure(unary, weights, offsets, highest):
     """Measure the costs of a model whose weights are cut off at `highest`; sums run over rows of sums over a row."""
     H, W, C = unary.shape
-    sums, row = np.zeros(3 + C), np.zeros(3 + C)
+    sums, row = np.zeros(3 + C), np.empty(3 + C)
     smallest = 1.0
     incident = np.empty(W)
     for v in range(H):
-        incident[:] = 0.0
+        clear(incident)
         for d in range(len(offsets)):
-            down, right = offsets[d]
+            down, right = offsets[d, 0], offsets[d, 1]
             add_capped(incident, weights[d, v], highest)
             if v >= down:
                 first, last = max(0, -right), W - max(0, right)
                 add_capped(incident[first + right : last + right], weights[d, v - down, first:last], highest)
-        row[:] = 0.0
+        clear(row)
         for u in range(W):
             least = lowest(unary, v, u)
             row[0] += least
@@ -36,11 +37,21 @@ def measure(unary, weights, offsets, highest):
                 row[3 + c] += excess
                 if 1e-300 < excess < smallest:
                     smallest = excess
-        sums += row
-    return Size(sums[0], sums[1], sums[2], smallest, sums[3:].min())
+        add_capped(sums, row, np.inf)
+    constant = sums[3]
+    for c in range(1, C):
+        constant = min(constant, sums[3 + c])
+    return Size(sums[0], sums[1], sums[2], smallest, constant)
 
 
-@njit(cache=True, nogil=True)
+@part
+def clear(row):
+    """Set a row to 0."""
+    for i in range(len(row)):
+        row[i] = 0.0
+
+
+@part
 def lowest(unary, v, u):
     """The least cost of a pixel; a loop over few classes is faster than numba's own minimum."""
     least = unary[v, u, 0]
@@ -49,14 +60,14 @@ def lowest(unary, v, u):
     return least
 
 
-@njit(cache=True, nogil=True)
+@part
 def add_capped(total, terms, highest):
     """Add the terms, each cut off at `highest`."""
     for i in range(len(terms)):
         total[i] += min(terms[i], highest)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def round_weights(weights, highest, scale, out):
     """Round min(weights, highest) * scale down, from (D, H, W) to (H + 2, W + 2, D)."""
     D, H, W = weights.shape
@@ -66,7 +77,7 @@ def round_weights(weights, highest, scale, out):
                 out[v + 1, u + 1, d] = int(min(weights[d, v, u], highest) * scale)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def round_unary(unary, weights, step, scale, out):
     """Round each cost above the pixel's least one down, cut off just above the sum of the pixel's integer weights."""
     H, W, C = unary.shape

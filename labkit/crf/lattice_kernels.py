@@ -9,10 +9,11 @@ direction adds a constant to the key. Corner 0 stands for "none" and always hold
 """
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def corners_of_pixels(elevated, lowest, stride):
     """Find the simplex around each point of the plane sum(x) = 0: the keys and barycentric weights of its corners."""
     N, d1 = elevated.shape
@@ -72,7 +73,7 @@ def neighbour_corners(found, steps):
     return near
 
 
-@njit(cache=True)
+@kernel
 def lattice_filter(values, scale, corner, weights, near, out):
     """Splat, blur and slice: out += scale * filtered (scale * values); values and out (N, C), scale (N,)."""
     N, d1 = corner.shape

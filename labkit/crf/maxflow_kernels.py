@@ -12,7 +12,8 @@ fill up, and the nodes that hung on them look for another parent in their tree o
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 FREE, SOURCE, SINK = 0, 1, 2  # which tree a node is in
 ROOT, ORPHAN = -1, -2  # a node's parent is one of its arcs, or the terminal itself, or lost
@@ -38,7 +39,7 @@ def new_forest(size):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def both_ways(weights, step):
     """Give each pair of neighbours an arc of its weight in either direction: capacities (N, K) from weights (N, D)."""
     capacity = np.zeros((len(weights), len(step)), weights.dtype)
@@ -48,7 +49,7 @@ def both_ways(weights, step):
     return capacity
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def max_flow(graph, forest, active, orphans, nodes, near):
     """Send all the flow that fits and return its value; forest.tree is then SOURCE on that side of a minimum cut.
 
@@ -85,7 +86,7 @@ def max_flow(graph, forest, active, orphans, nodes, near):
     return flow
 
 
-@njit(cache=True, nogil=True)
+@part
 def push_nearby(graph, height, queue, nodes, near):
     """Let all nodes push their excess towards the sink at once (Goldberg and Tarjan 1988): short ways need no trees.
 
@@ -133,7 +134,7 @@ def push_nearby(graph, height, queue, nodes, near):
                 count += 1
 
 
-@njit(cache=True, nogil=True)
+@part
 def meets_others(graph, tree, n):
     """Say whether a node of a tree can grow at all: amid its own tree it waits until a neighbour gets lost."""
     capacity, _, step = graph
@@ -145,7 +146,7 @@ def meets_others(graph, tree, n):
     return False
 
 
-@njit(cache=True, nogil=True)
+@part
 def push(queue, n):
     """Append a node unless it waits already."""
     if not queue.waiting[n]:
@@ -156,7 +157,7 @@ def push(queue, n):
             queue.ends[1] = 0
 
 
-@njit(cache=True, nogil=True)
+@part
 def pop(queue):
     """Take the node that has waited longest."""
     n = queue.nodes[queue.ends[0]]
@@ -167,7 +168,7 @@ def pop(queue):
     return n
 
 
-@njit(cache=True, nogil=True)
+@part
 def grow(graph, forest, active, n):
     """Let node n take free neighbours into its tree; return its arc to the other tree once there is one, or -1."""
     capacity, _, step = graph
@@ -189,7 +190,7 @@ def grow(graph, forest, active, n):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@part
 def augment(graph, forest, orphans, n, bridge):
     """Send what fits through the path over arc `bridge` of n; return how many orphans that makes and the flow sent."""
     capacity, excess, step = graph
@@ -248,7 +249,7 @@ def augment(graph, forest, orphans, n, bridge):
     return lost, room
 
 
-@njit(cache=True, nogil=True)
+@part
 def adopt(graph, forest, active, orphans, lost, time):
     """Find each orphan the parent nearest to its terminal; one without any leaves the tree and orphans its children."""
     capacity, _, step = graph
@@ -282,7 +283,7 @@ def adopt(graph, forest, active, orphans, lost, time):
         tree[n] = FREE
 
 
-@njit(cache=True, nogil=True)
+@part
 def distance_to_terminal(forest, step, n, time):
     """Count the steps from n up to its terminal, FAR if an orphan is in the way; the nodes passed remember theirs."""
     _, parent, dist, stamp = forest

@@ -10,12 +10,13 @@ hop[d] = (diagonals, places) further. There are MARGIN empty diagonals and one e
 """
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 MARGIN = 3  # the longest hop: right and down among 8 neighbours
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def skewed(image, slant):
     """Store an image (H, W, C) by diagonals: (diagonals, C, places)."""
     H, W, C = image.shape
@@ -27,7 +28,7 @@ def skewed(image, slant):
     return out
 
 
-@njit(cache=True, nogil=True)
+@part
 def straightened(rows, slant, W):
     """Bring one channel (diagonals, places) back to an image (H, W)."""
     H = rows.shape[1] - 2
@@ -38,28 +39,28 @@ def straightened(rows, slant, W):
     return out
 
 
-@njit(cache=True, nogil=True)
+@part
 def places(k, slant, H, W):
     """Range of places on diagonal k that hold pixels."""
     k -= MARGIN
     return 1 + max(0, -((W - 1 - k) // slant)), 1 + min(H - 1, k // slant) + 1
 
 
-@njit(cache=True, nogil=True)
+@part
 def add(total, terms):
     """Add element by element; as all loops below, over pixels that are neighbours in memory."""
     for i in range(len(total)):
         total[i] += terms[i]
 
 
-@njit(cache=True, nogil=True)
+@part
 def smaller(least, values):
     """Keep the smaller of each pair of elements."""
     for i in range(len(least)):
         least[i] = min(least[i], values[i])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forward):
     """Send new messages along all pairs, forward or backward; return the lower bound that this proves.
 
@@ -109,7 +110,7 @@ def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forw
     return bound
 
 
-@njit(cache=True, nogil=True)
+@part
 def divide(belief, shift, ahead, rest):
     """Replace a belief by the share of one pair; `rest` is what remains after all pairs ahead took theirs."""
     for i in range(len(belief)):
@@ -118,21 +119,21 @@ def divide(belief, shift, ahead, rest):
         belief[i] = share
 
 
-@njit(cache=True, nogil=True)
+@part
 def subtract(out, x, y):
     """out = x - y."""
     for i in range(len(out)):
         out[i] = x[i] - y[i]
 
 
-@njit(cache=True, nogil=True)
+@part
 def cut_off(message, values, low, w):
     """message = min(values - low, w): the distance transform of a Potts term."""
     for i in range(len(message)):
         message[i] = min(values[i] - low[i], w[i])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def trws_labels(unary, weights, messages, hop, slant, W):
     """Read labels off the messages of a backward sweep: each pixel in turn, given the labels already chosen."""
     D, C, H = len(hop), unary.shape[1], unary.shape[2] - 2
@@ -153,14 +154,14 @@ def trws_labels(unary, weights, messages, hop, slant, W):
     return straightened(labels, slant, W)
 
 
-@njit(cache=True, nogil=True)
+@part
 def add_where_differs(cost, w, labels, c):
     """Charge class c for each pair whose other pixel has another label."""
     for i in range(len(cost)):
         cost[i] += w[i] if labels[i] != c else 0
 
 
-@njit(cache=True, nogil=True)
+@part
 def choose(labels, least, cost, c):
     """Take class c where it is the first or the cheapest so far."""
     for i in range(len(labels)):
@@ -169,7 +170,7 @@ def choose(labels, least, cost, c):
             labels[i] = c
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def trws_bound(unary, weights, step, nodes, place, iterations, enough):
     """Run the same algorithm on few scattered pixels, one at a time; return the bound on their energy and iterations.
 
@@ -186,7 +187,7 @@ def trws_bound(unary, weights, step, nodes, place, iterations, enough):
     return bound, iterations
 
 
-@njit(cache=True, nogil=True)
+@part
 def sweep_nodes(unary, weights, step, nodes, place, messages, forward):
     """Do what `trws_sweep` does; messages[i, k] comes to pixel nodes[i] from its neighbour k."""
     K, C = len(step), unary.shape[1]

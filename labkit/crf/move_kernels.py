@@ -5,18 +5,19 @@ and all arcs of `nodes`. Arrays are flat with a ring (`integers`); ring pixels h
 """
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 RING = 255
 
 
-@njit(cache=True, nogil=True)
+@part
 def pair_weight(weights, n, m, k, K):
     """The weight between pixel n and its neighbour m, the k-th of K, kept at the pixel that counts it forward."""
     return weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
     """Ask of each pixel: keep your label, or take `alpha` (the source's side)?
 
@@ -53,7 +54,7 @@ def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
         excess[n] = -taking
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
     """Ask each pixel labelled alpha or beta (the source's side) which of the two it takes; all pixels are free.
 
@@ -78,7 +79,7 @@ def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
     return present
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def persistency_test(unary, weights, step, labels, free, nodes, graph):
     """Ask which pixels keep their label in some best labelling: those beyond the source's side of the cut.
 
@@ -115,7 +116,7 @@ def persistency_test(unary, weights, step, labels, free, nodes, graph):
         excess[n] = saved - (second - cost[own])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fold_fixed(unary, weights, step, labels, free, nodes):
     """Turn what fixed neighbours charge free pixels into unary costs, in place, and cut the pairs with them.
 
@@ -129,10 +130,14 @@ def fold_fixed(unary, weights, step, labels, free, nodes):
             if weights[row, d] > 0 and not free[m]:
                 unary[n, labels[m]] -= weights[row, d]
                 weights[row, d] = 0
-        unary[n] -= unary[n].min()
+        least = unary[n, 0]
+        for c in range(1, unary.shape[1]):
+            least = min(least, unary[n, c])
+        for c in range(unary.shape[1]):
+            unary[n, c] -= least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def energy_of(unary, weights, step, labels, nodes):
     """Sum the integer costs of `nodes` and of the pairs that these own."""
     total = 0

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from labkit.grasp.search_kernels import GRIP, SLIPPERY, Shortcomings, lack
+from labkit.grasp.search_kernels import SLIPPERY, lack
+from labkit.support.compiled import kernel, part
 
 STEEPEST = 0.5  # tangent: between two faces that each lean by more than this to the same side, the target slips out
 
@@ -24,48 +24,56 @@ class Contact(NamedTuple):
     slope: float
 
 
-@njit(cache=True, nogil=True)
 def measure_grips(found, target, hidden, centre, rules, most, dropped):
     """Measure grips of `search`, the best first, until `most` of them hold; `dropped` counts the others on.
 
     Returns those that hold, and for each of them the middle of the jaws along their closing direction, their opening,
     and the cost.
     """
-    grips, places = np.empty(most, GRIP), np.empty((most, 3))
-    T, H = np.empty_like(target), np.empty_like(hidden)
-    n = 0
-    for grip in found:
-        if n == most:
-            break
-        turn(target, centre, grip, T)
-        turn(hidden, centre, grip, H)
-        if measure(grip, T, H, rules, places[n], dropped):
-            grips[n] = grip
-            n += 1
+    grips, places = found.copy(), np.empty((most, 3))
+    turned = np.empty_like(target), np.empty_like(hidden)
+    n = measure_in_turn(grips, target, hidden, centre, rules, *turned, places, dropped)
     return grips[:n], places[:n]
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def measure_in_turn(grips, target, hidden, centre, rules, T, H, places, dropped):
+    """Move the grips that hold to the front, until `places` is full; returns how many these are.
+
+    T, H: room for target and hidden points turned to a grip.
+    """
+    n = 0
+    for i in range(len(grips)):
+        if n == len(places):
+            break
+        turn(target, centre, grips[i], T)
+        turn(hidden, centre, grips[i], H)
+        if measure(grips[i], T, H, rules, places[n], dropped):
+            grips[n] = grips[i]
+            n += 1
+    return n
+
+
+@part
 def turn(points, centre, grip, out):
     """Coordinates of points along and across the jaws, relative to the target's middle and the grip's row."""
-    x, y = centre
     cos, sin = np.cos(grip.yaw), np.sin(grip.yaw)
     for i in range(len(points)):
-        dx, dy = points[i, 0] - x, points[i, 1] - y
+        dx, dy = points[i, 0] - centre[0], points[i, 1] - centre[1]
         out[i, 0], out[i, 1], out[i, 2] = dx * cos + dy * sin, dy * cos - dx * sin - grip.b, points[i, 2]
 
 
-@njit(cache=True, nogil=True)
+@part
 def measure(grip, T, H, rules, place, dropped):
     """Write middle, opening and cost of a grip into `place`, given target and hidden points turned to it.
 
     The cost is the weighted sum of its shortcomings, each from 0 to 1. Says whether the grip fits and would hold.
     """
-    hand, enough = rules.hand, rules.enough
+    hand, weights, enough = rules.hand, rules.weights, rules.enough
     left, right, start, end = jaws(T, grip, hand)
     if not 0.0 < right - left <= hand.opening:
         return False
-    at_left, at_right = contact(T, grip.tip, hand, start, -1), contact(T, grip.tip, hand, end, 1)
+    at_left, at_right = contact(T, grip.tip, hand, start, -1.0), contact(T, grip.tip, hand, end, 1.0)
     # Where both faces recede to the same side, as at a corner, the jaws squeeze the target out. Two parallel faces
     # recede to opposite sides: they only turn between the jaws.
     if abs(np.arctan(at_left.slope) + np.arctan(at_right.slope)) > 2.0 * np.arctan(STEEPEST):
@@ -79,23 +87,20 @@ def measure(grip, T, H, rules, place, dropped):
     )
     offset = np.sqrt(((start + end) / 2) ** 2 + grip.b**2)
     unseen = max(min(dark_left, at_left.rise), min(dark_right, at_right.rise))
-    shortcomings = Shortcomings(
-        shallow=lack(min(at_left.top, at_right.top), enough.shallow),
-        wide=1.0 - lack(end - start, enough.wide),
-        tight=lack(min(start - left, right - end), enough.tight),
-        offset=1.0 - lack(offset, enough.offset),
-        shadow=1.0 - lack((dark_left + dark_right) / 2 + dark_palm, enough.shadow),
-        short=lack((at_left.patch + at_right.patch) / 2, enough.short),
-        skew=1.0 - lack(abs(at_left.middle - at_right.middle), enough.skew),
-        unseen=1.0 - lack(unseen, enough.unseen),
-    )
-    place[0], place[1], place[2] = middle, right - left, 0.0
-    for i in range(len(rules.weights)):
-        place[2] += rules.weights[i] * shortcomings[i]
+    # One term for each of `Shortcomings`.
+    cost = weights.shallow * lack(min(at_left.top, at_right.top), enough.shallow)
+    cost += weights.wide * (1.0 - lack(end - start, enough.wide))
+    cost += weights.tight * lack(min(start - left, right - end), enough.tight)
+    cost += weights.offset * (1.0 - lack(offset, enough.offset))
+    cost += weights.shadow * (1.0 - lack((dark_left + dark_right) / 2 + dark_palm, enough.shadow))
+    cost += weights.short * lack((at_left.patch + at_right.patch) / 2, enough.short)
+    cost += weights.skew * (1.0 - lack(abs(at_left.middle - at_right.middle), enough.skew))
+    cost += weights.unseen * (1.0 - lack(unseen, enough.unseen))
+    place[0], place[1], place[2] = middle, right - left, cost
     return True
 
 
-@njit(cache=True, nogil=True)
+@part
 def jaws(P, grip, hand):
     """Where to open the jaws around what stands between them: left and right pad, left and right edge of the target.
 
@@ -103,7 +108,8 @@ def jaws(P, grip, hand):
     room for `hand.least` the right pad comes out left of the left one.
     """
     start, end = np.inf, -np.inf
-    for a, b, z in P:
+    for i in range(len(P)):
+        a, b, z = P[i, 0], P[i, 1], P[i, 2]
         if abs(b) <= hand.finger and z > grip.tip and grip.left_near - hand.cell < a < grip.right_near + hand.cell:
             start, end = min(start, a), max(end, a)
     room = min(start - grip.left_far, grip.right_far - end, (hand.opening - (end - start)) / 2)
@@ -113,17 +119,18 @@ def jaws(P, grip, hand):
     return min(grip.left_near, start - off), max(grip.right_near, end + off), start, end
 
 
-@njit(cache=True, nogil=True)
+@part
 def contact(P, tip, hand, edge, side):
     """Look at what a pad meets at an edge of the target (side -1 left, 1 right)."""
     low, high, top, inner = np.inf, -np.inf, -np.inf, -np.inf
     outline = np.full(4, np.inf)  # how far inside the edge the target begins: beside the pad, its two halves, beside it
-    for a, b, z in P:
+    for i in range(len(P)):
+        a, b, z = P[i, 0], P[i, 1], P[i, 2]
         depth = (edge - a) * side
         if z <= tip or abs(b) >= 2 * hand.pad or depth < -2 * hand.pad:
             continue
-        i = int(b / hand.pad + 2.0)
-        outline[i] = min(outline[i], depth)
+        half = int(b / hand.pad + 2.0)
+        outline[half] = min(outline[half], depth)
         if abs(b) <= hand.pad and 0.0 <= depth <= 3 * hand.cell:
             if depth <= hand.cell:  # the pad touches this too
                 low, high, top = min(low, b), max(high, b), max(top, z)
@@ -131,11 +138,11 @@ def contact(P, tip, hand, edge, side):
                 inner = max(inner, z)
     slope = slope_beyond(outline[1], outline[2], outline[3]) - slope_beyond(outline[2], outline[1], outline[0])
     if high < low:  # what reaches out furthest passes beside the pad
-        return Contact(0.0, float(side), 0.0, 0.0, slope / hand.pad)
+        return Contact(0.0, side, 0.0, 0.0, slope / hand.pad)
     return Contact(high - low, (low + high) / 2, top - tip, top - max(inner, tip), slope / hand.pad)
 
 
-@njit(cache=True, nogil=True)
+@part
 def slope_beyond(inner, outer, beside):
     """How much further out a face gets from one half of a pad to the other, if it goes on so beside the pad; else 0.
 
@@ -144,7 +151,7 @@ def slope_beyond(inner, outer, beside):
     return max(min(inner - outer, outer - beside), 0.0) if outer < np.inf and beside < np.inf else 0.0
 
 
-@njit(cache=True, nogil=True)
+@part
 def shadow_height(P, height, half, low, high):
     """How far unseen things might stand above a height, between two places along the jaws."""
     z = 0.0

@@ -252,8 +252,7 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
         return "the target is too flat: nothing of it is higher than the lowest tips"
     hand = _hand(gripper, kernels)
     rules = kernels.Rules(lowest, hand, kernels.Shortcomings(**WEIGHTS), _enough(gripper, kernels))
-    camera = np.zeros(0) if camera_position is None else camera_position
-    centre, near, hidden = kernels.surroundings(target, scene, camera, lowest, hand)
+    centre, near, hidden = kernels.surroundings(target, scene, camera_position, lowest, hand)
 
     def find(scene, hidden):
         grips, costs, dropped = kernels.search(target, scene, hidden, centre, _yaws(target), rules)

@@ -10,7 +10,8 @@ the cells and of the maps. Nothing here holds Python's lock, so that several tar
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 # In cells, of which CELLS cover the open gripper.
 CELLS = 20
@@ -132,23 +133,15 @@ GRIP = np.dtype(
 GRIP = np.dtype((np.record, GRIP))  # fields are attributes where nothing is compiled, too
 
 
-@njit(cache=True, nogil=True)
 def middle_of_area(points, cell):
     """Find the middle of what points cover, seen from above: every cell counts once, however many points it has."""
-    x, y = points[:, 0].min(), points[:, 1].min()
-    n = int((points[:, 0].max() - x) / cell) + 1
-    m = int((points[:, 1].max() - y) / cell) + 1
-    seen = np.zeros((n, m), np.bool_)
-    sum_x, sum_y, count = 0.0, 0.0, 0
-    for i in range(len(points)):
-        c, r = int((points[i, 0] - x) / cell), int((points[i, 1] - y) / cell)
-        if not seen[c, r]:
-            seen[c, r] = True
-            sum_x, sum_y, count = sum_x + c, sum_y + r, count + 1
-    return np.array([x + (sum_x / count + 0.5) * cell, y + (sum_y / count + 0.5) * cell])
+    corner = points[:, :2].min(axis=0)
+    cells = ((points[:, :2] - corner) / cell).astype(int)
+    seen = np.zeros(cells.max(axis=0) + 1, bool)
+    seen[tuple(cells.T)] = True
+    return corner + (np.argwhere(seen).mean(axis=0) + 0.5) * cell
 
 
-@njit(cache=True, nogil=True)
 def hidden_points(scene, x, y, radius, cell, camera, floor):
     """Bound from above what the camera cannot see: one point (K, 3) per cell without a reading, if above `floor`.
 
@@ -157,14 +150,20 @@ def hidden_points(scene, x, y, radius, cell, camera, floor):
     tau = (camera height - z) / distance over ground stays the same.
     """
     n = int(2.0 * radius / cell)
-    tau = np.full((n, n), np.inf)
+    tau, hidden = np.full((n, n), np.inf), np.empty((n * n, 3))
+    return hidden[: cast_shadows(scene, x, y, radius, cell, camera, floor, tau, hidden)]
+
+
+@kernel
+def cast_shadows(scene, x, y, radius, cell, camera, floor, tau, hidden):
+    """Fill tau (n, n) by cell, infinite without a reading, and `hidden`; returns how many hidden points there are."""
+    n = len(tau)
     for i in range(len(scene)):
         dx, dy = scene[i, 0] - x + radius, scene[i, 1] - y + radius
         if 0.0 <= dx < n * cell and 0.0 <= dy < n * cell:
             r, c = int(dy / cell), int(dx / cell)
             distance = max(np.sqrt((scene[i, 0] - camera[0]) ** 2 + (scene[i, 1] - camera[1]) ** 2), cell)
             tau[r, c] = min(tau[r, c], (camera[2] - scene[i, 2]) / distance)
-    out = np.empty((n * n, 3))
     count = 0
     for r in range(n):
         for c in range(n):
@@ -180,27 +179,27 @@ def hidden_points(scene, x, y, radius, cell, camera, floor):
                 u, v = u + dx / step, v + dy / step
             z = camera[2] - grazed * np.sqrt(dx**2 + dy**2)
             if z > floor:
-                out[count, 0], out[count, 1], out[count, 2] = px, py, z
+                hidden[count, 0], hidden[count, 1], hidden[count, 2] = px, py, z
                 count += 1
-    return out[:count]
+    return count
 
 
-@njit(cache=True, nogil=True)
 def surroundings(target, scene, camera, lowest, hand):
     """Collect what matters around a target: its middle (x, y), the points near it above `lowest`, and hidden points.
 
-    camera: its position, or an empty array if it is unknown; then nothing counts as hidden.
+    camera: its position, or None if it is unknown; then nothing counts as hidden.
     """
     centre = middle_of_area(target, hand.cell)
     radius = (hand.columns + 1) / 2 * hand.cell
-    around = scene[(np.abs(scene[:, 0] - centre[0]) < radius) & (np.abs(scene[:, 1] - centre[1]) < radius)]
     hidden = np.empty((0, 3))
-    if len(camera):
-        hidden = hidden_points(around, centre[0], centre[1], radius, hand.cell, camera, lowest)
-    return centre, around[around[:, 2] > lowest], hidden
+    if camera is not None:
+        hidden = hidden_points(scene, *centre, radius, hand.cell, camera, lowest)
+    raised = scene.compress(scene[:, 2] > lowest, axis=0)
+    x, y = raised[:, 0] - centre[0], raised[:, 1] - centre[1]
+    return centre, raised.compress((np.abs(x) < radius) & (np.abs(y) < radius), axis=0), hidden
 
 
-@njit(cache=True, nogil=True)
+@part
 def fill(heights, points, x, y, cos, sin, cell):
     """Make a map, turned by a yaw around (x, y): the highest point of each cell."""
     rows, columns = heights.shape
@@ -212,7 +211,7 @@ def fill(heights, points, x, y, cos, sin, cell):
             heights[int(v), int(u)] = max(heights[int(v), int(u)], points[i, 2])
 
 
-@njit(cache=True, nogil=True)
+@part
 def profile(heights, row, n, first, last, out):
     """Look at columns first to last of a map from the side: the highest of the cells within n rows of a row."""
     out[:] = -np.inf
@@ -221,7 +220,7 @@ def profile(heights, row, n, first, last, out):
             out[c] = heights[r, c] if heights[r, c] > out[c] else out[c]
 
 
-@njit(cache=True, nogil=True)
+@part
 def finger_floor(heights, underside, first, last, left, right):
     """How low the tips can go with a pad at the left edge of columns first to last: left finger, right finger."""
     left[:], right[:] = np.inf, np.inf  # beyond these there is no place
@@ -234,7 +233,7 @@ def finger_floor(heights, underside, first, last, left, right):
             right[edge] = z if z > right[edge] else right[edge]
 
 
-@njit(cache=True, nogil=True)
+@part
 def find_runs(heights, first, last, tip, slot, runs):
     """Find the stretches of columns higher than the tips, as rows of `runs`: first column, one past the last; how many.
 
@@ -255,7 +254,7 @@ def find_runs(heights, first, last, tip, slot, runs):
     return n
 
 
-@njit(cache=True, nogil=True)
+@part
 def free_side(floors, edge, step, tip):
     """Where may a pad start, from an edge of the target outwards (step -1 or 1)? The nearest place and the furthest."""
     for near in range(edge, edge + 3 * step, step):
@@ -267,7 +266,7 @@ def free_side(floors, edge, step, tip):
     return -1, -1
 
 
-@njit(cache=True, nogil=True)
+@part
 def end_height(heights, first, last):
     """The lower of the two ends of a stretch of columns, each the higher of its two outermost ones."""
     left, right = heights[first], heights[last]
@@ -276,7 +275,7 @@ def end_height(heights, first, last):
     return min(left, right)
 
 
-@njit(cache=True, nogil=True)
+@part
 def hand_fits(heights, row, middle, tip, hand):
     """Is there room for the palm, and for the wider body behind it, with the tips at a height?"""
     rows, columns = heights.shape
@@ -292,36 +291,39 @@ def hand_fits(heights, row, middle, tip, hand):
     return True
 
 
-@njit(cache=True, nogil=True)
 def search(target, scene, hidden, centre, yaws, rules):
     """Try every yaw, row and tip height, and every pair of edges of the target there; keep the best of each few rows.
 
     centre: x, y of the target's middle. Returns GRIPs, their rough costs (infinite for a place without a grip), and
     counts of what was dropped and why.
     """
-    x, y = centre
     hand = rules.hand
     bands = 2 * REACH // BAND + 1
-    costs = np.full(len(yaws) * bands, np.inf)
-    grips = np.empty(len(yaws) * bands, GRIP)
+    costs, grips = np.full((len(yaws), bands), np.inf), np.empty((len(yaws), bands), GRIP)
+    grips["yaw"] = yaws[:, None]
     dropped = np.zeros(5, np.int64)
     heights = np.empty((3, hand.rows, hand.columns), np.float32)
     lines = np.empty((7, hand.columns), np.float32)
-    highest = scene[:, 2].max() if len(scene) else -np.inf
-    maps = Maps(heights[0], heights[1], heights[2], highest)
-    for n, yaw in enumerate(yaws):
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        fill(maps.target, target, x, y, cos, sin, hand.cell)
-        fill(maps.scene, scene, x, y, cos, sin, hand.cell)
-        fill(maps.hidden, hidden, x, y, cos, sin, hand.cell)
+    maps = Maps(*heights, highest=scene[:, 2].max(initial=-np.inf))
+    search_yaws(target, scene, hidden, centre, rules, maps, lines, grips, costs, dropped)
+    return grips.ravel(), costs.ravel(), dropped
+
+
+@kernel
+def search_yaws(target, scene, hidden, centre, rules, maps, lines, grips, costs, dropped):
+    """Write the best grip of each yaw and band of rows, and its cost, into `grips` and `costs`, (yaws, bands)."""
+    x, y, cell = centre[0], centre[1], rules.hand.cell
+    for n in range(len(grips)):
+        cos, sin = np.cos(grips[n, 0].yaw), np.sin(grips[n, 0].yaw)
+        fill(maps.target, target, x, y, cos, sin, cell)
+        fill(maps.scene, scene, x, y, cos, sin, cell)
+        fill(maps.hidden, hidden, x, y, cos, sin, cell)
         for offset in range(-REACH, REACH + 1, STRIDE):
-            i = n * bands + (offset + REACH) // BAND
-            grips[i].yaw = yaw
-            costs[i] = search_row(maps, lines, hand.rows // 2 + offset, rules, costs[i], grips[i], dropped)
-    return grips, costs, dropped
+            i, number = (offset + REACH) // BAND, rules.hand.rows // 2 + offset
+            costs[n, i] = search_row(maps, lines, number, rules, costs[n, i], grips[n, i], dropped)
 
 
-@njit(cache=True, nogil=True)
+@part
 def search_row(maps, lines, number, rules, best, grip, dropped):
     """Find the best grip of one row; if it costs less than `best`, write it into `grip`. Returns the lower cost.
 
@@ -330,7 +332,9 @@ def search_row(maps, lines, number, rules, best, grip, dropped):
     hand, lowest = rules.hand, rules.lowest
     cell, least_depth = hand.cell, LEAST_DEPTH * hand.cell
     profile(maps.target, number, int(hand.pad / cell + 0.5), 0, hand.columns, lines[0])
-    top = lines[0].max()
+    top = lines[0, 0]
+    for c in range(1, hand.columns):
+        top = max(top, lines[0, c])
     if top <= lowest + least_depth:
         dropped[SHALLOW] += top > lowest
         return best
@@ -354,11 +358,12 @@ def search_row(maps, lines, number, rules, best, grip, dropped):
     return best
 
 
-@njit(cache=True, nogil=True)
+@part
 def from_the_side(maps, lines, number, rules):
     """Look at a row from the side; lines: its heights, of which the first are the target's already."""
     hand = rules.hand
-    material, around, shadow, left, right, dark_left, dark_right = lines
+    material, around, shadow = lines[0], lines[1], lines[2]
+    left, right, dark_left, dark_right = lines[3], lines[4], lines[5], lines[6]
     begin, stop = 0, hand.columns
     while material[begin] <= rules.lowest:
         begin += 1
@@ -374,7 +379,7 @@ def from_the_side(maps, lines, number, rules):
     return Row(number, b, begin, stop, material, left, right, dark_left, dark_right)
 
 
-@njit(cache=True, nogil=True)
+@part
 def rough_cost(maps, row, first, last, tip, rules, best, dropped):
     """The cost of gripping columns first to last of a row with the tips at a height, and where the pads may be.
 
@@ -409,7 +414,7 @@ def rough_cost(maps, row, first, last, tip, rules, best, dropped):
     return cost, Pads(left_near, left_far, right_near, right_far)
 
 
-@njit(cache=True, nogil=True)
+@part
 def lack(value, enough):
     """How much of `enough` is missing: 0 none, 1 all."""
     return 1.0 - min(max(value, 0.0) / enough, 1.0)

@@ -47,7 +47,9 @@ def geometry_channels(
     footprint = np.float32(np.sqrt(K[0, 0] * K[1, 1]) * FOOTPRINT)
     single = [np.asarray(x, np.float32) for x in (to_normal, slant)]
     reach = np.array(HEIGHTS, np.float32)
-    return fill_channels(depth, q, q_u, q_v, *single, np.float32(t[2] - table_z), reach, footprint)
+    channels = np.full((*depth.shape, len(CHANNELS)), np.float32(0.5))
+    fill_channels(depth, q, q_u, q_v, *single, np.float32(t[2] - table_z), reach, footprint, channels)
+    return channels
 
 
 def inverse_depth(depth: Float[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:

@@ -5,42 +5,49 @@ times as long as a grid of cubes. The benchmark of this topic measures both.
 """
 
 import numpy as np
-from numba import njit
+
+from labkit.support.compiled import kernel, part
 
 
-@njit(cache=True)
 def scale_rays(depth, rays, t):
     """Compute d * ray + t for every pixel of depth images (N, H, W), and NaN where d is not above 0 (or is NaN itself).
 
-    Row by row, d and t are first repeated for x, y and z: then the sum runs over plain rows of numbers, which the
-    compiler turns into vector instructions. Twice as fast as the obvious loop over pixels.
+    rays: (H, W, 3). t: (3,). All float32.
     """
     N, H, W = depth.shape
     P = np.empty((N, H, W, 3), np.float32)
-    d_xyz, t_xyz = np.empty(3 * W, np.float32), np.empty(3 * W, np.float32)
-    for k in range(3 * W):
-        t_xyz[k] = t[k % 3]
-    for n in range(N):
-        for v in range(H):
-            for u in range(W):
-                d = depth[n, v, u] if depth[n, v, u] > 0.0 else np.float32(np.nan)
-                d_xyz[3 * u] = d_xyz[3 * u + 1] = d_xyz[3 * u + 2] = d
-            row, ray = P[n, v].reshape(3 * W), rays[v].reshape(3 * W)
-            for k in range(3 * W):
-                row[k] = d_xyz[k] * ray[k] + t_xyz[k]
+    scale_rows(depth, rays.reshape(H, 3 * W), np.tile(t, W), P.reshape(N, H, 3 * W))
     return P
 
 
-@njit(cache=True)
-def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footprint):
-    """Compute the geometry channels of every pixel, (H, W, 7) in 0..1, from 1 / depth and its slopes.
+@kernel
+def scale_rows(depth, rays, t, P):
+    """Fill P (N, H, 3 W) with d * ray + t; x, y and z of a row's pixels stand in turn.
+
+    Row by row, d is first repeated for x, y and z: then the sum runs over plain rows of numbers, which the compiler
+    turns into vector instructions. Twice as fast as the obvious loop over pixels.
+    """
+    N, H, W = depth.shape
+    for n in range(N):
+        for v in range(H):
+            row, ray = P[n, v], rays[v]
+            for u in range(W):
+                d = depth[n, v, u] if depth[n, v, u] > 0.0 else np.float32(np.nan)
+                row[3 * u] = row[3 * u + 1] = row[3 * u + 2] = d
+            for k in range(3 * W):
+                row[k] = row[k] * ray[k] + t[k]
+
+
+@kernel
+def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footprint, out):
+    """Compute the geometry channels of every pixel, `out` (H, W, 7) in 0..1, from 1 / depth and its slopes.
 
     axes: (3, 3), from the gradient (q_u, q_v, q_1) of 1 / depth to the normal's parts. slant: (3,), the height that a
     ray gains for each metre of depth is its product with (u, v, 1). reach: the metres of the two height channels.
-    footprint: metres at which its channel is 0.5, times the focal length.
+    footprint: metres at which its channel is 0.5, times the focal length. All float32; `out` comes as 0.5 everywhere,
+    which a pixel without depth keeps.
     """
     H, W = depth.shape
-    out = np.full((H, W, 7), np.float32(0.5))
     half, one = np.float32(0.5), np.float32(1.0)
     for v in range(H):
         for u in range(W):
@@ -60,7 +67,6 @@ def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footpri
                 out[v, u, 4] += scale * y
                 out[v, u, 5] += scale * z
                 out[v, u, 6] += half * min(one, max(-one, np.log2(d / footprint) / np.float32(3.0)))
-    return out
 
 
 def sort_into_cells(P, reach):
@@ -84,7 +90,7 @@ def sort_into_cells(P, reach):
     return order, points[order], (keys, np.append(starts, len(P)), x_step, y_step)
 
 
-@njit(cache=True)
+@part
 def nearby_cells(keys, offset):
     """Find, for every cell a, the run of cells first[a] to last[a] whose keys are within 2 of keys[a] + offset.
 
@@ -102,19 +108,24 @@ def nearby_cells(keys, offset):
     return first, last
 
 
-@njit(cache=True)
+@part
 def within(points, i, j, reach):
     """Say whether two points are at most `reach` apart."""
     x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
     return x * x + y * y + z * z <= reach * reach
 
 
-@njit(cache=True)
 def count_neighbours(points, keys, starts, x_step, y_step, reach, enough):
     """Count the other points within `reach` of each point; the search for a point ends at `enough`."""
-    count = np.empty(len(points), np.int64)
-    for a in range(len(keys)):
-        count[starts[a] : starts[a + 1]] = starts[a + 1] - starts[a] - 1  # its own cube is all within reach
+    sizes = np.diff(starts)
+    count = np.repeat(sizes - 1, sizes)  # a point's own cube is all within reach
+    add_neighbours(points, keys, starts, x_step, y_step, reach, enough, count)
+    return count
+
+
+@kernel
+def add_neighbours(points, keys, starts, x_step, y_step, reach, enough, count):
+    """Add to the count of each point its neighbours in other cubes."""
     for dx in range(-2, 3):
         for dy in range(-2, 3):
             first, last = nearby_cells(keys, dx * x_step + dy * y_step)
@@ -125,10 +136,9 @@ def count_neighbours(points, keys, starts, x_step, y_step, reach, enough):
                             break
                         if not starts[a] <= j < starts[a + 1]:
                             count[i] += within(points, i, j, reach)
-    return count
 
 
-@njit(cache=True)
+@part
 def root(parent, a):
     """Follow a cell to the root of its tree, shortening the way for the next time."""
     while parent[a] != a:
@@ -137,7 +147,7 @@ def root(parent, a):
     return a
 
 
-@njit(cache=True)
+@part
 def touch(points, starts, a, b, reach):
     """Say whether any point of cell a is within `reach` of any point of cell b."""
     for i in range(starts[a], starts[a + 1]):
@@ -147,10 +157,16 @@ def touch(points, starts, a, b, reach):
     return False
 
 
-@njit(cache=True)
 def link_cells(points, keys, starts, x_step, y_step, reach):
-    """Number the groups of points that chains with steps of at most `reach` hold together (union-find over cells)."""
+    """Number the groups of points that chains with steps of at most `reach` hold together."""
     parent = np.arange(len(keys))
+    join_cells(points, keys, starts, x_step, y_step, reach, parent)
+    return np.repeat(parent, np.diff(starts))
+
+
+@kernel
+def join_cells(points, keys, starts, x_step, y_step, reach, parent):
+    """Union-find over cells: afterwards the parent of each is the root that its group shares."""
     for dx in range(3):  # a pair of cells is met once from either side: half of the columns is enough
         for dy in range(-2 if dx else 0, 3):
             first, last = nearby_cells(keys, dx * x_step + dy * y_step)
@@ -159,7 +175,5 @@ def link_cells(points, keys, starts, x_step, y_step, reach):
                     root_a, root_b = root(parent, a), root(parent, b)
                     if root_a != root_b and touch(points, starts, a, b, reach):
                         parent[max(root_a, root_b)] = min(root_a, root_b)
-    group = np.empty(len(points), np.int64)
     for a in range(len(keys)):
-        group[starts[a] : starts[a + 1]] = root(parent, a)
-    return group
+        parent[a] = root(parent, a)
