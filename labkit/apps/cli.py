@@ -438,6 +438,28 @@ def grade(
     raise typer.Exit(1 if graded.needs_a_look else 0)
 
 
+@app.command()
+def grades(
+    topic: Annotated[str, typer.Argument(help="Which lab, such as 04_iou.")],
+    moodle: Annotated[bool, typer.Option("--moodle", help="Moodle's grading worksheet, and its zip of pages.")] = False,
+    canvas: Annotated[bool, typer.Option("--canvas", help="Canvas's columns, and its zip of pages.")] = False,
+    course: Annotated[Path, typer.Option(help="Folder that holds nbgrader's gradebook.")] = Path("."),
+) -> None:
+    """Write a table of grades: for Moodle or Canvas as they import it, with a zip of feedback that they hand out."""
+    from labkit.course.grading.platforms import write_grades
+    from labkit.course.grading.run import private
+
+    if moodle and canvas:
+        raise ValueError("expected --moodle or --canvas, got both")
+    with private():
+        files, waiting = write_grades(course, topic, "moodle" if moodle else "canvas" if canvas else "scores")
+    for path in files:
+        typer.echo(f"wrote {path}")
+    if waiting:
+        typer.echo(f"to be graded by hand yet: {', '.join(waiting)}")
+    raise typer.Exit(1 if waiting else 0)
+
+
 def main() -> None:
     """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
     try:

@@ -10,7 +10,10 @@ copies     which answers hold the kit's own code
 batch      a folder of submissions: what changed is graded
 outputs    grades.csv, results.json, and `feedback`, a page per student
 markdown   a stranger's Markdown, made harmless
+tell       what to say about a wrong answer, in a process with limits
+changes    what an instructor changed after the release: course.toml
 gradebook  nbgrader's database and the copies that formgrader shows
 students   those who were renamed, and those who are gone
+platforms  tables and zips that Moodle and Canvas take back
 refusal    why nbgrader's own Autograde does nothing
 """
