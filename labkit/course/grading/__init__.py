@@ -1,5 +1,6 @@
 """Grading: a student's answers run in a sandbox that holds nothing worth stealing, and are judged outside it.
 
+collect    whose a file is in the zip of a learning platform
 reading    a released lab and the submissions of it, read as data of strangers
 sandbox    what an answer sees and may use: bubblewrap, `seccomp`, limits, a fresh process
 bwrap      which bubblewrap there is, and why it does not work where it does not

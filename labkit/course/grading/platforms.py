@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from labkit.course.collect import student_and_notebook
+from labkit.course.grading.collect import student_and_notebook
 from labkit.course.grading.gradebook import opened
 from labkit.course.grading.outputs import harmless
 from labkit.support.files import write_atomically
