@@ -86,14 +86,17 @@ DEVICE ?= auto
 train: .venv/installed
 	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)
-	$(BIN)/python -m data_gen data/wide --scenes $(WIDE_SCENES) --first-seed 0 --config wide --size $(SIZE) --workers $(WORKERS)
+	for config in wide any; do
+	    $(BIN)/python -m data_gen data/$$config --scenes $(WIDE_SCENES) --first-seed 0 --config $$config --size $(SIZE) --workers $(WORKERS)
+	done
 	for model in smallsegnet unet; do
 	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	done
-	rgbd="$(BIN)/labkit train data/train data/wide --scenes $(WIDE_SCENES) --val data/val --device $(DEVICE) --epochs $(or $(EPOCHS),24)"
-	$$rgbd --model unet_rgbd
-	$$rgbd --init data/runs/unet_rgbd.pt --lr 2e-3 --seed 1 --out data/runs/again
-	cp data/runs/{smallsegnet,unet}.pt data/runs/again/unet_rgbd.pt labkit/weights/
+	rgbd="$(BIN)/labkit train --scenes $(WIDE_SCENES) --val data/val --device $(DEVICE) data/train"
+	$$rgbd data/wide --model unet_rgbd --epochs $(or $(EPOCHS),24)
+	$$rgbd data/wide --init data/runs/unet_rgbd.pt --epochs $(or $(EPOCHS),24) --lr 2e-3 --seed 1 --out data/runs/again
+	$$rgbd data/any --init data/runs/again/unet_rgbd.pt --epochs $(or $(EPOCHS),4) --lr 1e-3 --seed 2 --out data/runs/any
+	cp data/runs/{smallsegnet,unet}.pt data/runs/any/unet_rgbd.pt labkit/weights/
 
 # Environments, and the extras of pyproject.toml that each holds.
 .venv/installed: EXTRAS := course,instructor,stacks,cluster,test

@@ -60,6 +60,15 @@ CONFIGS = {
         roll=0.35,
         obstacles=(3, 9),
     ),
+    "any": SceneConfig(
+        stream=5,
+        wide=True,
+        elevations=((0.25, 0.38), (0.38, 0.95), (0.95, 1.25), (1.25, 1.56)),  # hard's and other's views among them
+        distance=(0.45, 1.3),
+        roll=3.1,
+        fov_y=(0.55, 0.95),
+        obstacles=(3, 9),
+    ),
     "other": SceneConfig(
         stream=4,
         elevations=((1.20, 1.50),),
@@ -76,9 +85,10 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     """Draw a scene; the same seed and config give the same scene.
 
     config: "train", "test" (the same distribution, other scenes), "hard" (shapes, textures and viewpoints that are not
-    in train), "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data) or
-    "other" (test's objects as another camera sees them: from overhead, wide-angled, drawn by another renderer, with
-    depth of a stereo pair). Raises ValueError for a negative seed or an unknown config.
+    in train), "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data), "any"
+    (wide's objects from every elevation up to 89 degrees, at any roll: training data as well) or "other" (test's
+    objects as another camera sees them: from overhead, wide-angled, drawn by another renderer, with depth
+    of a stereo pair). Raises ValueError for a negative seed or an unknown config.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)

@@ -74,7 +74,7 @@ def test_no_family_is_both_target_and_obstacle_and_colours_do_not_tell():
     assert np.abs(means[TARGET] - means[OBSTACLE]).max() < 0.06
 
 
-@pytest.mark.parametrize("config", ["train", "wide"])
+@pytest.mark.parametrize("config", ["train", "wide", "any"])
 def test_training_shows_nothing_that_hard_asks_about(config):
     scenes = {c: [data_gen.sample_scene(seed, c) for seed in range(60)] for c in (config, "hard")}
     things = {c: [thing for spec in scenes[c] for thing in spec.objects] for c in scenes}
@@ -86,14 +86,16 @@ def test_training_shows_nothing_that_hard_asks_about(config):
     ours, theirs = ([np.arcsin(-s.camera.T_base_cam[2][2]) for s in scenes[c]] for c in scenes)
     if config == "train":
         assert all(not min(ours) <= height <= max(ours) for height in theirs)
-    else:
+    elif config == "wide":
         (low_from, low_to), (high_from, _) = CONFIGS["hard"].elevations
         assert all(height < high_from and not low_from < height < low_to for height in ours)
 
 
-def test_wide_has_none_of_hards_shapes():
+@pytest.mark.parametrize("ours_is", ["wide", "any"])
+def test_wide_has_none_of_hards_shapes(ours_is):
     """Shapes are told apart by the edges of their boxes, or by their parts."""
-    things = {c: [t for seed in range(60) for t in data_gen.sample_scene(seed, c).objects] for c in ("wide", "hard")}
+    things = {"wide": ours_is, "hard": "hard"}
+    things = {c: [t for seed in range(60) for t in data_gen.sample_scene(seed, k).objects] for c, k in things.items()}
 
     def sizes(config, family):
         """Edge lengths in the object's frame, sorted."""
