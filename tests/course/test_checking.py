@@ -83,13 +83,13 @@ CASES = [
            "      returns   [[0.25, 0.75]]\n      expected  [[0.98127, 1.4813]]\n  Hint: Do all of them sum to one?"),
     (transposed, "✘ share: expected shape (1, 2), got (2, 1)\n" + HERE +
            "      returns   [[0.25], [0.75]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Hint: No case is right. Do the one above by hand, and print what each of your lines gives."),
+           "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
     (lambda n: n + 9, "✘ share: 2 of 2 values are not right\n" + HERE +
            "      returns   [[10, 12]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: A right answer has a property that yours lacks: shares are not over two."),
     (lambda n: n > 0, "✘ share: expected real numbers, got dtype bool: write .astype(float) or .astype(int)\n" + HERE +
            "      returns   [[True, True]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Hint: No case is right. Do the one above by hand, and print what each of your lines gives."),
+           "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
     (alters, "✘ share: it changes its argument n: work on a copy; what calls it still needs the old values"),
     (loud, "✔ share is right\n  Cases tried: 1 by hand, 4 random.\n"
            "  It prints: hello\n  It prints: hello\n  It prints: hello\n  ..."),
@@ -189,7 +189,7 @@ def test_the_counterexample_comes_at_once_and_the_marked_line_joins_it(tmp_path)
     label = "Look at line 3:  "
     line = f"  {label}return i / (n.sum(0) - n.sum(1) - i)"
     text = shown.data["text/plain"]
-    assert f"{line}\n{' ' * line.index('-')}^\n  Hint: Only this operator is wrong." in text
+    assert f"{line}\n{' ' * line.index('-')}^\n  Hint: Another operator belongs at the marked place." in text
     assert f"{label}<code>return i / (n.sum(0) <mark>-</mark> n.sum(1) - i)</code>" in shown.data["text/html"]
     assert checking.LOOKING not in text
 

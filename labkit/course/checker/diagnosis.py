@@ -150,7 +150,7 @@ def found_in_the_program(
         equal = [f for f in repairs if f.kind == finding.kind and f.width == finding.width and f != finding][:1]
         says = said(finding)
         if finding in repairs and equal:
-            says = f"One of these two places is wrong. {says}"
+            says = f"Change one of the two marked places, not both. {says}"
         yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
 
 
@@ -229,10 +229,7 @@ def fulfilled(prop: Property, case: Case, got: object) -> bool:
 
 
 def which_cases(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Sentence:
-    """How many cases are right: what is special about the others may tell the rest."""
+    """What to do with the case that is shown, and how many others are right."""
     right = sum(alike(question, case.expected, got) for case, got in zip(cases, outputs, strict=True))
-    if right:
-        says = f"{right} of {len(cases)} cases are right. What does the one above have that they do not?"
-    else:
-        says = "No case is right. Do the one above by hand, and print what each of your lines gives."
-    return Sentence("case", says)
+    others = f" {right} of {len(cases)} cases are right." if right else ""
+    return Sentence("case", f"Do the case above by hand, and print what each of your lines gives for it.{others}")

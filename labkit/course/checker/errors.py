@@ -61,11 +61,9 @@ def outside(found: re.Match, args: dict) -> str:
         along = f"axis {axis}{' (as long as that of ' + of + ')' if of else ''}"
         return f"The index {index} is one past the end: the last one along {along} is {size - 1}."
     lengths = [f"axis {k} of {name}" for name, a in arrays(args).items() for k, n in enumerate(a.shape) if index < n]
-    if holding:
-        return f"An index of {index} into an axis of only {size}; {holding[0]} holds {index}: is it used as an index?"
     if lengths:
         return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes exchanged?"
-    return f"An index of {index} into an axis of {size}: which numbers can stand there?"
+    return f"An index of {index} into an axis of {size}: what does the index count, and what does this array hold?"
 
 
 @when(r"ValueError: operands could not be broadcast together with shapes? \(([\d,]*)\) \(([\d,]*)\)")
@@ -90,10 +88,11 @@ def whose(shape: tuple[int, ...], args: dict) -> str:
 @when(r"(?:(?:numpy\.exceptions\.)?AxisError|an exception): axis (-?\d+) is out of bounds for array of dimension (\d+)")
 def no_such_axis(found: re.Match, args: dict) -> str:
     """An axis that there is not."""
-    by_hand = f"{found[2]} axes: 0" + (f" to {int(found[2]) - 1}" if int(found[2]) > 1 else "")
-    return (
-        f"There is no axis {found[1]} here: the array has {by_hand if found[2] != '0' else 'none, it is one number'}."
-    )
+    count = int(found[2])
+    if count == 0:
+        return f"There is no axis {found[1]} here: it is one number, and no array."
+    axes = "one axis, number 0" if count == 1 else f"{count} axes, 0 to {count - 1}"
+    return f"There is no axis {found[1]} here: in this case the array has {axes}. The last axis is always number -1."
 
 
 @when(r"TypeError: .+?\(\) (?:takes|missing).*positional")
@@ -162,7 +161,8 @@ TABLE = {
         "You put something of shape ({1}) into a place of shape ({2})."
     ),
     r"(?:Value|Index)Error: (?:shape mismatch|could not be broadcast|.*shape mismatch)": (
-        "Index arrays that are used together must have one shape: print the shape of each."
+        "Index arrays are taken together entry by entry, so that they need one shape. For each row with each column "
+        "one of them has an axis more, as in rows[:, None]."
     ),
     r"ValueError: need at least one array": "In this case there is nothing to stack or join: is a list empty?",
     r"ValueError: all the input array|ValueError: all input arrays": (
@@ -178,11 +178,9 @@ TABLE = {
     r"ValueError: (?:'?axes?'?.*match|axes don't match|repeated axis|duplicate value in 'axis')": (
         "The list of axes must name each axis of the array once."
     ),
-    r"ValueError: zero-size array to reduction operation (\w+)|ValueError: attempt to get (\w+) of an empty": (
-        "The {1} of nothing: in this case nothing is left. What is right then?"
-    ),
+    r"ValueError: zero-size array to reduction operation (\w+)|ValueError: attempt to get (\w+) of an empty|"
     r"ValueError: (\w+)\(\) (?:arg is an empty sequence|iterable argument is empty)": (
-        "The {1} of nothing: in this case nothing is left. What is right then?"
+        "{1} gets an empty array: does an index run too far, or does a mask select nothing in this case?"
     ),
     r"ValueError: zip\(\) argument (\d+) is (\w+) than": (
         "Of the lists that you go through together, number {1} is {2} than those before: print them."
@@ -235,6 +233,9 @@ TABLE = {
     ),
     r"TypeError: only (?:length-1|0-dimensional|integer scalar|size-1) arrays": (
         "Python wants one number there and gets an array: is a sum or an index missing, or np.exp for math.exp?"
+    ),
+    r"TypeError: (?:int|float)\(\) argument must be .*'NoneType'": (
+        "Something is still None there: in this case nothing has given it a value. Which condition was never true?"
     ),
     r"TypeError: (?:int|float)\(\) argument must be|TypeError: must be real number, not": (
         "Python wants one number there and gets a list or a tuple: which of its entries do you mean?"

@@ -70,7 +70,8 @@ COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 # What may be missing around an expression `_`: the kind of the mistake, how many nodes it adds, and the texts.
 AROUND = (
     ("transpose", 1.5, "_.T | np.swapaxes(_, -1, -2)"),
-    ("sign", 1.5, "-_ | np.abs(_)"),
+    ("sign", 1.5, "-_"),
+    ("absolute", 1.5, "np.abs(_)"),
     ("cast", 1.5, "_.astype(float) | _.astype(int) | float(_) | int(_) | np.int64(_)"),
     ("copy", 1.5, "_.copy()"),
     ("power", 2, "np.sqrt(_) | _ ** 2"),
@@ -219,7 +220,9 @@ def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
         for recipe in recipes[place].values():
             yield at([place], [recipe])
     seen = set()
-    for group in (*equal_places(places), *parallel_places(function)):
+    lines = [list(expressions(line)) for line in simple_statements(function)]
+    equal = (group for inside in (places, *lines) for group in equal_places(inside))
+    for group in (*equal, *parallel_places(function)):
         identity = tuple(id(place.node) for place in group)
         if identity in seen or any(place not in recipes for place in group):
             continue
@@ -228,6 +231,8 @@ def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
             if all(key in recipes[place] for place in group):
                 yield at(group, [recipes[place][key] for place in group])
     yield from exchanged_names(function, scope, places)
+    for inside in lines:
+        yield from exchanged_parts(inside)
 
 
 def at(places: Sequence[Place], recipes: Sequence[Recipe]) -> Mutation:
@@ -289,8 +294,7 @@ def skeleton(node: ast.AST) -> str:
 
 def exchanged_names(function: ast.stmt, scope: Scope, places: Sequence[Place]) -> Iterator[Mutation]:
     """Two names exchanged wherever they are read, in one statement or in the whole function."""
-    bodies = [node for node in ast.walk(function) if isinstance(node, ast.stmt) and not hasattr(node, "body")]
-    for where in (function, *bodies):
+    for where in (function, *simple_statements(function)):
         read = list(places) if where is function else list(expressions(where))
         named = [place for place in read if isinstance(place.node, ast.Name) and place.node.id in scope.names]
         for a, b in itertools.combinations(dict.fromkeys(place.node.id for place in named), 2):
@@ -300,6 +304,21 @@ def exchanged_names(function: ast.stmt, scope: Scope, places: Sequence[Place]) -
             spans = tuple(span_of(place.node) for place in both)
             if len(both) <= LONGEST_GROUP:
                 yield Mutation("names exchanged", 2.0, tuple(both), makes, spans)
+
+
+def exchanged_parts(places: Sequence[Place]) -> Iterator[Mutation]:
+    """Two short parts of a statement exchanged, such as k // 2 and k % 2."""
+    short = [p for p in places if isinstance(p.node, ast.BinOp | ast.Subscript | ast.Call) and size(p.node) <= SHORT]
+    for a, b in itertools.combinations(short, 2):
+        apart = span_of(a.node).last_line < b.node.lineno or a.node.end_col_offset <= b.node.col_offset
+        if apart and type(a.node) is type(b.node) and ast.dump(a.node) != ast.dump(b.node):
+            makes = (lambda n, other=b.node: other, lambda n, other=a.node: other)
+            yield Mutation("order", 2.0, (a, b), makes, (span_of(a.node), span_of(b.node)))
+
+
+def simple_statements(function: ast.stmt) -> list[ast.stmt]:
+    """The statements without a block of their own."""
+    return [node for node in ast.walk(function) if isinstance(node, ast.stmt) and not hasattr(node, "body")]
 
 
 def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
@@ -460,6 +479,9 @@ def calls(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
             return ast.copy_location(ast.Call(n.func, args, n.keywords), n)
 
         yield Recipe("order", f"arguments {i} {j}", 1, make, (node.args[i], node.args[j]))
+    for i in range(len(node.args) if len(node.args) > 1 else 0):
+        fewer = lambda n, i=i: ast.copy_location(ast.Call(n.func, n.args[:i] + n.args[i + 1 :], n.keywords), n)  # noqa: E731
+        yield Recipe("too much", f"without argument {i}", 1, fewer, (node.args[i],))
     method = isinstance(node.func, ast.Attribute) and not is_module(node.func.value, scope)
     if method:
         yield Recipe("call too many", "method", 1, lambda n: n.func.value)

@@ -285,7 +285,7 @@ def only_at_a_place(view: View) -> str:
     wrong = view.wrong()
     for name, masks in places(view):
         inside = all(not (w & ~m).any() for w, m in zip(wrong, masks, strict=True))
-        others = any((~m).any() for w, m in zip(wrong, masks, strict=True) if w.any())
+        others = all((~m).any() for w, m in zip(wrong, masks, strict=True) if w.any())
         if inside and others:
             return f"It is wrong only {name}; all else is right."
     return ""

@@ -122,7 +122,7 @@ def repairs(
 def found_in(mutant: Mutant, cases, fresh, right) -> list[Finding]:
     """Try the mutations of all functions, the smallest first, until those of the next cost are much larger."""
     tried = [(k, statement, m) for k, statement in mutant.functions() for m in mutations(statement)]
-    tried.sort(key=lambda entry: entry[2].cost)
+    tried.sort(key=lambda entry: (entry[2].cost, REPAIRS.index(entry[2].kind)))
     cases = sorted(cases, key=lambda case: (passes(mutant, case, right), weight(case[0])))
     more: list = []
     found: dict[Finding, tuple] = {}  # with what decides which one is told first

@@ -14,10 +14,16 @@ def shown_case(question: Question, case: Case, got: object) -> tuple[str, ...]:
     lines = [call(question, case.args)]
     if isinstance(got, Problem):
         return tuple(lines)
-    returned, expected = written(got), written(case.expected)
+    digits = enough_digits(got, case.expected)
+    returned, expected = written(got, digits), written(case.expected, digits)
     if len(returned) <= LONGEST and len(expected) <= LONGEST and "..." not in returned + expected:
         return (*lines, f"returns   {returned}", f"expected  {expected}")
     return (*lines, *first_difference(question, case.expected, got))
+
+
+def enough_digits(got: object, expected: object) -> int:
+    """As many digits as show a difference."""
+    return next((n for n in (5, 7, 9, 12) if written(got, n) != written(expected, n)), 5)
 
 
 def call(question: Question, args: tuple) -> str:
@@ -48,23 +54,23 @@ def size(value: object) -> str:
         return f"{value.shape} {value.dtype} from {number(np.nanmin(value))} to {number(np.nanmax(value))}"
 
 
-def written(value: object) -> str:
-    """A number, array or tuple in one line; "..." for what is too large.
+def written(value: object, digits: int = 5) -> str:
+    """A number, array or tuple in one line; "..." for what is too large. digits: of each number.
 
     >>> written((np.array([[1.0, 0.5], [-0.0, np.nan]]), True))
     '([[1, 0.5], [0, nan]], True)'
     """
     if isinstance(value, tuple | list):
-        return "(" + ", ".join(written(part) for part in value) + ")"
+        return "(" + ", ".join(written(part, digits) for part in value) + ")"
     if isinstance(value, np.ndarray) and value.ndim:
-        return "[" + ", ".join(written(part) for part in value) + "]" if value.size <= MOST_NUMBERS else "..."
-    return number(value)
+        return "[" + ", ".join(written(part, digits) for part in value) + "]" if value.size <= MOST_NUMBERS else "..."
+    return number(value, digits)
 
 
-def number(value: object) -> str:
-    """A number in five digits."""
+def number(value: object, digits: int = 5) -> str:
+    """A number in so many digits."""
     if isinstance(value, float | np.floating) or (isinstance(value, np.ndarray) and value.dtype.kind == "f"):
-        return f"{float(value) + 0.0:.5g}"  # + 0.0: -0 is 0
+        return f"{float(value) + 0.0:.{digits}g}"  # + 0.0: -0 is 0
     return str(value)
 
 
@@ -86,7 +92,9 @@ def first_difference(question: Question, expected: object, got: object) -> list[
             )
         if wrong.any():
             at = tuple(int(i) for i in np.argwhere(wrong)[0])
-            came, right = number(np.atleast_1d(g)[at]), number(np.atleast_1d(e)[at])
+            came, right = np.atleast_1d(g)[at], np.atleast_1d(e)[at]
+            digits = enough_digits(came, right)
+            came, right = number(came, digits), number(right, digits)
             place = f"at {list(at)} " if e.ndim else ""
             return [
                 f"{name} is {came} {place}where {right} is expected; {np.count_nonzero(wrong)} of {wrong.size} differ"

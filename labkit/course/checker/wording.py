@@ -15,24 +15,26 @@ SAYS = {
     "no number": "The marked part has no result (0 / 0, for example). In which case is that, and what is right then?",
     "wraps": "The marked part is computed in bytes or other small integers. Behind their largest number they begin "
     "again. Which type is wide enough?",
-    "writes": "This line changes an argument. Whoever calls the function still needs the old values: work on a copy.",
+    "writes": "This line changes an argument, perhaps through another name for it or for a part of it. Whoever calls "
+    "the function still needs the old values: work on a copy.",
     # Repairs: with the marked part written otherwise, every case is right.
-    "comparison": "Only this comparison is wrong. What should it give below the limit, on it and above it?",
-    "operator": "Only this operator is wrong. Which one belongs there?",
-    "axis": "Only the axis is wrong. Along which axis do those numbers stand that belong together?",
+    "comparison": "Another comparison belongs at the marked place{s}. What should come out on the limit itself?",
+    "operator": "Another operator belongs at the marked place{s}. Which one?",
+    "axis": "Another axis belongs at the marked place{s}. Along which one do the numbers belong together?",
     "keepdims": "The numbers are right, the axes are not: should the summed axis stay, with length 1?",
-    "name": "Only this name is wrong: another variable of yours belongs here. Which one?",
-    "sign": "Only the sign is wrong here.",
-    "not": "This picks the others: it should be true exactly where it is false.",
-    "order": "The marked parts are right, only their order is not. Which one comes first?",
+    "name": "Another of your variables belongs at the marked place{s}. Which one?",
+    "sign": "The sign is wrong at the marked place{s}: is there a minus too many, or one too few?",
+    "absolute": "The sign of the marked part should not count. What makes it positive?",
+    "not": "The marked condition is true where it should be false, and false where it should be true.",
+    "order": "Something stands in the wrong order at the marked place{s}. What comes first there?",
     "brackets": "Brackets are missing here, or they stand elsewhere. What has to be computed first?",
-    "constant": "Only this number is wrong. Which number belongs there?",
-    "slice": "Only this slice is wrong: where does it begin, where does it end, and which way does it go?",
-    "type": "Only this type is wrong. Which numbers must it be able to hold?",
-    "option": "Only this option is wrong. What does it do, and what does the function do without it?",
-    "function": "Only this function is wrong: a similar one belongs here. What does yours do, and what should it do?",
-    "transpose": "Rows and columns are the wrong way round here. Which shape should the marked part have?",
-    "condition": "This condition is wrong: a part of it is missing, or one part is too much. What must hold here?",
+    "constant": "Another number belongs at the marked place{s}. Which one?",
+    "slice": "Another slice belongs at the marked place{s}. Where does it begin and end, and in which direction?",
+    "type": "Another type belongs at the marked place{s}. Which numbers must it be able to hold?",
+    "option": "The marked option is wrong, or one too many. What does it do, and what happens without it?",
+    "function": "A similar function belongs at the marked place{s}. What does yours do, and what should it do?",
+    "transpose": "Rows and columns are the wrong way round at the marked place{s}.",
+    "condition": "In the marked condition a part is missing, or one part is too much. What must hold there?",
     "branch": "Here the wrong branch runs, in some case or in all. When should it run?",
     "cast": "The values are right, but their type is not. Should they be whole numbers, fractions, or true and false?",
     "index": "This index counts along the wrong axis. Along which axis should it count?",
@@ -42,8 +44,8 @@ SAYS = {
     "moved": "The line is right, but it stands in the wrong block. When should it run: in each turn, or once?",
     "names exchanged": "Two names are exchanged here. Which one belongs where?",
     "copy": "A later line changes this array, although you still need its old values. Where is a copy needed?",
-    "factor": "A constant factor is missing here, or one is too much. Which units meet here?",
-    "power": "A square or a root is missing here. Which unit should the marked part have?",
+    "factor": "The marked part should be larger or smaller by a constant factor. Which one, and why?",
+    "power": "The marked part should be squared, or its root taken. Which one, and why?",
     "logarithm": "A logarithm is missing here. What does the formula take: the number, or its logarithm?",
     "exponential": "An exponential is missing here. What does the formula take: the number, or its logarithm?",
     "off by one": "The marked part is off by one, or by a half. Where do you begin to count?",
@@ -51,7 +53,7 @@ SAYS = {
     "reciprocal": "Numerator and denominator are exchanged here. What is divided by what?",
     "shift": "Something has to be subtracted from the marked part before it is used. What is it?",
     "divided": "The marked part is not yet divided by what it should be. What should its sum or its length be?",
-    "term": "A term or a factor is missing here, and it is made of your own variables. Which one?",
+    "term": "Beside the marked part a term or a factor is missing, made of your own variables. Which one?",
     "new axis": "An axis is missing here. Which shapes meet in this line, and which entries should meet?",
     "sum": "The marked part should become fewer numbers first: a sum, a mean, a largest or a smallest one. Of what?",
     "reversed": "The order is turned round here. Which one comes first?",
@@ -60,8 +62,8 @@ SAYS = {
     "period": "The marked part comes round again, as an angle does. After how much?",
     "index missing": "All entries are used here, but one of them is meant. Which one?",
     "index too many": "One entry is used here, but all are meant.",
-    "call too many": "The marked call is one too many: every case is right without it. What does it do here?",
-    "too much": "The marked part is one too many: every case is right without it. Why did you count it?",
+    "call too many": "The marked call is one too many: every case is right without it. What does it do there?",
+    "too much": "The marked part is one too many: every case is right without it. What is it there for?",
 }
 assert SAYS.keys() == {*WATCHES, *REPAIRS}
 
@@ -86,7 +88,8 @@ def said(finding: Finding) -> str:
     value = ""
     if finding.kind == "overflow" and math.isfinite(finding.value):
         value = f": a number as large as {finding.value:.4g} goes into it"
-    return SAYS[finding.kind].replace("{value}", value)
+    several = "s" if len(finding.spans) > 1 else ""
+    return SAYS[finding.kind].replace("{value}", value).replace("{s}", several)
 
 
 def marked(findings: Sequence[Finding], pieces: Sequence[tuple[str, str]]) -> tuple[Marked, ...]:

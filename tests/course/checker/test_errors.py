@@ -27,7 +27,7 @@ EXCEPTIONS = [
     (lambda: np.zeros(3).reshape(2, 2), "3 numbers do not fill the shape (2,2)"),
     (lambda: 1 if np.zeros(3) > 0 else 2, "np.where"),
     (lambda: np.zeros(3).sum(axis=1), "no axis 1 here"),
-    (lambda: np.zeros(0).max(), "nothing is left"),
+    (lambda: np.zeros(0).max(), "empty array"),
     (lambda: np.array([[1], [1, 2]]), "different lengths"),
     (lambda: 1 / 0, "divide by is 0"),
     (lambda: np.linalg.inv(np.zeros((2, 2))), "no inverse"),

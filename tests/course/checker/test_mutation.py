@@ -20,6 +20,7 @@ MADE = [
     ("keepdims", "def f(a): return a.sum(axis=0)", "a.sum(axis=0, keepdims=True)", ["a.sum(axis=0)"]),
     ("name", "def f(a, b): return a", "return b", ["a"]),
     ("sign", "def f(a): return -a", "return a", ["-a"]),
+    ("absolute", "def f(a): return a", "return np.abs(a)", ["a"]),
     ("not", "def f(a): return a > 0", "~(a > 0)", ["a > 0"]),
     ("order", "def f(a, b): return np.arctan2(a, b)", "np.arctan2(b, a)", ["a", "b"]),
     ("order", "def f(a, b): return a[0, 1]", "a[1, 0]", ["0", "1"]),

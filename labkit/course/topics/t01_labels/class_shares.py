@@ -43,6 +43,11 @@ def of_all_pixels(y, C):
     return counts(y, C) / y.size
 
 
+@wrong(QUESTION, "Pixels of 255 are counted as class 0: nobody has judged them, so they belong to no class.")
+def unjudged_is_background(y, C):
+    return np.bincount(np.where(y == 255, 0, y).ravel(), minlength=C) / y.size
+
+
 @wrong(QUESTION, "Background (class 0) is a class like the others here.")
 def without_background(y, C):
     n = counts(y, C)

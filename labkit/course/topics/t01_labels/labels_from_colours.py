@@ -41,6 +41,7 @@ QUESTION = Question(
     reference=labels_from_colours,
     inputs=_picture,
     by_hand=(
+        (np.array([[[15, 0, 7], [0, 9, 0]]], np.uint8), np.array([[0, 9, 0], [1, 1, 1]], np.uint8)),  # equally bright
         (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
         (_NEARLY, _PALETTE),
     ),

@@ -123,7 +123,10 @@ def grad_of_a_softmax_over_everything(z, y):
     return (e / e.sum() - one_hot(z, y)) * (y != 255)[..., None]
 
 
-@wrong(QUESTION, "p (1 - p) is the slope of a sigmoid: does it still stand there after the logarithm's slope, 1 / p?")
+@wrong(
+    QUESTION,
+    "In the lesson a factor p cancels with the 1 / p of the logarithm. Which factor of yours should have cancelled?",
+)
 def grad_times_the_slope_of_a_sigmoid(z, y):
     p = softmax(z)
     return cross_entropy_grad(z, y) * p * (1.0 - p)

@@ -42,7 +42,10 @@ def softmax_that_overflows(z):
     return np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Take each pixel's own largest logit: beside the image's, a dark pixel's exponentials all round to 0.")
+@wrong(
+    QUESTION,
+    "You take off the largest logit of the whole image. What is left of a pixel whose logits are all much smaller?",
+)
 def softmax_of_global_maximum(z):
     e = np.exp(z - z.max())
     return e / e.sum(axis=-1, keepdims=True)

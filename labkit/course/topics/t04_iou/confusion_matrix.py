@@ -35,6 +35,7 @@ QUESTION = Question(
         (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),
         (np.zeros((250, 280), np.uint8), np.ones((250, 280), np.uint8), 2, 255),  # more than two bytes can count
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
+        (np.array([[254]], np.uint8), np.array([[253]], np.uint8), 255, 255),
     ),
     random_cases=10,
     rtol=0.0,

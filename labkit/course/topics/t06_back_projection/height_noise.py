@@ -53,6 +53,13 @@ def stds_added(*arguments):
     return np.sum(np.abs(shares(*arguments)))
 
 
+@wrong(QUESTION, "fx and fy are two numbers: which one belongs to v?")
+def one_focal_length(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    same = K.copy()
+    same[1, 1] = K[0, 0]
+    return height_noise(u, v, d, same, T_base_cam, sigma_pixel, sigma_depth)
+
+
 @wrong(QUESTION, "Two errors of independent signs do not cancel: square before you add.")
 def signed_stds_added(*arguments):
     return np.abs(np.sum(shares(*arguments)))

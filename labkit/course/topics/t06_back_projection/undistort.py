@@ -90,6 +90,18 @@ def radius_as_seen(pixels, K, k):
     return c + f * seen / (1.0 + k[0] * r2 + k[1] * r2**2)
 
 
+@wrong(
+    QUESTION, "Each round divides the last guess again, so that the factors pile up. Which numbers are to be divided?"
+)
+def guess_divided_again(pixels, K, k):
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    guess = (pixels - c) / f
+    for _ in range(10):
+        r2 = (guess**2).sum(axis=1, keepdims=True)
+        guess = guess / (1.0 + k[0] * r2 + k[1] * r2**2)
+    return c + f * guess
+
+
 @wrong(QUESTION, "r is a radius without a unit, at depth 1: where do you go from pixels to x and y, and back?")
 def normalised(pixels, K, k):
     return (undistort(pixels, K, k) - K[:2, 2]) / np.diagonal(K)[:2]
