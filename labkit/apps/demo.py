@@ -23,7 +23,7 @@ from labkit.sim.world import TIME_STEP, World
 from labkit.views import fingers
 
 FILM_SIZE = (480, 360)
-FILM_RATE = 12  # pictures a second, of simulated time
+FILM_RATE = 10  # pictures a second, of simulated time
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool |
     def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
         record.steps += 1
         if record.steps % every == 0:
-            film.append(world.render(FILM_SIZE, camera).rgb)
+            film.append(world.render(FILM_SIZE, camera, shadow=False).rgb)
 
     record.steps = -1
     with timed(seconds, "scene"):
