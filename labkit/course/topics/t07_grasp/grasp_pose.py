@@ -134,6 +134,11 @@ def position_of_the_inverse(position, approach, closing):
     return T
 
 
+@wrong(QUESTION, "That is the base in the grasp frame, the inverse: where does T_base_grasp take (0, 0, 0)?")
+def inverse_of_the_pose(position, approach, closing):
+    return np.linalg.inv(grasp_pose(position, approach, closing))
+
+
 @wrong(QUESTION, "T times (0, 0, 0, 1) is the grasp's origin: does it pick a row of T, or a column?")
 def position_in_the_last_row(position, approach, closing):
     T = grasp_pose(position, approach, closing)

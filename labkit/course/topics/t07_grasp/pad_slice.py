@@ -16,6 +16,8 @@ def pad_slice(P, T_base_grasp, half):
 
 
 def _cloud_and_grasp(rng):
+    if rng.random() < 0.3:  # multiples of an eighth, so that points lie on the pads' edges
+        return rng.integers(-3, 4, (12, 3)) / 8.0 + FACING_X[:3, 3], FACING_X.copy(), float(rng.choice([0.125, 0.25]))
     P, T = cloud(rng), leaning_grasp(rng)
     P -= P.mean(axis=0)  # near the base's origin: whoever forgets the grasp's place still meets some points
     T[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3)
@@ -148,3 +150,27 @@ def twice_the_larger_side(P, T_base_grasp, half):
 def cut_along_y(P, T_base_grasp, half):
     _, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[np.abs(y) <= half])
+
+
+@wrong(QUESTION, "The points are in the base frame: which transform takes base coordinates to the grasp frame?")
+def transform_not_inverted(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3].T + T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong(QUESTION, "You turn the points: where is the origin of the grasp frame, and where is it for you?")
+def position_not_taken_off(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong(QUESTION, "A point at the very edge of a pad is touched, too: is x < half true of it?")
+def edges_left_out(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[np.abs(x) < half])
+
+
+@wrong(QUESTION, "x has two signs: what does x <= half say of a point far away on the negative side?")
+def one_edge_alone(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[x <= half])

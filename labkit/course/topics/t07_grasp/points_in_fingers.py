@@ -153,3 +153,24 @@ def the_points(P, T_base_grasp, width, half, thickness, tips):
 @wrong(QUESTION, "thickness counts from the pad outwards: from where does |y| count?")
 def thickness_from_the_middle(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness - width / 2, tips)
+
+
+@wrong(QUESTION, "The borders belong to the boxes: what lies on one counts, with <= and >=.")
+def pads_and_outer_sides_left_out(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out = np.abs(y) - width / 2
+    return int(((np.abs(x) <= half) & (out > 0.0) & (out < thickness) & (z <= tips)).sum())
+
+
+for _first in (1.0, -1.0):
+
+    def or_after_and(P, T_base_grasp, width, half, thickness, tips, first=_first):
+        x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+        out, near = first * y - width / 2, (np.abs(x) <= half) & (z <= tips)
+        other = -first * y - width / 2
+        return int((((out >= 0.0) & (out <= thickness)) | ((other >= 0.0) & (other <= thickness) & near)).sum())
+
+    or_after_and.__name__ += "_left" if _first > 0 else "_right"
+    wrong(QUESTION, "Python reads & before |, as it reads * before +: which finger do x and z cut in yours?")(
+        or_after_and
+    )

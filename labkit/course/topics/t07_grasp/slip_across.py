@@ -92,3 +92,9 @@ def left_of_the_way_seen_from_above(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3])
     pushed = np.abs(off @ T_base_grasp[:3, 1])
     return pushed, np.sqrt(np.maximum(off[0] ** 2 + off[1] ** 2 - pushed**2, 0.0))
+
+
+@wrong(QUESTION, "A slip is a distance: what do yours say if the middle lies on the other side of the hand?")
+def with_signs(T_base_grasp, middle):
+    off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
+    return off[1], off[0]

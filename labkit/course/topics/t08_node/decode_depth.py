@@ -72,6 +72,18 @@ def padding_as_pixels(data, height, width, step, is_bigendian):
     return metres(units(pixels, height, width, 2 * width, ">" if is_bigendian else "<"))
 
 
+@wrong(QUESTION, "A row takes step bytes, and its pixels 2 width of them: what do you do with the rest?")
+def padding_as_pixels_of_all_bytes(data, height, width, step, is_bigendian):
+    numbers = np.frombuffer(bytes(data), ">u2" if is_bigendian else "<u2")  # raises if their count is odd
+    return metres(numbers[: height * width].reshape(height, width))
+
+
+@wrong(QUESTION, "65535 has become -1: the numbers have no sign. Which type is that?")
+def signed_distances(data, height, width, step, is_bigendian):
+    numbers = units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16)
+    return np.where(numbers == 0, np.nan, numbers / 1000)
+
+
 @wrong(QUESTION, "What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")
 def signed_numbers(data, height, width, step, is_bigendian):
     return metres(units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16))

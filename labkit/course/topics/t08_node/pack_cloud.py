@@ -89,6 +89,17 @@ def axis_after_axis(P):
     return np.frombuffer(numbers.T.astype("<f4").tobytes(), np.uint8)
 
 
+@wrong(QUESTION, "The bytes of one point stand together: x, y, z, then the next point.")
+def axis_after_axis_and_zeros_with_signs(P):
+    x, y, z = finite(P).T
+    return np.frombuffer(np.array([x, y, z, 0.0 * x], "<f4").tobytes(), np.uint8)
+
+
+@wrong(QUESTION, "Each point has its own four bytes of 0: what stands at bytes 12 to 15 of yours?")
+def padding_after_the_last_point(P):
+    return np.append(packed(finite(P), padding=0), np.zeros(4 * len(finite(P)), np.uint8))
+
+
 @wrong(QUESTION, "The field x has offset 0: a point begins with its x.")
 def padding_first(P):
     return np.roll(packed(finite(P)), 4, axis=1).ravel()

@@ -98,7 +98,7 @@ def one_partner_for_two(a, b, slop):
 
 @wrong(
     QUESTION,
-    "A stamp of a takes a partner to which a later stamp of a is nearer: which one is the nearest of the partner?",
+    "The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?",
 )
 def first_come_first_served(a, b, slop):
     j, free = np.full(len(a), -1), np.ones(len(b), bool)

@@ -28,13 +28,14 @@ def turned(axis, angle):
 def _stream(rng):
     """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way.
 
-    In some streams the turns beside t are equal, and of length 1 but for rounding; some times are before or after all.
+    In some streams they are nanoseconds apart. In some the turns beside t are equal, and of length 1 but for rounding;
+    some times are before or after all.
     """
-    stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20_000_000, 80_000_000, 5))
+    stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20, 80, 5)) * rng.choice([1, 1_000_000])
     quaternions = rng.normal(size=(5, 4))
     quaternions = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     i = int(rng.integers(4))
-    t = stamps[i] + rng.uniform(0.1, 0.4) * (stamps[i + 1] - stamps[i])
+    t = stamps[i] + int(rng.uniform(0.1, 0.4) * (stamps[i + 1] - stamps[i]))
     kind = rng.random()
     if kind < 0.3:
         quaternions[i : i + 2] = quaternions[i] * (1 + 4e-16), quaternions[i] * rng.choice([-1, 1]) * (1 + 4e-16)
@@ -73,6 +74,7 @@ QUESTION = Question(
         (_STAMPS, _PLACES, _TURNS, -1),
         (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
         (_STAMPS, _PLACES, _HARDLY, 50),  # a small turn, but not none
+        (_STAMPS + 1_700_000_000_000_000_000, _PLACES, _TURNS, 1_700_000_000_000_000_010),  # one float64 holds both
     ),
     random_cases=16,
     atol=1e-5,
@@ -189,6 +191,20 @@ def gone_on_beyond_the_ends(stamps, positions, quaternions, t):
     return (1 - share) * positions[i] + share * positions[i + 1], slerp(a, b if a @ b >= 0 else -b, share)
 
 
+@wrong(QUESTION, "At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
+def share_of_the_whole_recording(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)[0], (t - stamps[0]) / (stamps[-1] - stamps[0])
+    a, b = quaternions[i], quaternions[i + 1]
+    turn = slerp(a, b if a @ b >= 0 else -b, share)
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
+
+
+@wrong(QUESTION, "A stamp has 19 digits and a float64 keeps 16: what do you do to stamps before you subtract?")
+def stamps_in_seconds(stamps, positions, quaternions, t):
+    with np.errstate(invalid="ignore"):
+        return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
+
+
 def with_turn(hint, name, turn):
     """Enter answers whose places are right: turn(a, b, share), at a stamp from the pose before it, and from its own."""
     for side in ("left", "right"):
@@ -205,7 +221,7 @@ def with_turn(hint, name, turn):
 def arc(a, b, first, second, divided=True, nearer=lambda a, b: b if a @ b >= 0 else -b):
     """first(omega) a + second(omega) b for the nearer one of b and -b; a, if both are one turn."""
     b = nearer(a, b)
-    omega = np.arccos(min(a @ b, 1.0))
+    omega = np.arccos(np.clip(a @ b, -1.0, 1.0))
     if np.sin(omega) < 1e-12:
         return a
     return (first(omega) * a + second(omega) * b) / (np.sin(omega) if divided else 1.0)
@@ -234,4 +250,11 @@ with_turn(
     lambda a, b, s: arc(
         *(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o)), nearer=lambda a, b: b if b[3] >= 0 else -b
     ),
+)
+
+
+with_turn(
+    "A small turn has become a large one the other way round: which of b and -b is nearer to a?",
+    "the_long_way_round",
+    lambda a, b, s: arc(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o), nearer=lambda a, b: b),
 )

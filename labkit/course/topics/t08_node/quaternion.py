@@ -177,3 +177,16 @@ def axis_of_any_sign(R):
     n = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
     angle = np.arccos(np.clip((np.trace(R) - 1.0) / 2.0, -1.0, 1.0))
     return np.append(n * np.sin(angle / 2.0), np.cos(angle / 2.0))
+
+
+for _least in (1e-12, 1e-14, 1e-16):
+
+    def unit_with_a_floor_under_w(R, least=_least):
+        q = from_trace(R, least)
+        return q / np.linalg.norm(q)
+
+    unit_with_a_floor_under_w.__name__ += f"_{_least:.0e}"
+    wrong(
+        QUESTION,
+        "After half a turn 1 + trace is 0, and your smallest number stands for it: is w the largest of the four then?",
+    )(unit_with_a_floor_under_w)

@@ -50,6 +50,12 @@ QUESTION = Question(
         (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
         (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
         (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
+        (
+            _LINE - _LINE[0],
+            np.zeros(3),
+            np.diag([1.0, 4.0, 1.0]),
+            np.array([False, True, True]),
+        ),  # a forbidden one at the mean
     ),
     random_cases=24,
     rtol=0.0,
@@ -147,3 +153,23 @@ def others_at_1000(features, mean, covariance, allowed):
     off = features - mean
     squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)
     return int(np.where(allowed, squared, 1000.0).argmin()) + 1 if allowed.any() else 0
+
+
+@wrong(QUESTION, "A spread of 0.1 should count for more than one of 10: do you multiply by the covariance, or divide?")
+def covariance_without_its_inverse(features, mean, covariance, allowed):
+    return chosen(((features - mean) @ covariance * (features - mean)).sum(axis=1), allowed)
+
+
+@wrong(QUESTION, "What is the covariance for? Area and hue have units of their own, and your distance adds them up.")
+def euclidean(features, mean, covariance, allowed):
+    return chosen(((features - mean) ** 2).sum(axis=1), allowed)
+
+
+@wrong(QUESTION, "A forbidden piece has distance 0 in yours, and wins: which distance never wins?")
+def forbidden_ones_at_the_mean(features, mean, covariance, allowed):
+    return 1 + int((distances(features, mean, covariance) * allowed).argmin()) if allowed.any() else 0
+
+
+@wrong(QUESTION, "Yours is the allowed piece farthest from the mean: do you want argmax?")
+def farthest(features, mean, covariance, allowed):
+    return chosen(-distances(features, mean, covariance), allowed)

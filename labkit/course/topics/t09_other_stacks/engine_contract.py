@@ -155,3 +155,15 @@ def nan_for_the_worst(reference, other, tolerance):
     kept = np.abs(reference - other).max() <= tolerance
     labels = np.where(np.isnan(other), -np.inf, other).argmax(axis=0)
     return kept, np.mean(reference.argmax(axis=0) != labels), at_risk(reference, 2 * tolerance)
+
+
+@wrong(QUESTION, "NaN is neither above nor below: is a comparison with it true the way you ask?")
+def kept_unless_above_and_nan_for_the_best(reference, other, tolerance):
+    broken = np.abs(reference - other) > tolerance
+    return not broken.any(), *nan_for_the_best(reference, other, tolerance)[1:]
+
+
+@wrong(QUESTION, "The logits are (C, H, W), and argmax and the sort are over a pixel's classes: which axis is that?")
+def classes_on_the_last_axis(reference, other, tolerance):
+    last = sorted_along_a_row(reference, other, tolerance)[2]
+    return *labels_along_rows(reference, other, tolerance)[:2], last

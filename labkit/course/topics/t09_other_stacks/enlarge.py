@@ -132,3 +132,8 @@ def resize_rows_as_columns(labels, size):
     (W, H), (h, w) = size, labels.shape
     rows, columns = ((2 * np.arange(n) + 1) * w // (2 * W) for n in (H, W))
     return labels[np.minimum(rows, h - 1)[:, None], columns]
+
+
+@wrong(QUESTION, "From 2 rows to 4, a new row takes half an old one: which of h and H multiplies, and which divides?")
+def resize_by_the_factor_upside_down(labels, size):
+    return copied(labels, size[::-1], lambda i, n, old: np.minimum((2 * i + 1) * n // (2 * old), old - 1))

@@ -99,6 +99,12 @@ def room_all_round(bgr, multiple):
     return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
 
 
+@wrong(QUESTION, "The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+def room_above_and_left(bgr, multiple):
+    room = [(-n % multiple, 0) for n in bgr.shape[:2]]
+    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+
+
 @wrong(QUESTION, "What is left over was cut off: the network should see all of the image.")
 def cut_to_a_multiple(bgr, multiple):
     H, W = (n // multiple * multiple for n in bgr.shape[:2])

@@ -113,3 +113,9 @@ def measured_by_medians(pieces):
 @wrong(QUESTION, "np.nonzero goes row by row: is the pixel that it finds first also the leftmost?")
 def measured_from_first_to_last(pieces):
     return measured(pieces, box=lambda vu: (*vu[0, ::-1], *vu[-1, ::-1]))
+
+
+@wrong(QUESTION, "A centroid is the mean over the pixels of the piece: how many are they? You divide by W and H.")
+def measured_by_the_sides_of_the_image(pieces):
+    H, W = pieces.shape
+    return measured(pieces, centroid=lambda vu: vu.sum(axis=0)[::-1] / (W, H))
