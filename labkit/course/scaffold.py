@@ -1,162 +1,42 @@
 """A new question, or a new lab, begun: all files that it needs, which work, with a TODO wherever an author must write.
 
 What is written asks for the sum of each row, so that it can be checked, released and graded before anything is changed
-in it. `left_to_do` finds what is not changed yet, and `make test` fails once for each.
+in it. `make test` fails once for each TODO that is left.
 """
 
 import io
-import json
 import keyword
 import re
 import tokenize
 from pathlib import Path
 
-from nbformat import NotebookNode
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbformat import NotebookNode, reads
+from nbformat.v4 import new_code_cell
 
 from labkit.course.release import read, tidy, to_bytes
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
 
-# ------------------------------------------------------------------------------------------ what is written
-
-QUESTION = '''"""TOPIC.NAME: the question, and wrong answers with the hints that they earn."""
-
-import numpy as np
-
-from labkit.course.checker.question import Question, wrong
-
-
-def NAME(values):
-    """Sum each row."""  # TODO the right answer, short and complete in itself
-    return values.sum(axis=1)
-
-
-def inputs(rng):
-    """Draw the argument of one case."""  # TODO asymmetric arguments, so that exchanged axes, rows and units show
-    rows = int(rng.integers(2, 6))
-    return (rng.integers(-9, 10, (rows, rows + 2)),)
-
-
-QUESTION = Question(
-    name="TOPIC.NAME",
-    reference=NAME,
-    inputs=inputs,
-    points=POINTS,
-    by_hand=(  # TODO cases that can be done by hand, each with something that goes wrong in it
-        (np.array([[1, 2, 3], [4, 5, 7]]),),
-        (np.array([[5, 0, 0, -2]]),),
-    ),
-)
-
-
-@wrong(QUESTION, "Which axis is left, rows or columns, after yours has been summed away?")
-def columns_for_rows(values):  # TODO a mistake that students make; its hint asks or points, and never holds the answer
-    return values.sum(axis=0)
-
-
-@wrong(QUESTION, "A row of two equal numbers shows it: is a sum as large as one of them?")
-def means_for_sums(values):  # TODO another mistake
-    return values.mean(axis=1)
-'''
-
+TEMPLATES = Path(__file__).parent / "templates"
 NO_ALTERNATIVES = '''"""Right answers to the questions of TOPIC, written in other ways than the references."""
 
 import numpy as np
 '''
-
-ALTERNATIVES = """
-
-def NAME__loops(values):  # TODO a right answer as a student writes it
-    return np.array([sum(row) for row in values])
-
-
-def NAME__einsum(values):  # TODO another one, by other means
-    return np.einsum("ij->i", values)
-
-
-def NAME__torch(values):  # TODO a third one
-    import torch
-
-    return torch.as_tensor(values).sum(1).numpy()
-"""
-
-TASK = """## Task NUMBER: TODO title (10 minutes)
-
-TODO what the robot needs it for, what is given, and an example that can be done by hand."""
-
-ANSWER = '''def NAME(values):
-    """TODO say what it returns, to somebody who reads nothing else of the lab.
-
-    values: integers (H, W). TODO each argument with its shape and units. Returns integers (H,). Do not change values.
-
-    >>> np.asarray(NAME(np.array([[1, 2, 3], [4, 5, 7]]))).tolist()
-    [6, 16]
-    """
-    ### BEGIN SOLUTION
-    # TODO the right answer; half of a lab's points are for steps of no lesson: "# New step: ..." says what is new
-    return values.sum(axis=1)
-    ### END SOLUTION'''
-
-HINTS = """<details><summary>Hint 1</summary>TODO a question that leads to the first step.</details>
-<details><summary>Hint 2</summary>TODO what to look up.</details>
-<details><summary>Hint 3</summary>TODO the way, but not the line.</details>"""
-
 TOPIC = '"""Questions of topic DIGITS: TODO what they are about."""\n'
-
-START = """# Lab DIGITS: TODO title
-
-TODO which question of a robot this lab answers, in three sentences.
-
-| task | you write | minutes |
-|---|---|---|
-| | a written question | 15 |
-
-15 minutes in all. Each blank has a check below it that says at once whether it is right. If yours is not ready, the lab
-goes on with the kit's own function, so that no task blocks the next."""
-
-IMPORTS = """import matplotlib.pyplot as plt
-
-import data_gen
-from labkit import check
-from labkit.course.plots import panels, style
-from labkit.labels import overlay
-
-style()"""
-
-DATA = """## The data
-
-TODO what the data are, and what to notice in the picture. About 5 seconds."""
-
-PICTURE = """frame = data_gen.render(data_gen.sample_scene(1, "test"), (320, 240))
-panels({"the camera's image": frame.rgb, "its true labels": overlay(frame.rgb, frame.labels)})
-plt.show()"""
-
-WRITTEN = """## Written question (15 minutes)
-
-TODO a derivation or an interpretation, in numbered parts."""
-
-MODEL_ANSWER = """TODO the model answer, part by part, in 500 characters or more.
-
-**Rubric (2 points).**
-
-- 1 point: TODO
-- 1 point: TODO"""
-
-END = """## Before you hand in
-
-Save the notebook (Ctrl+S), then run the last cell. It checks the saved file as the grader will: each answer in \
-a fresh process, with what it needs of your other cells and nothing else. What is ticked here is right there."""
-
 ROW = "| DIGITS WORDS | | [lab](labs/TOPIC/TOPIC.ipynb) | TODO where in the kit, and a lesson if there is one |\n"
 
 
-def filled(template: str, topic: str, name: str = "", number: int = 0, points: int = 0) -> str:
-    """Put names and numbers into a template."""
+def template(name: str) -> str:
+    """The text of a file of TEMPLATES."""
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def filled(text: str, topic: str, name: str = "", number: int = 0, points: int = 0) -> str:
+    """Put names and numbers into the text of a template."""
     digits, _, words = topic.partition("_")
-    values = {"TOPIC": topic, "NAME": name, "DIGITS": digits, "WORDS": words.replace("_", " ")}
+    values = {"TOPIC": topic, "NAME": name, "DIGITS": digits, "WORDS": words.replace("_", " "), "GRADE": words}
     values |= {"NUMBER": str(number), "POINTS": str(points)}
-    return re.sub("|".join(values), lambda found: values[found[0]], template)
+    return re.sub("|".join(values), lambda found: values[found[0]], text)
 
 
 # --------------------------------------------------------------------------------------------- the commands
@@ -188,8 +68,8 @@ def new_question(course: Path, name: str, points: int = 2) -> list[Path]:
     right = answers.read_text(encoding="utf-8") if answers.exists() else filled(NO_ALTERNATIVES, topic)
     add_task(notebook, topic, function, points)
     files = {
-        module: filled(QUESTION, topic, function, points=points).encode(),
-        answers: (right + filled(ALTERNATIVES, topic, function)).encode(),
+        module: filled(template("question.txt"), topic, function, points=points).encode(),
+        answers: (right + filled(template("alternatives.txt"), topic, function)).encode(),
         solution: to_bytes(tidy(notebook)),
     }
     return write_all(files)
@@ -223,67 +103,21 @@ def new_lab(course: Path, topic: str) -> list[Path]:
     last, line_end, rest = rest.partition("\n")
     files = {
         topic_folder(course, topic) / "__init__.py": filled(TOPIC, topic).encode(),
-        solution_of(course, topic): to_bytes(tidy(lab_notebook(topic))),
+        solution_of(course, topic): to_bytes(tidy(notebook_of(filled(template("lab.ipynb"), topic)))),
         readme: (table + link + last + line_end + filled(ROW, topic) + rest).encode(),
     }
     return write_all(files)
 
 
-def left_to_do(course: Path) -> list[str]:
-    """List each TODO of questions, right answers, solutions and README: "FILE:LINE: what", or "FILE, cell ID: what"."""
-    found = []
-    for pattern in ("labkit/course/topics/t*/*.py", "tests/alternatives/t*.py", "README.md"):
-        for path in sorted(course.glob(pattern)):
-            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-                found += [f"{path.relative_to(course)}:{number}: {todo}" for todo in todos(line)]
-    for path in sorted(course.glob("solutions/*/*.ipynb")):
-        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
-            place = f"{path.relative_to(course)}, cell {cell['id']}"
-            found += [f"{place}: {todo}" for line in "".join(cell["source"]).splitlines() for todo in todos(line)]
-    return found
-
-
-def todos(line: str) -> list[str]:
-    """The TODOs of a line.
-
-    >>> todos("values: TODO its shape. Returns TODO its type.")
-    ['TODO its shape. Returns', 'TODO its type.']
-    """
-    return [found.strip(' "|') for found in re.findall(r"\bTODO\b(?:(?!\bTODO\b|<).)*", line)]
-
-
 # ----------------------------------------------------------------------------------------------- notebooks
 
 
-def marked(cell: NotebookNode, grade_id: str, **mark) -> NotebookNode:
-    """Mark a cell as nbgrader does."""
-    cell.metadata["nbgrader"] = {
-        "grade": False,
-        "grade_id": grade_id,
-        "locked": False,
-        "schema_version": 3,
-        "solution": False,
-        "task": False,
-    } | mark
-    return cell
-
-
-def lab_notebook(topic: str) -> NotebookNode:
-    """A solution with data, a written question and no blank."""
-    written = marked(new_markdown_cell(MODEL_ANSWER), f"{topic[3:]}_in_words", grade=True, solution=True, points=2)
-    end = f'from labkit import check_file\n\ncheck_file("{topic}.ipynb")'
-    cells = [
-        new_markdown_cell(filled(START, topic)),
-        marked(new_code_cell("import numpy as np"), "setup", locked=True),
-        new_code_cell(IMPORTS, metadata={"tags": ["nbval-ignore-output"]}),
-        new_markdown_cell(DATA),
-        new_code_cell(PICTURE),
-        new_markdown_cell(WRITTEN),
-        written,
-        new_markdown_cell(END),
-        new_code_cell(end),
-    ]
-    return new_notebook(cells=cells)
+def notebook_of(text: str) -> NotebookNode:
+    """A notebook of a template's text, whose cells have ids of their own."""
+    notebook = reads(text, as_version=4)
+    for cell in notebook.cells:
+        cell.id = new_code_cell().id
+    return notebook
 
 
 def add_task(notebook: NotebookNode, topic: str, function: str, points: int) -> None:
@@ -296,13 +130,9 @@ def add_task(notebook: NotebookNode, topic: str, function: str, points: int) -> 
     number = 1 + max(map(int, numbers), default=0)
     starts = [i for i, text in enumerate(headings) if text.startswith(("## Written question", "## Before you hand in"))]
     place = min(starts, default=len(headings))
-    call = f'{function} = check("{topic}.{function}", {function})'
-    notebook.cells[place:place] = [
-        new_markdown_cell(filled(TASK, topic, function, number)),
-        marked(new_code_cell(filled(ANSWER, topic, function)), function, solution=True),
-        marked(new_code_cell(call), f"check_{function}", grade=True, locked=True, points=points),
-        new_markdown_cell(HINTS),
-    ]
+    task = notebook_of(filled(template("task.ipynb"), topic, function, number)).cells
+    task[2].metadata.nbgrader.points = points
+    notebook.cells[place:place] = task
     row = f"| {number} | `{function}`: TODO in a few words | 10 |\n"
     start = next((i for i, text in enumerate(headings) if "minutes in all" in text), None)
     if start is not None:
