@@ -32,11 +32,15 @@ def options(debug: Annotated[bool, typer.Option("--debug", help="Show the traceb
 
 
 @app.command()
-def doctor() -> None:
+def doctor(
+    warm: Annotated[
+        bool, typer.Option("--warm", help="Compile now what first runs would, beside the code, for all who use it.")
+    ] = False,
+) -> None:
     """Check Python, packages, PyBullet, a render, disk, cores and GPU; exit status 1 if something needed is missing."""
-    from labkit.apps.doctor import all_well, examine, report
+    from labkit.apps.doctor import all_well, examine, report, warm_up
 
-    findings = examine()
+    findings = [warm_up()] if warm else examine()
     typer.echo(report(findings))
     raise typer.Exit(0 if all_well(findings) else 1)
 

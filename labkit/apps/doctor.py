@@ -13,6 +13,7 @@ from packaging.requirements import Requirement
 from labkit.support.packages import read_pins, requirements
 
 ROOT = Path(__file__).resolve().parents[2]  # the checkout, when labkit is installed from one with -e
+PACKAGE = ROOT / "labkit"
 NEEDED_GB = 2.0  # free disk for a data set to train on, checkpoints and pictures
 NEEDED_RENDER_MM = 0.1
 
@@ -172,6 +173,48 @@ def check_sandbox() -> list[Finding]:
         return [Finding("sandbox", NOTE, f"none for `labkit grade`: {missing.cause}", missing.mend)]
     version = ".".join(map(str, bwrap.version_of(path)))
     return [Finding("sandbox", OK, f"bubblewrap {version}, {path}")]
+
+
+def warm_up() -> Finding:
+    """Compile every kernel for what commands and labs pass to it, by a small run of each; say where that is kept."""
+    import numpy as np
+
+    from data_gen import sample_scene
+    from labkit.crf import PottsCRF, dense_crf, solve
+    from labkit.learning.network import load_model, weights_path
+    from labkit.metrics import confusion_matrix
+    from labkit.pipeline import Pipeline
+    from labkit.sim.world import World
+    from labkit.support import compiled
+
+    with World(sample_scene(0, "test")) as world:
+        frame = world.render((160, 120))
+    Pipeline(load_model(weights_path("unet_rgbd"))).run(frame)
+    Pipeline().locate(frame, frame.labels)  # whatever the network saw of so small a picture, here are targets
+    rgb, psi = np.zeros((48, 64, 3), np.uint8), np.full((48, 64, 4), (0.0, 9.0, 9.0, 9.0))
+    psi[20:28, 30:38] = np.random.default_rng(0).random((8, 8, 4))  # the rest is certain, and "persistency" uses both
+    for y in (rgb[..., 0].copy(), np.zeros((48, 64), np.int64)):
+        confusion_matrix(y, y, 4)
+        PottsCRF.from_image(psi, rgb, lam=0.3, sigma_I=50.0).energy(y)
+    for method in ("icm", "mean_field", "expansion", "swap", "trws", "persistency", "min_cut"):
+        classes = 2 if method == "min_cut" else 4
+        solve(PottsCRF.from_image(psi[..., :classes].copy(), rgb, lam=0.3, sigma_I=50.0), method)
+    dense_crf(psi, rgb, iterations=1)
+    return where_kept(compiled.KERNELS)
+
+
+def where_kept(kernels) -> Finding:
+    """Say where kernels are kept that were compiled, and whether all who use this installation find them there."""
+    number = sum(len(kernel.signatures) for kernel in kernels)
+    found = f"{number} compiled, for processors of this kind; kept in"
+    folders = {Path(kernel.stats.cache_path) for kernel in kernels}
+    if all(folder.name == "__pycache__" for folder in folders):
+        return Finding("kernels", OK, f"{found} {PACKAGE}, where all who use this installation find them")
+    place = os.path.commonpath(folders)
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return Finding("kernels", NOTE, f"{found} {place}, as NUMBA_CACHE_DIR says")
+    mend = f"run it as a user who may write to {PACKAGE}, then all others find them"
+    return Finding("kernels", NOTE, f"{found} {place}, for you alone", mend)
 
 
 def report(findings: list[Finding]) -> str:

@@ -1,13 +1,51 @@
-"""How numba compiles the loops in the modules ending in `_kernels`.
+"""How numba compiles the loops in the modules ending in `_kernels`, and where it keeps what it compiled.
 
-A kernel is called from Python; what it is compiled to is kept in a file beside the code. A part is called by kernels
+A kernel is called from Python; what it is compiled to is kept in files beside the code. A part is called by kernels
 and other parts only. It compiles faster, as it needs no entrance from Python and no file; called from Python it would
 run as Python. Arrays are made outside, and loops say what NumPy's functions would: numba takes longer to compile
 `np.full`, `x.min()` or `x[:] = 0` than a loop.
 """
 
-from numba import njit
+import os
+from pathlib import Path
+
+from numba import config, njit
+from numba.core.caching import CacheImpl, UserWideCacheLocator
 from numba.extending import register_jitable
 
-kernel = njit(cache=True, nogil=True)
+from labkit.support.files import write_atomically
+
+KERNELS = []  # all whose modules are loaded
 part = register_jitable
+
+
+def kernel(function):
+    """Compile a function for each kind of arguments when they first come, or load what an earlier process compiled."""
+    KERNELS.append(njit(cache=True, nogil=True)(function))
+    return KERNELS[-1]
+
+
+class CopyOfSharedCache(UserWideCacheLocator):
+    """The user's own cache of a kernel, to which whatever is newer beside the code is copied first.
+
+    Numba reads a cache only in a folder that it may write to. The users of one read-only installation would each
+    compile everything, though `labkit doctor --warm` left all of it beside the code.
+    """
+
+    @classmethod
+    def from_function(cls, py_func, py_file):
+        shared = Path(py_file).parent / "__pycache__"
+        kept = sorted(shared.glob(f"{Path(py_file).stem}.{py_func.__qualname__}-*.nb[ci]"))  # the index comes last
+        if config.CACHE_DIR or not kept or os.access(shared, os.W_OK):
+            return None  # numba's own choices hold
+        own = super().from_function(py_func, py_file)
+        for file in kept if own else ():
+            copy = Path(own.get_cache_path()) / file.name
+            if not copy.exists() or copy.stat().st_mtime < file.stat().st_mtime:
+                write_atomically(copy, file.read_bytes())
+        return own
+
+
+if not config.CACHE_LOCATOR_CLASSES:
+    choices = [CopyOfSharedCache, *CacheImpl._locator_classes]
+    config.CACHE_LOCATOR_CLASSES = ",".join(f"{choice.__module__}.{choice.__name__}" for choice in choices)

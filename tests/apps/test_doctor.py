@@ -1,13 +1,16 @@
 """labkit doctor: what is whole is called whole, and each thing that can be broken is found when it is broken."""
 
+import os
 import shutil
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
 
 from labkit.apps import doctor
 from labkit.apps.doctor import NOTE, OK, WRONG
-from labkit.support import packages
+from labkit.support import compiled, packages
 
 
 def write_package(folder, name: str, version: str, *requires: str):
@@ -133,3 +136,45 @@ def test_one_broken_check_leaves_the_others_standing(monkeypatch):
     assert findings["cores"].found[0].isdigit()
     assert not doctor.all_well(list(findings.values()))
     assert "mend: " in doctor.report(list(findings.values()))
+
+
+# labkit doctor --warm -----------------------------------------------------------------------------------------------
+
+
+def test_warming_up_compiles_every_kernel():
+    doctor.warm_up()
+    assert [kernel.py_func.__name__ for kernel in compiled.KERNELS if not kernel.signatures] == []
+
+
+@pytest.mark.parametrize(
+    ("place", "state", "words"),
+    [
+        (doctor.PACKAGE / "crf" / "__pycache__", OK, "all who use this installation find them"),
+        ("/elsewhere/numba/crf_0123", NOTE, "/elsewhere/numba/crf_0123, for you alone"),
+    ],
+)
+def test_warming_up_says_who_finds_what_it_compiled(place, state, words, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    kernel = SimpleNamespace(signatures=["float64"], stats=SimpleNamespace(cache_path=str(place)))
+    finding = doctor.where_kept([kernel])
+    assert (finding.state, bool(finding.mend)) == (state, state == NOTE) and words in finding.found
+
+
+def test_users_of_a_read_only_installation_load_what_was_compiled_beside_the_code(tmp_path):
+    (tmp_path / "some_kernels.py").write_text(
+        "from labkit.support.compiled import kernel\n\n\n@kernel\ndef twice(x):\n    return 2 * x\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"XDG_CACHE_HOME": str(tmp_path / "own"), "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+
+    def call(before: str, argument: str) -> list[str]:
+        code = f"{before}; from some_kernels import twice; twice({argument}); s = twice.stats"
+        code += "; print(s.cache_path, sum(s.cache_hits.values()), sum(s.cache_misses.values()))"
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert call("pass", "3") == [str(tmp_path / "__pycache__"), "0", "1"]
+    for argument, loaded in (("3", ["1", "0"]), ("0.5", ["0", "1"])):  # another kind of argument is compiled, and kept
+        place, *counts = call("import os; os.access = lambda *_: False", argument)  # as for a user who may only read
+        assert place.startswith(str(tmp_path / "own")) and counts == loaded
+    assert call("import os; os.access = lambda *_: False", "0.5")[1:] == ["1", "0"]
