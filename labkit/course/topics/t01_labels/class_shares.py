@@ -24,7 +24,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[1, 1], [0, 3]], np.uint8), 5),
         (np.array([[1, 255, 255], [1, 1, 0]], np.uint8), 3),
-        (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (25, 4)), 4),  # more pixels of a class than a byte counts
+        (np.tile(np.array([0, 1, 1, 1, 2, 255], np.uint8), (25, 4)), 3),  # more pixels of a class than a byte counts
     ),
     random_cases=6,
     points=1,
@@ -98,3 +98,9 @@ def unjudged_as_the_last_class(y, C):
 @wrong(QUESTION, "np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")
 def unjudged_as_a_class(y, C):
     return np.bincount(y.ravel(), minlength=C) / y.size
+
+
+@wrong(QUESTION, "Between C edges there are C - 1 bins, and the last holds two classes: how many edges do C bins need?")
+def edges_of_one_bin_too_few(y, C):
+    n, _ = np.histogram(y[y != 255], bins=np.arange(C))
+    return np.append(n, 0) / n.sum()

@@ -109,3 +109,8 @@ def first_link_alone(segmentation, class_of_body):
     for body, c in enumerate(class_of_body):
         labels[(segmentation == body) | (segmentation == body + (1 << 24))] = c
     return labels
+
+
+@wrong(QUESTION, "These are body numbers: one more step leads to the class, and class_of_body knows it.")
+def body_in_a_byte_for_class(segmentation, class_of_body):
+    return body_for_class(segmentation, class_of_body).astype(np.uint8)

@@ -47,3 +47,10 @@ def ignored_is_shared_out(y, C):
     Y = (y[..., None] == np.arange(C)).astype(float)
     Y[y == 255] = 1 / C
     return Y
+
+
+@wrong(QUESTION, "The course has four classes, and the function gets C: how many does yours mark?")
+def four_classes(y, C):
+    Y = one_hot(y, C)
+    Y[..., 4:] = 0
+    return Y

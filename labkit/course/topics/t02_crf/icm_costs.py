@@ -112,3 +112,12 @@ def upper_diagonals_exchanged(y, psi, weights, v, u):
     own = pairs_of(weights, v, u)[0]
     owned = pairs_of(weights[[0, 1, 3, 2]], v, u)[1]
     return charged(own + owned, y, psi, v, u)
+
+
+@wrong(QUESTION, "At the border there is no neighbour: which pixel does a row or column that you clip lead to?")
+def clipped_at_the_border(y, psi, weights, v, u):
+    (H, W), both = y.shape, []
+    for w, (down, right) in zip(weights, PAIRS, strict=True):
+        ahead, behind = ((int(np.clip(v + s * down, 0, H - 1)), int(np.clip(u + s * right, 0, W - 1))) for s in (1, -1))
+        both += [(w[v, u], *ahead), (w[behind], *behind)]
+    return charged(both, y, psi, v, u)

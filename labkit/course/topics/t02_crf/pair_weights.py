@@ -223,3 +223,8 @@ def without_diagonals(image, lam, sigma_I, sigma_p):
     w = gaussian(squares(image), lam, sigma_I, sigma_p)
     w[2:] = 0.0
     return w
+
+
+@wrong(QUESTION, "Python reads a / 2 * b as (a / 2) * b: on which side of the fraction line is your sigma?")
+def multiplied_by_sigma(image, lam, sigma_I, sigma_p):
+    return gaussian(squares(image), lam, 1.0 / sigma_I, 1.0 / sigma_p)

@@ -94,3 +94,8 @@ def logarithm_to_base_10(p, floor):
 @wrong(QUESTION, "np.log undoes np.exp: to which base is your logarithm?")
 def logarithm_to_base_2(p, floor):
     return -np.log2(np.maximum(p, floor))
+
+
+@wrong(QUESTION, "The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
+def costs_lifted_and_infinite_ones_replaced(p, floor):
+    return np.where(p > 0.0, costs_lifted(np.where(p > 0.0, p, 1.0), floor), -np.log(floor))

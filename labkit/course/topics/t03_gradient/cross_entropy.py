@@ -136,3 +136,19 @@ def cross_entropy_of_sigmoids(z, y):
 @wrong(QUESTION, "To which base is your logarithm, and to which is that of the loss?")
 def cross_entropy_in_bits(z, y):
     return cross_entropy(z, y) / np.log(2.0)
+
+
+@wrong(QUESTION, "You give the pixels of 255 to class 0: how much should they add to the loss?")
+def cross_entropy_with_ignored_as_class_0(z, y):
+    return cross_entropy(z, np.where(y == 255, 0, y))
+
+
+for _least in (np.finfo(float).tiny, 1e-300, 1e-100, 1e-50):
+
+    def cross_entropy_with_a_floor(z, y, least=_least):
+        return float(-np.log(np.maximum(np.exp(true_log_probabilities(z, y)), least)).sum())
+
+    cross_entropy_with_a_floor.__name__ += f"_of_{_least:.0e}"
+    wrong(QUESTION, "A loss has no upper end. How large is it at most in yours, and can you write log p without p?")(
+        cross_entropy_with_a_floor
+    )

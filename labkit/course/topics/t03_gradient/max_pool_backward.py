@@ -155,3 +155,17 @@ def nearly_the_largest(x, g):
 def largest_by_size(x, g):
     b = np.abs(blocks(x))
     return unblocked((b == b.max(axis=2, keepdims=True)) * g[..., None])
+
+
+@wrong(QUESTION, "Blocks do not overlap: in how many of your windows does a pixel lie?")
+def all_windows_of_stride_1(x, g):
+    out = np.zeros_like(x)
+    for i, j in np.ndindex(x.shape[0] - 1, x.shape[1] - 1):
+        v, u = divmod(int(x[i : i + 2, j : j + 2].argmax()), 2)
+        out[i + v, j + u] += g[i // 2, j // 2]
+    return out
+
+
+@wrong(QUESTION, "argmax counts a block row by row: of its number 1, what is the row, and what is the column?")
+def rows_and_columns_of_the_block_exchanged(x, g):
+    return unblocked(np.eye(4)[[0, 2, 1, 3]][blocks(x).argmax(axis=2)] * g[..., None])

@@ -98,3 +98,9 @@ def sum_of_unshifted_logits(z):
 @wrong(QUESTION, "Those are logarithms of probabilities, all negative: what undoes a logarithm?")
 def log_softmax(z):
     return z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
+
+
+@wrong(QUESTION, "Dividing by the largest logit changes the differences of logits; taking it off does not.")
+def divided_by_the_largest_size(z):
+    largest = np.abs(z).max(axis=-1, keepdims=True)
+    return softmax(z / np.where(largest == 0.0, 1.0, largest))

@@ -130,3 +130,8 @@ def added_in_16_bits(n_frames):
 @wrong(QUESTION, "Means of counts need not be whole: what does the cast to integers do to a class of few pixels?")
 def means_cut_to_whole_numbers(n_frames):
     return np.nanmean(iou_of(n_frames.mean(axis=0).astype(int)))
+
+
+@wrong(QUESTION, "A weight does not make one mean of two quotients: add the frames' counts, and divide once.")
+def mean_of_frames_by_their_pixels(n_frames):
+    return np.average([np.nanmean(iou_of(n)) for n in n_frames], weights=n_frames.sum(axis=(1, 2)))

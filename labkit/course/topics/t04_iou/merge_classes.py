@@ -49,7 +49,7 @@ def written_once(n, group):
     return merged
 
 
-@wrong(QUESTION, "A target called obstacle: if both are 'object' now, is that still a mistake?")
+@wrong(QUESTION, "Two classes have become one: where do the pixels go that were confused between them?")
 def mistakes_within_a_group_dropped(n, group):
     mistake = (group[:, None] == group) & ~np.eye(len(n), dtype=bool)
     return merge_classes(np.where(mistake, 0, n), group)
@@ -84,3 +84,16 @@ def diagonal_alone(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     np.add.at(merged, (group, group), np.diagonal(n))
     return merged
+
+
+@wrong(QUESTION, "The result has a row for each group, yours one for each old class: how many groups are there?")
+def as_large_as_before(n, group):
+    empty = len(n) - (group.max() + 1)
+    return np.pad(merge_classes(n, group), (0, empty))
+
+
+@wrong(QUESTION, "A cell adds up rows and columns: how many columns has the other group, and how many do you take?")
+def first_column_of_other_groups(n, group):
+    first = [np.flatnonzero(group == g)[0] for g in range(group.max() + 1)]
+    own = group[:, None] == group
+    return merge_classes(np.where(own | np.isin(np.arange(len(n)), first), n, 0), group)

@@ -121,6 +121,11 @@ def one_side(y, width):
     return banded(y, width, square(width), np.less) & (y != 255)
 
 
+@wrong(QUESTION, "An edge has two sides: must the number nearby be larger than the pixel's own, or just another?")
+def other_side(y, width):
+    return banded(y, width, square(width), np.greater) & (y != 255)
+
+
 @wrong(QUESTION, "A window of one class is in your band if 255 or your frame is in it, too: which labels are classes?")
 def unjudged_and_frame_are_a_class(y, width):
     framed = np.pad(np.where(y == 255, 9, y), width, constant_values=9)

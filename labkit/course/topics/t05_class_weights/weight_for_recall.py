@@ -69,7 +69,7 @@ def the_threshold(p1, y, recall):
     return 1.0 / (1.0 + weight_for_recall(p1, y, recall))
 
 
-@wrong(QUESTION, "Weighted, class 1 need not reach 1: it competes with 1 - p1.")
+@wrong(QUESTION, "Class 1 is called where w p1 reaches 1 - p1: what must w p1 reach in yours?")
 def against_one(p1, y, recall):
     return 1.0 + weight_for_recall(p1, y, recall)
 
@@ -108,3 +108,15 @@ for _limit in (10.0, 100.0, 1000.0, 10_000.0):
 
     searched_up_to.__name__ += f"_{_limit:.0f}"
     wrong(QUESTION, "For a pixel of p1 = 0.000001 the weight is 999,999: where does your search end?")(searched_up_to)
+
+
+@wrong(QUESTION, "Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
+def as_many_of_all_pixels(p1, y, recall):
+    last = np.sort(p1)[::-1][int(np.ceil(recall * y.sum())) - 1]
+    return float((1.0 - last) / last)
+
+
+@wrong(QUESTION, "You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
+def weight_for_precision(p1, y, recall):
+    odds = np.unique((1.0 - p1) / p1)
+    return float(next(w for w in odds if np.mean(y[w * p1 >= 1.0 - p1]) >= recall))

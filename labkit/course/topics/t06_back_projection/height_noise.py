@@ -118,3 +118,11 @@ def translation_added(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
 @wrong(QUESTION, "That is the noise along the camera's z axis: which row of T makes heights of camera coordinates?")
 def along_the_optical_axis(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return sigma_depth
+
+
+@wrong(QUESTION, "All three errors at once, in one direction, are one draw: what do independent errors do one by one?")
+def all_three_at_once(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
+    def height(u, v, d):
+        return d * (T_base_cam[2, :3] @ np.linalg.inv(K) @ (u, v, 1.0))
+
+    return abs(height(u + sigma_pixel, v + sigma_pixel, d + sigma_depth) - height(u, v, d))

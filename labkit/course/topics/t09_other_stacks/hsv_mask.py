@@ -174,3 +174,10 @@ def all_along_the_rows(hsv, lower, upper):
     if lower[0] > upper[0]:
         inside[..., 0] = above[..., 0] | below[..., 0]
     return inside.all(axis=0)
+
+
+@wrong(QUESTION, "A hue that equals a bound is inside: what does your `not` make of `>=` and `<=` there?")
+def not_between_the_bounds(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    above, below = h >= lower[0], h <= upper[0]
+    return (above & below if lower[0] <= upper[0] else ~((h >= upper[0]) & (h <= lower[0]))) & rest
