@@ -38,9 +38,9 @@ class Question:
     name: "04_iou.iou", the topic and the function's name, which is the grade id of its cell. reference: the right
     answer, short and complete in itself. inputs: function of a numpy Generator to the arguments of one random case,
     asymmetric so that swaps show. by_hand: arguments of cases small enough to do by hand; each is always tried.
-    random_cases: how many cases are drawn. rtol, atol: what counts as equal. same_dtype: whether
-    the dtype is asked for, too. points: what the blank is worth.
-    properties: what the check may say about a wrong output before it compares. misconceptions: filled by `wrong`.
+    random_cases: how many cases are drawn. rtol, atol: which fractions count as equal; integers and truth values are
+    compared exactly. same_dtype: whether the dtype is asked for, too. points: what the blank is worth. properties: what
+    the check may say about a wrong output that nothing else explains. misconceptions: filled by `wrong`.
     canonical: maps an output to the one form of those that are equally right (the sign of an axis, say). forbidden:
     modules that would do the work; they do not exist where answers are graded.
     """

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t01_labels import labels_and_classes
 
 
@@ -28,7 +28,6 @@ QUESTION = Question(
     ),
     random_cases=6,
     points=1,
-    properties=(Property("the shares add up to 1", lambda arguments, shares: np.isclose(np.sum(shares), 1.0)),),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

@@ -45,8 +45,6 @@ QUESTION = Question(
         (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
         (_NEARLY, _PALETTE),
     ),
-    rtol=0.0,
-    atol=0.0,
     points=3,
     properties=(
         Property(

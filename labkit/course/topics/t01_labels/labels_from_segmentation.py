@@ -38,9 +38,6 @@ QUESTION = Question(
         (np.array([[65537, 65538 + (127 << 24)]], np.int32), (np.arange(5, 65545) // 7 % 4).astype(np.uint8)),  # many
         (np.array([[5 << 24, 3 + (12 << 24)]], np.int32), np.array([2, 0, 0, 255], np.uint8)),  # a body not judged
     ),
-    rtol=0.0,
-    atol=0.0,
-    points=2,
     properties=(
         Property(
             "where nothing is seen (-1), the label is 0",

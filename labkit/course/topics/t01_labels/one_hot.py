@@ -17,8 +17,6 @@ QUESTION = Question(
     inputs=labels_and_classes,
     by_hand=((np.array([[0, 2]], np.uint8), 3), (np.array([[1, 255], [0, 3], [2, 2]], np.uint8), 5)),
     random_cases=6,
-    rtol=0.0,
-    atol=0.0,
     points=1,
     properties=(
         Property(

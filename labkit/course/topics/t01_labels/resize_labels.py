@@ -49,8 +49,6 @@ QUESTION = Question(
         (_LARGE, 5, 6),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
     ),
-    rtol=0.0,
-    atol=0.0,
     points=4,
     properties=(
         Property(

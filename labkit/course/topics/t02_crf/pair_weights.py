@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t02_crf import PAIRS
 
 
@@ -37,10 +37,6 @@ QUESTION = Question(
         (np.full((3, 2, 3), 77, np.uint8), 1.5, 8.0, 0.5),
     ),
     points=3,
-    properties=(
-        Property("no weight is negative", lambda given, w: bool(np.min(w) >= 0.0)),
-        Property("no weight is above lam", lambda given, w: bool(np.max(w) <= given[1] + 1e-9)),
-    ),
     forbidden=("labkit",),
 )
 

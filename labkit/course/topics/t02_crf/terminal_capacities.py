@@ -23,7 +23,6 @@ QUESTION = Question(
         (np.array([[[4.0, 1.0], [-1.0, -3.0]]]),),
         (np.array([[[0.5, 0.5]], [[0.0, 2.0]], [[3.0, 1.0]]]),),
     ),
-    points=2,
     properties=(
         Property("no capacity is negative", lambda given, out: bool(np.min(out[0]) >= 0.0 and np.min(out[1]) >= 0.0)),
         Property(

@@ -26,7 +26,6 @@ QUESTION = Question(
     ),
     random_cases=6,
     atol=2e-4,  # logits near 1000 have errors of 3e-5 in single precision
-    points=2,
     properties=(
         Property(
             "the gradient of each pixel sums to 0",

@@ -43,7 +43,6 @@ QUESTION = Question(
         (np.array([[[30_000, 2_000], [0, 500]]] * 3),),  # more pixels than 16 bits count
     ),
     random_cases=6,
-    points=2,
     forbidden=("sklearn", "torchmetrics"),
 )
 

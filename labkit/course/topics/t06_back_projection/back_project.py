@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t06_back_projection import K_of, camera
 
 
@@ -34,14 +34,6 @@ QUESTION = Question(
             np.array([[4.0, 0.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]),
         ),
         (np.array([[1.0, 2.0], [2.0, 4.0]]), np.array([[2.0, 0.0, 1.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]])),  # no holes
-    ),
-    properties=(
-        Property(
-            "the third coordinate, z, is the depth itself, and NaN where there is no reading",
-            lambda arguments, P: np.allclose(
-                P[..., 2], np.where(arguments[0] > 0, arguments[0], np.nan), equal_nan=True
-            ),
-        ),
     ),
 )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t06_back_projection import camera
 
 
@@ -33,9 +33,6 @@ QUESTION = Question(
         (np.array([[200.0, 0.0, 0.0], [0.0, 300.0, 0.0], [0.0, 0.0, 1.0]]), 0, 0, 2.0),  # the first pixel's centre
     ),
     rtol=1e-6,
-    properties=(
-        Property("the last row of K is 0, 0, 1", lambda arguments, K: np.array_equal(np.asarray(K)[2], [0, 0, 1])),
-    ),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

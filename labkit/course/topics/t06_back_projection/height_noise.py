@@ -34,7 +34,6 @@ QUESTION = Question(
         (2.0, 1.0, 0.5, K_SMALL, _LOOKS_LEVEL, 0.5, 0.01),  # a pixel down is 0.125 m: hypot(0.0625, 0.0025)
         (3.0, 2.0, 1.0, K_SMALL, _LOOKS_LEVEL, 0.0, 0.02),  # depth alone, off the axis: 0.5 * 0.02
     ),
-    rtol=1e-4,
     atol=1e-9,
     points=3,
 )

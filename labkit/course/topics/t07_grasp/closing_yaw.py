@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t07_grasp import cloud
 
 
@@ -35,14 +35,6 @@ QUESTION = Question(
     random_cases=10,
     atol=1e-4,
     points=3,
-    properties=(
-        Property(
-            "among all directions of the table's plane the jaws close in the one of least variance",
-            lambda arguments, yaw: (
-                _variance(arguments[0], yaw) <= 1.001 * np.linalg.eigvalsh(arguments[0][:2, :2])[0] + 1e-12
-            ),
-        ),
-    ),
     # An axis has no sign: yaw and yaw + pi are the same grasp, and have the same double angle on the circle.
     canonical=lambda yaw: np.array([np.cos(2.0 * yaw), np.sin(2.0 * yaw)]),
     forbidden=("sklearn", "cv2"),

@@ -41,14 +41,6 @@ QUESTION = Question(
     atol=1e-5,
     points=4,
     properties=(
-        Property("the last row is 0 0 0 1", lambda arguments, T: np.allclose(T[3], (0.0, 0.0, 0.0, 1.0))),
-        Property(
-            "the three axes are at right angles and of length 1",
-            lambda arguments, T: np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=1e-4),
-        ),
-        Property(
-            "the frame is right-handed: its determinant is 1", lambda arguments, T: np.linalg.det(T[:3, :3]) > 0.0
-        ),
         Property(
             "z is the direction of the approach",
             lambda arguments, T: np.allclose(T[:3, 2], arguments[1] / np.linalg.norm(arguments[1]), atol=1e-4),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t07_grasp import FACING_X, cloud, leaning_grasp
 
 
@@ -51,7 +51,6 @@ QUESTION = Question(
     ),
     random_cases=14,
     points=4,
-    properties=(Property("a width is not negative", lambda arguments, out: bool(out[1] >= 0.0)),),
     forbidden=("scipy", "cv2"),
 )
 

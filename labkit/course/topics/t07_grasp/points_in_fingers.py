@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t07_grasp import FACING_X, leaning_grasp
 
 
@@ -49,12 +49,6 @@ QUESTION = Question(
     ),
     random_cases=12,
     points=3,
-    properties=(
-        Property(
-            "there are not more points in the fingers than there are points",
-            lambda arguments, count: 0 <= count <= len(arguments[0]),
-        ),
-    ),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

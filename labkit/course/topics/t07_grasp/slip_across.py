@@ -30,7 +30,6 @@ QUESTION = Question(
     ),
     random_cases=6,
     atol=1e-4,
-    points=2,
     forbidden=("scipy",),
 )
 

@@ -42,10 +42,6 @@ QUESTION = Question(
     points=3,
     properties=(
         Property(
-            "one number for each of height x width pixels",
-            lambda arguments, depth: np.shape(depth) == arguments[1:3],
-        ),
-        Property(
             "no distance is 0, and none is more than 65.535 m",
             lambda arguments, depth: bool(np.all(np.isnan(depth) | ((depth > 0.0) & (depth < 65.536)))),
         ),

@@ -57,21 +57,9 @@ QUESTION = Question(
         (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
     ),
     random_cases=8,
-    rtol=0.0,
-    atol=0.0,
     points=3,
     properties=(
         Property("one answer for each stamp of a", lambda arguments, j: np.shape(j) == np.shape(arguments[0])),
-        Property(
-            "each answer is -1, or the number of a stamp of b (from 0), not a stamp",
-            lambda arguments, j: all(-1 <= k < len(arguments[1]) for k in j),
-        ),
-        Property(
-            "whatever is paired lies within slop",
-            lambda arguments, j: all(
-                k == -1 or abs(int(arguments[0][i]) - int(arguments[1][k])) <= arguments[2] for i, k in enumerate(j)
-            ),
-        ),
     ),
 )
 

@@ -65,7 +65,6 @@ QUESTION = Question(
         (np.eye(3),),
     ),
     random_cases=40,
-    rtol=1e-4,
     atol=1e-5,
     points=3,
     properties=(

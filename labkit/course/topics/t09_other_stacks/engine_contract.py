@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 
 
 def engine_contract(reference, other, tolerance):
@@ -60,12 +60,6 @@ QUESTION = Question(
     ),
     random_cases=24,
     points=3,
-    properties=(
-        Property(
-            "shares lie in 0..1",
-            lambda arguments, out: bool(0.0 <= out[1] <= 1.0 and 0.0 <= out[2] <= 1.0),
-        ),
-    ),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

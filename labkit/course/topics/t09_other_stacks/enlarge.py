@@ -33,9 +33,6 @@ QUESTION = Question(
         (np.array([[300, 2]]), (4, 1)),  # labels need not be bytes
     ),
     random_cases=6,
-    rtol=0.0,
-    atol=0.0,
-    points=2,
     properties=(
         Property(
             "no class appears that was not there",

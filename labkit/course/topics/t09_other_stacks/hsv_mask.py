@@ -63,9 +63,6 @@ QUESTION = Question(
         ),
     ),
     random_cases=24,
-    rtol=0.0,
-    atol=0.0,
-    points=2,
     forbidden=("cv2",),
 )
 

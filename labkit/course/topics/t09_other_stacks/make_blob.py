@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, wrong
 
 
 def make_blob(bgr, multiple):
@@ -37,9 +37,6 @@ QUESTION = Question(
     atol=1e-7,
     points=3,
     same_dtype=True,
-    properties=(
-        Property("values lie in 0..1", lambda arguments, blob: bool(np.min(blob) >= 0.0 and np.max(blob) <= 1.0)),
-    ),
     forbidden=("cv2",),
 )
 
