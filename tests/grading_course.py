@@ -151,7 +151,9 @@ def define(function: Callable, name: str, cell: str, done: dict[int, tuple[str, 
         if isinstance(value, types.FunctionType) and value.__module__.startswith(OURS):
             renamed[used] = define(value, f"{cell}_{used}".replace(".", "_"), cell, done)
         elif not (isinstance(value, types.ModuleType) and value.__name__.startswith(OURS)):
-            lines.append(assignment(used, value))
+            if used in function.__code__.co_freevars:  # another answer of the notebook may have a value of this name
+                renamed[used] = f"{cell}_{used}"
+            lines.append(assignment(renamed.get(used, used), value))
     node = Renamed(renamed).visit(node_of(function))
     if isinstance(node, ast.Lambda):
         source = f"{name} = {ast.unparse(node)}"

@@ -1,7 +1,7 @@
 """What a question is: a reference, its inputs, and the wrong answers that have a hint of their own."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -80,19 +80,32 @@ class Question:
         return inspect.getsource(inspect.unwrap(self.reference))
 
 
-def wrong(question: Question, hint: str) -> Callable[[Callable], Callable]:
+def wrong(question: Question, hint: str, **variants: Sequence) -> Callable[[Callable], Callable]:
     """Decorate a wrong answer to a question: whoever's answer gives its outputs gets the hint.
 
+    variants: values of one more argument of the answer; with each it is a wrong answer of its own.
+
     >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(),))
-    >>> @wrong(double, "Twice, not squared.")
-    ... def squared(x):
-    ...     return x * x
-    >>> double.misconceptions[0].name
-    'squared'
+    >>> @wrong(double, "Twice, not a power.", exponent=(2, 3))
+    ... def power(x, exponent):
+    ...     return x**exponent
+    >>> [misconception.name for misconception in double.misconceptions]
+    ['power exponent 2', 'power exponent 3']
     """
 
     def add(answer: Callable) -> Callable:
-        question.misconceptions.append(Misconception(answer, hint))
+        given = [with_argument(answer, name, value) for name, values in variants.items() for value in values]
+        question.misconceptions.extend(Misconception(variant, hint) for variant in given or [answer])
         return answer
 
     return add
+
+
+def with_argument(answer: Callable, name: str, value: object) -> Callable:
+    """An answer with one of its arguments given, under a name that says so."""
+
+    def variant(*args):
+        return answer(*args, **{name: value})
+
+    variant.__name__ = f"{answer.__name__}_{name}_{value}"
+    return variant

@@ -32,6 +32,9 @@ TOY = np.array([2.0, 1.0, -1.0])
 SURE = np.array([[0.0, 3000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0
 
 
+EPSILONS = tuple(10.0**-digits for digits in (6, 7, 8, 9, 10, 12, 15, 16))  # what people add to probabilities
+
+
 TRUE_CLASSES = np.array([0, 255], np.uint8)
 
 

@@ -42,7 +42,4 @@ def draw_pixels(rng):
 TOY = np.array([[2.0, 1.0, -1.0]])
 
 
-EPSILONS = tuple(10.0**-digits for digits in (6, 7, 8, 9, 10, 12, 15, 16))  # what people add to probabilities
-
-
 SURE = np.array([[0.0, 1000.0, 3.0], [-1000.0, -1001.0, -1005.0]])  # exp overflows, or rounds everything to 0

@@ -3,7 +3,8 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, wrong
-from labkit.course.topics.t05_class_weights import EPSILONS, draw_shares, draw_weights, some_logits
+from labkit.course.topics.t03_gradient import EPSILONS
+from labkit.course.topics.t05_class_weights import draw_shares, draw_weights, some_logits
 
 
 def change_prior(z, w, shares, new_shares):
@@ -73,13 +74,10 @@ def by_exponentials(z, w, shares, new_shares):
     return np.log(p * new_shares / (w * shares))
 
 
-for _epsilon in EPSILONS:
-
-    def by_probabilities_and_epsilon(z, w, shares, new_shares, epsilon=_epsilon):
-        q = probabilities(z, w, shares, new_shares)
-        return np.log(q + epsilon)
-
-    by_probabilities_and_epsilon.__name__ += f"_of_{_epsilon:.0e}"
-    wrong(QUESTION, "Logits may lie as low as they like: how low can log(p + epsilon) be, and do you need p?")(
-        by_probabilities_and_epsilon
-    )
+@wrong(
+    QUESTION,
+    "Logits may lie as low as they like: how low can log(p + epsilon) be, and do you need p?",
+    epsilon=EPSILONS,
+)
+def by_probabilities_and(z, w, shares, new_shares, epsilon):
+    return np.log(probabilities(z, w, shares, new_shares) + epsilon)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, wrong
-from labkit.course.topics.t05_class_weights import EPSILONS, SURE, TOY, draw_pixels
+from labkit.course.topics.t03_gradient import EPSILONS
+from labkit.course.topics.t05_class_weights import SURE, TOY, draw_pixels
 
 
 def two_means(z, y, w):
@@ -36,6 +37,11 @@ def losses_and_weights(z, y, w):
     z, y = z[counted], y[counted]
     log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
     return -log_p[np.arange(len(y)), y], w[y]
+
+
+def means(loss, weight):
+    """Both means of losses that have weights."""
+    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
 
 
 @wrong(QUESTION, "A pixel that adds no loss is not one of those that you divide by.")
@@ -73,7 +79,7 @@ def one_maximum_for_all(z, y, w):
     z, y = z[y != 255], y[y != 255]
     z = z - z.max()
     loss, weight = np.log(np.exp(z).sum(axis=-1)) - z[np.arange(len(y)), y], w[y]
-    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+    return means(loss, weight)
 
 
 @wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
@@ -81,7 +87,7 @@ def means_that_overflow(z, y, w):
     p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
     counted = y != 255
     loss, weight = -np.log(np.take_along_axis(p[counted], y[counted][:, None], -1))[:, 0], w[y[counted]]
-    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+    return means(loss, weight)
 
 
 @wrong(QUESTION, "The probabilities of one pixel add up to 1: along which axis of z do its classes stand?")
@@ -89,17 +95,14 @@ def normalised_along_the_first_axis(z, y, w):
     log_p = z - np.logaddexp.reduce(z, axis=0, keepdims=True)
     counted = y != 255
     loss, weight = -np.take_along_axis(log_p[counted], y[counted][:, None], -1)[:, 0], w[y[counted]]
-    return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
+    return means(loss, weight)
 
 
-for _epsilon in EPSILONS:
-
-    def means_with_epsilon(z, y, w, epsilon=_epsilon):
-        loss, weight = losses_and_weights(z, y, w)
-        loss = -np.log(np.exp(-loss) + epsilon)
-        return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
-
-    means_with_epsilon.__name__ += f"_of_{_epsilon:.0e}"
-    wrong(QUESTION, "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?")(
-        means_with_epsilon
-    )
+@wrong(
+    QUESTION,
+    "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?",
+    epsilon=EPSILONS,
+)
+def means_with(z, y, w, epsilon):
+    loss, weight = losses_and_weights(z, y, w)
+    return means(-np.log(np.exp(-loss) + epsilon), weight)

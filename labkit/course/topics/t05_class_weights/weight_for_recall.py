@@ -101,13 +101,13 @@ def tried_without_room(p1, y, recall):
     return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)
 
 
-for _limit in (10.0, 100.0, 1000.0, 10_000.0):
-
-    def searched_up_to(p1, y, recall, limit=_limit):
-        return min(weight_for_recall(p1, y, recall), limit)
-
-    searched_up_to.__name__ += f"_{_limit:.0f}"
-    wrong(QUESTION, "For a pixel of p1 = 0.000001 the weight is 999,999: where does your search end?")(searched_up_to)
+@wrong(
+    QUESTION,
+    "For a pixel of p1 = 0.000001 the weight is 999,999: where does your search end?",
+    limit=(10.0, 100.0, 1000.0, 10_000.0),
+)
+def searched_up_to_a(p1, y, recall, limit):
+    return min(weight_for_recall(p1, y, recall), limit)
 
 
 @wrong(QUESTION, "Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")

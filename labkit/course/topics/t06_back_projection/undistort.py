@@ -74,6 +74,15 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+def divided_again(pixels, K, factor, rounds=100):
+    """The seen pixels, divided again and again by a lens's factor of the radius that they had in the last round."""
+    f, c = np.diagonal(K)[:2], K[:2, 2]
+    seen = ideal = (pixels - c) / f
+    for _ in range(rounds):
+        ideal = seen / factor(np.linalg.norm(ideal, axis=1, keepdims=True))
+    return c + f * ideal
+
+
 @wrong(QUESTION, "You bent the pixels a second time: the lens did it once, and you are to take it back.")
 def bent_again(pixels, K, k):
     return distort(pixels, K, k)
@@ -84,10 +93,7 @@ def bent_again(pixels, K, k):
     "Put your answer into the lens: does the given pixel come out? r is the ideal point's radius, not the seen one's.",
 )
 def radius_as_seen(pixels, K, k):
-    f, c = np.diagonal(K)[:2], K[:2, 2]
-    seen = (pixels - c) / f
-    r2 = (seen**2).sum(axis=1, keepdims=True)
-    return c + f * seen / (1.0 + k[0] * r2 + k[1] * r2**2)
+    return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**4, rounds=1)
 
 
 @wrong(
@@ -119,22 +125,12 @@ def radius_in_pixels(pixels, K, k):
 
 @wrong(QUESTION, "k1 stands beside r squared and k2 beside r to the fourth.")
 def powers_too_low(pixels, K, k):
-    f, c = np.diagonal(K)[:2], K[:2, 2]
-    seen = ideal = (pixels - c) / f
-    for _ in range(100):
-        r = np.linalg.norm(ideal, axis=1, keepdims=True)
-        ideal = seen / (1.0 + k[0] * r + k[1] * r**2)
-    return c + f * ideal
+    return divided_again(pixels, K, lambda r: 1.0 + k[0] * r + k[1] * r**2)
 
 
 @wrong(QUESTION, "Each pixel has its own r: add its x squared and its y squared, not those of all pixels.")
 def one_radius_for_all(pixels, K, k):
-    f, c = np.diagonal(K)[:2], K[:2, 2]
-    seen = ideal = (pixels - c) / f
-    for _ in range(60):
-        r2 = (ideal**2).sum()
-        ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
-    return c + f * ideal
+    return divided_again(pixels, K, lambda r: 1.0 + k[0] * (r**2).sum() + k[1] * (r**2).sum() ** 2)
 
 
 @wrong(QUESTION, "Minus signs in the factor undo the lens only roughly: guess r, divide what is seen, and repeat.")
@@ -154,24 +150,15 @@ def one_focal_length(pixels, K, k):
 
 @wrong(QUESTION, "A series is right for small r alone: put your pixels into the lens, do the given ones come out?")
 def by_a_series(pixels, K, k):
-    f, c = np.diagonal(K)[:2], K[:2, 2]
-    seen = (pixels - c) / f
-    r2 = (seen**2).sum(axis=1, keepdims=True)
-    return c + f * seen * (1.0 - k[0] * r2 + (3.0 * k[0] ** 2 - k[1]) * r2**2)
+    series = (-k[0], 3.0 * k[0] ** 2 - k[1])
+    return distort(pixels, K, series)
 
 
-for _rounds in (2, 3, 5, 10):
-
-    def too_few_rounds(pixels, K, k, rounds=_rounds):
-        f, c = np.diagonal(K)[:2], K[:2, 2]
-        seen = ideal = (pixels - c) / f
-        for _ in range(rounds):
-            r2 = (ideal**2).sum(axis=1, keepdims=True)
-            ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
-        return c + f * ideal
-
-    too_few_rounds.__name__ += f"_{_rounds}"
-    wrong(QUESTION, "By how many pixels would one more round change your answer? A thousandth counts.")(too_few_rounds)
+@wrong(
+    QUESTION, "By how many pixels would one more round change your answer? A thousandth counts.", rounds=(2, 3, 5, 10)
+)
+def too_few(pixels, K, k, rounds):
+    return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**4, rounds)
 
 
 @wrong(QUESTION, "Newton divides by the slope of what he wants to be 0: what is the derivative of k1 r^3?")
@@ -186,9 +173,4 @@ def newton_with_a_wrong_slope(pixels, K, k):
 
 @wrong(QUESTION, "k2 stands beside r to the fourth: which power of r does yours have?")
 def k2_beside_r_cubed(pixels, K, k):
-    f, c = np.diagonal(K)[:2], K[:2, 2]
-    seen = ideal = (pixels - c) / f
-    for _ in range(100):
-        r = np.linalg.norm(ideal, axis=1, keepdims=True)
-        ideal = seen / (1.0 + k[0] * r**2 + k[1] * r**3)
-    return c + f * ideal
+    return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**3)

@@ -96,25 +96,65 @@ def outside(stamps, t):
     return (np.full(3, np.nan), np.full(4, np.nan)) if t < stamps[0] or t > stamps[-1] else None
 
 
-def slerp(a, b, share):
-    angle = max(np.arccos(np.clip(a @ b, -1.0, 1.0)), 1e-6)
-    q = np.sin((1 - share) * angle) * a + np.sin(share * angle) * b
+def between(stamps, positions, quaternions, t, turn, side="left"):
+    """The right place, and a turn of one's own, turn(a, b, share)."""
+    i, share = neighbours(stamps, t, side)
+    place = (1 - share) * positions[i] + share * positions[i + 1]
+    return place, turn(quaternions[i], quaternions[i + 1], share)
+
+
+def with_turn(stamps, positions, quaternions, t, turn, side="left"):
+    return outside(stamps, t) or between(stamps, positions, quaternions, t, turn, side)
+
+
+def nearer(a, b):
+    return b if a @ b >= 0 else -b
+
+
+def unit(q):
     return q / np.linalg.norm(q)
 
 
-@wrong(QUESTION, "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?")
-def turn_by_the_chord(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    q = (1 - share) * a + share * (b if a @ b >= 0 else -b)
-    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q / np.linalg.norm(q))
+def slerp(a, b, share):
+    angle = max(np.arccos(np.clip(a @ b, -1.0, 1.0)), 1e-6)
+    return unit(np.sin((1 - share) * angle) * a + np.sin(share * angle) * b)
 
 
-@wrong(QUESTION, "A small turn has become a large one the other way round: which of b and -b is nearer to a?")
-def the_long_way_round(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)
-    q = slerp(quaternions[i], quaternions[i + 1], share)
-    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
+def arc(a, b, first, second, divided=True):
+    """first(omega) a + second(omega) b; a, if both are one turn."""
+    omega = np.arccos(np.clip(a @ b, -1.0, 1.0))
+    if np.sin(omega) < 1e-12:
+        return a
+    return (first(omega) * a + second(omega) * b) / (np.sin(omega) if divided else 1.0)
+
+
+STRAIGHT = "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?"
+
+
+@wrong(QUESTION, STRAIGHT)
+def turn_by_the_chord(*given):
+    return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * nearer(a, b)))
+
+
+@wrong(QUESTION, STRAIGHT)
+def each_number_of_the_turn_on_its_own(*given):
+    return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * b))
+
+
+LONG = "A small turn has become a large one the other way round: which of b and -b is nearer to a?"
+
+
+@wrong(QUESTION, LONG)
+def the_long_way_round(*given):
+    return with_turn(*given, slerp)
+
+
+@wrong(QUESTION, LONG, side=("left", "right"))
+def the_long_way_by_the_arc(*given, side):
+    def turn(a, b, share):
+        return arc(a, b, lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o))
+
+    return with_turn(*given, turn, side)
 
 
 @wrong(QUESTION, "The camera moved between the two poses: where was it when the image was taken?")
@@ -123,40 +163,56 @@ def the_last_one_before(stamps, positions, quaternions, t):
     return outside(stamps, t) or (positions[i], quaternions[i])
 
 
-@wrong(QUESTION, "Nobody knows where the camera is after the last pose: what should a node say then?")
+OUTSIDE = "Nobody knows where the camera is after the last pose: what should a node say then?"
+
+
+@wrong(QUESTION, OUTSIDE)
 def held_at_the_ends(stamps, positions, quaternions, t):
     return pose_at(stamps, positions, quaternions, min(max(t, stamps[0]), stamps[-1]))
 
 
-@wrong(QUESTION, "The places are right and the turns are not in between: which turn is it at this time?")
-def turn_of_the_one_before(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)
-    turn = quaternions[i + (share >= 1)]
+@wrong(QUESTION, OUTSIDE)
+def gone_on_beyond_the_ends(*given):
+    return between(*given, lambda a, b, share: slerp(a, nearer(a, b), share))
+
+
+@wrong(QUESTION, "At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
+def share_of_the_whole_recording(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)[0], (t - stamps[0]) / (stamps[-1] - stamps[0])
+    a, b = quaternions[i], quaternions[i + 1]
+    turn = slerp(a, nearer(a, b), share)
     return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
 
 
-EXCHANGED = "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?"
+@wrong(QUESTION, "A stamp has 19 digits and a float64 keeps 16: what do you do to stamps before you subtract?")
+def stamps_in_seconds(stamps, positions, quaternions, t):
+    with np.errstate(invalid="ignore"):
+        return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
 
 
-@wrong(QUESTION, EXCHANGED)
-def shares_exchanged(stamps, positions, quaternions, t, side="left"):
+@wrong(QUESTION, "The places are right and the turns are not in between: which turn is it at this time?")
+def turn_of_the_one_before(*given):
+    return with_turn(*given, lambda a, b, share: b if share >= 1 else a)
+
+
+@wrong(
+    QUESTION,
+    "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?",
+    side=("left", "right"),  # at a stamp it goes on from the pose before, or from that one
+)
+def shares_exchanged(stamps, positions, quaternions, t, side):
     i, _ = neighbours(stamps, t, side)
     then = stamps[i] + stamps[i + 1] - t
     return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
 
 
-@wrong(QUESTION, EXCHANGED)  # at a stamp it goes on from there
-def shares_exchanged_after(stamps, positions, quaternions, t):
-    return shares_exchanged(stamps, positions, quaternions, t, side="right")
-
-
 @wrong(QUESTION, "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
-def only_the_angle_made_shorter(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
-    q = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
-    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
+def only_the_angle_made_shorter(*given):
+    def turn(a, b, share):
+        angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
+        return (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+
+    return with_turn(*given, turn)
 
 
 @wrong(QUESTION, "There are poses between the first and the last: which two stand round t?")
@@ -171,84 +227,42 @@ def nan_between_equal_turns(stamps, positions, quaternions, t):
     return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)
 
 
-@wrong(QUESTION, "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?")
-def each_number_of_the_turn_on_its_own(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)
-    q = (1 - share) * quaternions[i] + share * quaternions[i + 1]
-    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q / np.linalg.norm(q))
+@wrong(QUESTION, "Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?")
+def angle_of_the_turn(*given):
+    def factor(share, omega):
+        return np.sin(2 * share * omega) / 2 / np.cos(omega)
+
+    return with_turn(*given, lambda a, b, s: arc(a, nearer(a, b), lambda o: factor(1 - s, o), lambda o: factor(s, o)))
 
 
-@wrong(QUESTION, "Nobody knows where the camera is after the last pose: what should a node say then?")
-def gone_on_beyond_the_ends(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    return (1 - share) * positions[i] + share * positions[i + 1], slerp(a, b if a @ b >= 0 else -b, share)
-
-
-@wrong(QUESTION, "At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
-def share_of_the_whole_recording(stamps, positions, quaternions, t):
-    i, share = neighbours(stamps, t)[0], (t - stamps[0]) / (stamps[-1] - stamps[0])
-    a, b = quaternions[i], quaternions[i + 1]
-    turn = slerp(a, b if a @ b >= 0 else -b, share)
-    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
-
-
-@wrong(QUESTION, "A stamp has 19 digits and a float64 keeps 16: what do you do to stamps before you subtract?")
-def stamps_in_seconds(stamps, positions, quaternions, t):
-    with np.errstate(invalid="ignore"):
-        return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
-
-
-def with_turn(hint, name, turn):
-    """Enter answers whose places are right: turn(a, b, share), at a stamp from the pose before it, and from its own."""
-    for side in ("left", "right"):
-
-        def answer(stamps, positions, quaternions, t, side=side):
-            i, share = neighbours(stamps, t, side)
-            q = turn(quaternions[i], quaternions[i + 1], share)
-            return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], q)
-
-        answer.__name__ = f"{name}_{side}"
-        wrong(QUESTION, hint)(answer)
-
-
-def arc(a, b, first, second, divided=True, nearer=lambda a, b: b if a @ b >= 0 else -b):
-    """first(omega) a + second(omega) b for the nearer one of b and -b; a, if both are one turn."""
-    b = nearer(a, b)
-    omega = np.arccos(np.clip(a @ b, -1.0, 1.0))
-    if np.sin(omega) < 1e-12:
-        return a
-    return (first(omega) * a + second(omega) * b) / (np.sin(omega) if divided else 1.0)
-
-
-with_turn(
-    "Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?",
-    "angle_of_the_turn",
-    lambda a, b, s: arc(
-        a, b, lambda o: np.sin(2 * (1 - s) * o) / 2 / np.cos(o), lambda o: np.sin(2 * s * o) / 2 / np.cos(o)
-    ),
-)
-with_turn(
+@wrong(
+    QUESTION,
     "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?",
-    "not_divided_by_the_sine",
-    lambda a, b, s: arc(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o), divided=False),
+    side=("left", "right"),
 )
-with_turn(
+def not_divided_by_the_sine(*given, side):
+    def turn(a, b, share):
+        return arc(a, nearer(a, b), lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o), divided=False)
+
+    return with_turn(*given, turn, side)
+
+
+@wrong(
+    QUESTION,
     "The places are right. At s = 0 the turn must be a: which of a and b has the factor 0 in yours?",
-    "shares_of_the_turn_exchanged",
-    lambda a, b, s: arc(a, b, lambda o: np.sin(s * o), lambda o: np.sin((1 - s) * o)),
+    side=("left", "right"),
 )
-with_turn(
-    "The nearer one of b and -b is near to a: does the sign of b's own w know where a is?",
-    "sign_of_w",
-    lambda a, b, s: arc(
-        *(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o)), nearer=lambda a, b: b if b[3] >= 0 else -b
-    ),
-)
+def shares_of_the_turn_exchanged(*given, side):
+    def turn(a, b, share):
+        return arc(a, nearer(a, b), lambda o: np.sin(share * o), lambda o: np.sin((1 - share) * o))
+
+    return with_turn(*given, turn, side)
 
 
-with_turn(
-    "A small turn has become a large one the other way round: which of b and -b is nearer to a?",
-    "the_long_way_round",
-    lambda a, b, s: arc(a, b, lambda o: np.sin((1 - s) * o), lambda o: np.sin(s * o), nearer=lambda a, b: b),
-)
+@wrong(QUESTION, "The nearer one of b and -b is near to a: does the sign of b's own w know where a is?")
+def sign_of_w(*given):
+    def turn(a, b, share):
+        b = b if b[3] >= 0 else -b
+        return arc(a, b, lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o))
+
+    return with_turn(*given, turn)

@@ -110,15 +110,13 @@ def divided_by_variances(features, mean, covariance, allowed):
     return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)
 
 
-for _more in (1e-2, 1e-3, 1e-4, 1e-6):
-
-    def variances_made_larger(features, mean, covariance, allowed, more=_more):
-        return choose_region(features, mean, covariance + more * np.eye(3), allowed)
-
-    variances_made_larger.__name__ += f"_by_{_more:.0e}"
-    wrong(QUESTION, "You add to the diagonal. What does that do to a variance of 0.0001? It is invertible as it is.")(
-        variances_made_larger
-    )
+@wrong(
+    QUESTION,
+    "You add to the diagonal. What does that do to a variance of 0.0001? It is invertible as it is.",
+    more=(1e-2, 1e-3, 1e-4, 1e-6),
+)
+def variances_made_larger(features, mean, covariance, allowed, more):
+    return choose_region(features, mean, covariance + more * np.eye(3), allowed)
 
 
 @wrong(QUESTION, "1 / covariance divides entry by entry: is its matrix product with covariance the identity?")
