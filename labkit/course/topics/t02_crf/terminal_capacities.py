@@ -67,12 +67,6 @@ def whole_costs_kept(psi):
     return terminals(dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum())
 
 
-@wrong(QUESTION, "The constant adds up what was taken from psi, and yours is 0: of which array is it the minimum?")
-def minimum_of_what_is_left(psi):
-    lowest = psi.min(axis=2)
-    return terminals(psi[..., 1] - lowest, psi[..., 0] - lowest, 0.0)
-
-
 @wrong(
     QUESTION,
     "Each pixel has one arc of capacity 0: which label cuts the arc from the source, the dearer one?",

@@ -59,13 +59,6 @@ def old_columns(n, group):
     return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
 
 
-@wrong(QUESTION, "Counts that meet are added: are yours averaged?")
-def means_of_blocks(n, group):
-    member = (np.arange(group.max() + 1)[:, None] == group).astype(float)
-    member /= member.sum(axis=1, keepdims=True)
-    return (member @ n @ member.T).astype(int)
-
-
 @wrong(QUESTION, "Your matrix still has C rows: an index array chooses rows, and does not add those of one group.")
 def rows_chosen(n, group):
     return n[np.ix_(group, group)]

@@ -103,11 +103,6 @@ def rolled_round(y, width):
     return (y != 255) & np.any([(n != y) & (n != 255) for n in near], axis=0)
 
 
-@wrong(QUESTION, "Some pixels of 255 are in your band: a pixel that nobody judged has no class, and no edge.")
-def unjudged_in_the_band(y, width):
-    return banded(y, width, square(width))
-
-
 @wrong(QUESTION, "An edge has two sides: the pixels of the lower class belong to the band, too.")
 def one_side(y, width):
     return banded(y, width, square(width), np.less) & (y != 255)

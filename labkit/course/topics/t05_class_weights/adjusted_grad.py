@@ -78,12 +78,6 @@ def one_hot_adjusted(z, y, shares, tau):
     return (p - Y * shares) * counted
 
 
-@wrong(QUESTION, "A pixel labelled 255 has no class: it pulls nowhere.")
-def ignored_too(z, y, shares, tau):
-    p, Y, _ = parts(z + tau * np.log(shares), y)
-    return p - Y
-
-
 @wrong(QUESTION, "You divide the gradient, as weights would: the shares move the logits, before the softmax.")
 def shares_as_weights(z, y, shares, tau):
     p, Y, counted = parts(z, y)

@@ -65,18 +65,7 @@ def weights_of_mean_one_over_classes(counts, power):
     return w
 
 
-@wrong(QUESTION, "A class without pixels gets 1, whatever the power.")
-def weights_of_absent_classes(counts, power):
-    w = np.maximum(counts, 1) ** -power
-    return w * counts.sum() / (counts @ w)
-
-
 @wrong(QUESTION, "A class without pixels gets 1 and has no part in the mean; you count it as one pixel.")
 def absent_class_as_one_pixel(counts, power):
     n = np.maximum(counts, 1)
     return n**-power * n.sum() / (n @ n**-power)
-
-
-@wrong(QUESTION, "A class without pixels gets the weight 1, not 0.")
-def absent_class_as_nothing(counts, power):
-    return class_weights(counts, power) * (counts > 0)

@@ -91,11 +91,6 @@ def low_byte_only(data, height, width, step, is_bigendian):
     return metres(numbers % 256)
 
 
-@wrong(QUESTION, "A distance of 0 m stands where the sensor saw nothing: what is asked for where the number is 0?")
-def zeros_kept(data, height, width, step, is_bigendian):
-    return units(data, height, width, step, ">" if is_bigendian else "<") * 0.001
-
-
 @wrong(QUESTION, "The two bytes of a pixel stand side by side in the row, not half a row apart.")
 def halves_of_a_row(data, height, width, step, is_bigendian):
     rows = data.reshape(height, step)[:, : 2 * width].reshape(height, 2, width)

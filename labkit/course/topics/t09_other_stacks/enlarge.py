@@ -113,11 +113,6 @@ def resize_by_shares(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) / n * old)
 
 
-@wrong(QUESTION, "What does your cast make of label 300? Labels keep their type.")
-def resize_to_bytes(labels, size):
-    return enlarge(labels, size).astype(np.uint8)
-
-
 @wrong(QUESTION, "np.repeat takes whole numbers of times: how do 2 rows become 5?")
 def resize_by_whole_factors(labels, size):
     W, H = size
