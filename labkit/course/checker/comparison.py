@@ -70,6 +70,15 @@ def trusted(function: Callable, args: tuple) -> object:
         return plain(function(*copy.deepcopy(args)))
 
 
+def same_argument(a: object, b: object) -> bool:
+    """Whether an argument is still what it was."""
+    if isinstance(a, np.ndarray):
+        return a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
+    if isinstance(a, tuple | list):
+        return len(a) == len(b) and all(map(same_argument, a, b))
+    return bool(a == b or (a != a and b != b))
+
+
 # ------------------------------------------------------------------------------------- what an output is
 
 

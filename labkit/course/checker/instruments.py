@@ -12,8 +12,9 @@ from types import FrameType, TracebackType
 
 import numpy as np
 
+from labkit.course.checker.comparison import quiet, same_argument
 from labkit.course.checker.finding import Finding, Span
-from labkit.course.checker.repair import ENDS, Mutant, copied, limited, same, silent
+from labkit.course.checker.repair import ENDS, Mutant, copied, limited
 
 MOST_S = 2.0  # CPU seconds of all watches together
 MOST_EVENTS = 4000  # lines of which the variables are kept
@@ -25,7 +26,7 @@ def readings(
 ) -> list[Finding]:
     """What the watches show of a wrong answer, the surest first; arguments are those of `repair.repairs`."""
     found = []
-    with limited(MOST_S), silent():
+    with limited(MOST_S), quiet():
         try:
             mutant = Mutant(pieces, name)
             outputs = [outcome(mutant, args) for args, _ in cases]
@@ -122,7 +123,7 @@ def written_argument(mutant: Mutant, cases, wrong, right) -> Finding | None:
             mutant.namespace[mutant.name](*given)
         except Exception:
             return None
-        if all(map(same, args, given)):
+        if all(map(same_argument, args, given)):
             continue
         locked = copied(args)
         for array in locked:

@@ -14,14 +14,15 @@ import ast
 import contextlib
 import copy
 import signal
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from labkit.course.checker.comparison import quiet, same_argument
 from labkit.course.checker.finding import REPAIRS, Finding
 from labkit.course.checker.mutation import Mutation, mutations
 
+RANK = {kind: number for number, kind in enumerate(REPAIRS)}
 MOST_MUTATIONS = 6000  # of one program
 MOST_S = 5.0  # CPU seconds of the whole search: then nothing is said
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
@@ -66,7 +67,7 @@ class Mutant:
         """Call the answer: its output, and whether it left its arguments as they were."""
         given = copied(args)
         output = self.namespace[self.name](*given)
-        return output, all(map(same, args, given))
+        return output, all(map(same_argument, args, given))
 
 
 def is_function(node: ast.stmt) -> bool:
@@ -84,13 +85,6 @@ def defines(node: ast.stmt) -> str:
 def copied(args: tuple) -> tuple:
     """Copies of arguments: arrays quickly, anything else safely."""
     return tuple(a.copy() if type(a) is np.ndarray else copy.deepcopy(a) for a in args)
-
-
-def same(a: object, b: object) -> bool:
-    """Whether an argument is still what it was."""
-    if isinstance(a, np.ndarray):
-        return a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
-    return repr(a) == repr(b)
 
 
 def weight(args: tuple) -> int:
@@ -111,7 +105,7 @@ def repairs(
     the public cases; fresh: gives more of them, asked for once, when a mutation passes the public ones. right: function
     (expected, got) -> bool. Empty if there is none, or if the time is up.
     """
-    with limited(MOST_S), silent():
+    with limited(MOST_S), quiet():
         try:
             mutant = Mutant(pieces, name)
             return found_in(mutant, cases, fresh, right)
@@ -122,7 +116,7 @@ def repairs(
 def found_in(mutant: Mutant, cases, fresh, right) -> list[Finding]:
     """Try the mutations of all functions, the smallest first, until those of the next cost are much larger."""
     tried = [(k, statement, m) for k, statement in mutant.functions() for m in mutations(statement)]
-    tried.sort(key=lambda entry: (entry[2].cost, REPAIRS.index(entry[2].kind)))
+    tried.sort(key=lambda entry: (entry[2].cost, RANK[entry[2].kind]))
     cases = sorted(cases, key=lambda case: (passes(mutant, case, right), weight(case[0])))
     more: list = []
     found: dict[Finding, tuple] = {}  # with what decides which one is told first
@@ -134,7 +128,7 @@ def found_in(mutant: Mutant, cases, fresh, right) -> list[Finding]:
         more = more or list(fresh())
         if mends(mutant, statement, mutation, more, right):
             finding = Finding(mutation.kind, k, mutation.spans)
-            found.setdefault(finding, (mutation.cost, REPAIRS.index(mutation.kind), finding.width))
+            found.setdefault(finding, (mutation.cost, RANK[mutation.kind], finding.width))
     return sorted(found, key=found.get)
 
 
@@ -178,11 +172,3 @@ def limited(seconds: float) -> Iterator[None]:
         yield
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-
-
-@contextlib.contextmanager
-def silent() -> Iterator[None]:
-    """Without warnings, Python's and NumPy's."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        yield

@@ -15,9 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from types import TracebackType
 
-import numpy as np
-
-from labkit.course.checker.comparison import Problem, expected_cases, plain, quiet
+from labkit.course.checker.comparison import Problem, expected_cases, plain, quiet, same_argument
 from labkit.course.checker.judge import Verdict, verdict
 from labkit.course.checker.program import Program
 from labkit.course.checker.question import Question
@@ -142,15 +140,6 @@ def limited(function: Callable, seconds: float | None) -> object:
         signal.signal(signal.SIGALRM, signal.SIG_DFL if handler is None else handler)
         if left:
             signal.setitimer(signal.ITIMER_REAL, max(left - (time.monotonic() - start), 1e-3), interval)
-
-
-def same_argument(a: object, b: object) -> bool:
-    """Whether an argument is still what it was."""
-    if isinstance(a, np.ndarray):
-        return a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
-    if isinstance(a, tuple | list):
-        return len(a) == len(b) and all(map(same_argument, a, b))
-    return bool(a == b or (a != a and b != b))
 
 
 # ---------------------------------------------------------------------- exceptions, and the student's own line
