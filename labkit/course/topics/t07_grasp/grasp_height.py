@@ -68,11 +68,6 @@ def origin_from_the_table_alone(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance + tips)
 
 
-@wrong(QUESTION, "Each bound says: not lower than this. Which of them satisfies all?")
-def least_of_the_bounds(P, table_z, palm, tips, clearance):
-    return min(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
-
-
 @wrong(QUESTION, "The object's top is a height in the base frame. You take how tall the object is.")
 def tallness_for_the_top(P, table_z, palm, tips, clearance):
     return max(np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips

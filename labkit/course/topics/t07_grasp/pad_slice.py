@@ -126,12 +126,6 @@ def zero_beside_the_pads(P, T_base_grasp, half):
     return middle_and_width(y * (np.abs(x) <= half))
 
 
-@wrong(QUESTION, "What does the task say of a slice without points? Your middle is NaN there.")
-def nan_for_an_empty_slice(P, T_base_grasp, half):
-    middle, width = pad_slice(P, T_base_grasp, half)
-    return (middle if (np.abs(in_grasp(P, T_base_grasp)[0]) <= half).any() else np.nan), width
-
-
 @wrong(QUESTION, "Your middle is a y of the base frame. In which frame do the jaws close along y?")
 def middle_in_the_base_frame(P, T_base_grasp, half):
     between = np.abs(in_grasp(P, T_base_grasp)[0]) <= half

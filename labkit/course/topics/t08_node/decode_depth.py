@@ -107,10 +107,3 @@ def padding_in_front(data, height, width, step, is_bigendian):
 def largest_for_a_hole(data, height, width, step, is_bigendian):
     depth = decode_depth(data, height, width, step, is_bigendian)
     return np.where(depth > 65.534, np.nan, depth)
-
-
-@wrong(QUESTION, "A byte has 256 values, 0 to 255: what does the high byte count?")
-def high_byte_counts_255(data, height, width, step, is_bigendian):
-    numbers = units(data, height, width, step, ">" if is_bigendian else "<").astype(float)
-    numbers -= numbers // 256
-    return np.where(numbers > 0, numbers / 1000, np.nan)

@@ -106,11 +106,6 @@ def millimetres(P):
     return packed(1000.0 * finite(P)).ravel()
 
 
-@wrong(QUESTION, "Padding is four bytes of 0: which number's bytes are all 0? NaN's are not.")
-def nan_for_padding(P):
-    return packed(np.pad(finite(P), ((0, 0), (0, 1)), constant_values=np.nan), padding=0).ravel()
-
-
 @wrong(QUESTION, "Three coordinates must be finite: how many of them do you ask?")
 def only_z_asked(P):
     return packed(P[np.isfinite(P[:, 2])]).ravel()

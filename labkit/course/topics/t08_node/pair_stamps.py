@@ -164,16 +164,6 @@ def stamps_in_32_bits(a, b, slop):
     return pairs(a.astype(np.int32), b.astype(np.int32), slop, lambda x, y: np.abs(x - y))
 
 
-@wrong(QUESTION, "Of equally near stamps the first is the nearest: which of two equal ones does `<=` leave you with?")
-def last_of_equals(a, b, slop):
-    if len(b) == 0:
-        return np.full(len(a), -1)
-    apart = np.abs(a[:, None] - b[None, :])
-    best = len(b) - 1 - apart[:, ::-1].argmin(axis=1)
-    each_others = len(a) - 1 - apart[::-1].argmin(axis=0)[best] == np.arange(len(a))
-    return np.where(each_others & (apart.min(axis=1) <= slop), best, -1)
-
-
 @wrong(QUESTION, "A stamp whose nearest one belongs to another stays alone: does yours get the next best?")
 def next_best(a, b, slop):
     """The nearest pair of all first, then the nearest of what is left."""
