@@ -4,6 +4,7 @@ import numpy as np
 
 from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t03_gradient import EPSILONS
+from labkit.course.topics.t03_gradient.cross_entropy import true_log_probabilities
 from labkit.course.topics.t05_class_weights import SURE, TOY, draw_pixels
 
 
@@ -33,10 +34,7 @@ QUESTION = Question(
 
 def losses_and_weights(z, y, w):
     """Loss and weight of each counted pixel."""
-    counted = y != 255
-    z, y = z[counted], y[counted]
-    log_p = z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
-    return -log_p[np.arange(len(y)), y], w[y]
+    return -true_log_probabilities(z, y), w[y[y != 255]]
 
 
 def means(loss, weight):

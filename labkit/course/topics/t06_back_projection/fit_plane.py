@@ -113,9 +113,8 @@ def unsure_points_count_more(P, sigma):
 
 @wrong(QUESTION, "np.linalg.eigh gives the eigenvectors as the columns of its matrix: yours is a row.")
 def row_of_the_eigenvectors(P, sigma):
-    w = 1.0 / sigma**2
-    centre = w @ P / w.sum()
-    return up(np.linalg.eigh((P - centre).T * w @ (P - centre))[1][0], centre)
+    centre, axes = centre_and_axes(P, sigma)
+    return up(axes[0], centre)
 
 
 @wrong(QUESTION, "d is gone only if you subtract the mean m from the points before you look for n; then d = n . m.")
@@ -131,9 +130,8 @@ def weights_in_both_factors(P, sigma):
 
 @wrong(QUESTION, "Turn n up before you compute n . m = d: yours still has the sign of the other normal.")
 def d_before_the_turn(P, sigma):
-    centre = np.average(P, axis=0, weights=sigma**-2.0)
-    n = np.linalg.eigh((P - centre).T / sigma**2 @ (P - centre))[1][:, 0]
-    return up(n, centre)[0], float(n @ centre)
+    n, d = not_turned_up(P, sigma)
+    return up(n, P[0])[0], d
 
 
 @wrong(QUESTION, "In which direction do points of a plane scatter least, and in which most?")
