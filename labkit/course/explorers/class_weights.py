@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.special import ndtr
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, TARGET, overlay
 from labkit.metrics import confusion_matrix, iou, precision_recall
@@ -128,10 +128,9 @@ def trained_masks(frames: Mapping[str, tuple[RGBDFrame, Float[np.ndarray, "H W C
     def draw(figure: Figure, exponent: float, name: str) -> None:
         frame, p = frames[name]
         mask, scores = figure.subplots(1, 2)
-        mask.imshow(overlay(frame.rgb, reweighted(p, exponent), 0.6))
+        title = f"target weighs {2.0**exponent:.3g}; white: the true outline"
+        show(mask, overlay(frame.rgb, reweighted(p, exponent), 0.6), title)
         mask.contour(frame.labels == TARGET, levels=[0.5], colors="white", linewidths=1.0)
-        mask.set_title(f"target weighs {2.0**exponent:.3g}; white: the true outline")
-        mask.axis("off")
         draw_scores(scores, EXPONENTS, curves[name], exponent)
         scores.set_title(said(target_scores(frame.labels, p, exponent)))
 

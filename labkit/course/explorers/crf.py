@@ -8,7 +8,7 @@ from jaxtyping import Float, Integer, UInt8
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.crf import PottsCRF, solve, unary_from_probabilities
 from labkit.crf.energy import pair_slices
 from labkit.crf.exact import enumerate_labellings
@@ -177,11 +177,8 @@ def lam_slider(
     def draw(figure: Figure, lam: float, sigma_I: float) -> None:
         labels, terms = refined(lam, sigma_I)
         seen, painted, bars = figure.subplots(1, 3)
-        seen.imshow(overlay(image, labels, 0.4))
-        painted.imshow(colorize(labels))
-        for axis, title in ((seen, "over the image"), (painted, f"labels, lam = {lam:g}")):
-            axis.set_axis_off()
-            axis.set_title(title)
+        show(seen, overlay(image, labels, 0.4), "over the image")
+        show(painted, colorize(labels), f"labels, lam = {lam:g}")
         bars.bar(["unary", "pairwise"], terms, color=[UNARY_COLOUR, PAIRWISE_COLOUR])
         bars.set_ylabel("energy")
         bars.spines[["top", "right"]].set_visible(False)

@@ -6,9 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 
 import ipywidgets
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
+
+
+def show(axes: Axes, image: np.ndarray, title: str = "") -> None:
+    """Show an image under a title, without ticks and frame."""
+    axes.imshow(image)
+    axes.set_title(title)
+    axes.axis("off")
 
 
 class Explorer:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.labels import CLASSES
 from labkit.metrics import confusion_matrix, iou, pixel_accuracy
 
@@ -90,8 +90,7 @@ def sliding_mask() -> Explorer:
 
     def draw(figure: Figure, shift: int, radius: int) -> None:
         picture, curves = figure.subplots(1, 2, width_ratios=[1, 1.6])
-        picture.imshow(error_image(*_slid(radius, shift), 1))
-        picture.axis("off")
+        show(picture, error_image(*_slid(radius, shift), 1))
         outcome_legend(picture, fontsize=7)
         shifts = np.arange(25)
         scores = np.array([slide_scores(radius, int(s)) for s in shifts])
@@ -130,9 +129,8 @@ def confusion_cells(
         matrix, picture = figure.subplots(1, 2, width_ratios=[1, 1.25])
         draw_matrix(matrix, n)
         matrix.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, fill=False, edgecolor="tab:red", linewidth=3))
-        picture.imshow(np.where(((y_true == i) & (y_pred == j))[..., None], LIT, dark))
-        picture.set_title(f"n[{i}, {j}] = {n[i, j]:,}: true {true}, predicted {predicted}")
-        picture.axis("off")
+        lit = np.where(((y_true == i) & (y_pred == j))[..., None], LIT, dark)
+        show(picture, lit, f"n[{i}, {j}] = {n[i, j]:,}: true {true}, predicted {predicted}")
 
     controls = {
         "true": ipywidgets.Dropdown(options=CLASSES, value=CLASSES[first_true], description="true"),

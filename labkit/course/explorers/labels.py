@@ -7,7 +7,7 @@ from jaxtyping import Bool, Integer, UInt8
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.course.plots import class_legend
 from labkit.labels import CLASSES, colorize, one_hot
 
@@ -55,15 +55,11 @@ def ghost_classes(y: Integer[np.ndarray, "H W"]) -> Explorer:
         resized = ways[way](y, *size)
         ghost = ghosts(y, resized)
         before, after, haunted = figure.subplots(1, 3)
-        before.imshow(colorize(y))
-        before.set_title(f"{y.shape[0]} x {y.shape[1]}: classes {np.unique(y).tolist()}")
+        show(before, colorize(y), f"{y.shape[0]} x {y.shape[1]}: classes {np.unique(y).tolist()}")
         class_legend(before, fontsize=6, loc="upper left")
-        after.imshow(colorize(resized))
-        after.set_title(f"{size[0]} x {size[1]}, {way}: classes {np.unique(resized).tolist()}")
-        haunted.imshow(np.where(ghost[..., None], GHOST, colorize(resized) // 3))
-        haunted.set_title(f"{np.count_nonzero(ghost)} pixels of a class that was not there")
-        for axes in (before, after, haunted):
-            axes.axis("off")
+        show(after, colorize(resized), f"{size[0]} x {size[1]}, {way}: classes {np.unique(resized).tolist()}")
+        invented = f"{np.count_nonzero(ghost)} pixels of a class that was not there"
+        show(haunted, np.where(ghost[..., None], GHOST, colorize(resized) // 3), invented)
 
     controls = {
         "scale": ipywidgets.FloatSlider(1.5, min=0.25, max=3.0, step=0.05, description="scale"),

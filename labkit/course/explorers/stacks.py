@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Integer, UInt8
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.labels import CLASSES, PALETTE, overlay
 from labkit.metrics import confusion_matrix, iou
 from labkit.stacks.threshold import HSVRange, hsv_mask
@@ -61,9 +61,7 @@ def colour_range(rgb: UInt8[np.ndarray, "H W 3"], table: Bool[np.ndarray, "H W"]
         inside = hsv_mask(rgb, HSVRange((first, saturation, value[0]), (last, 255, value[1])))
         both = np.count_nonzero(inside & table) / max(np.count_nonzero(inside | table), 1)
         picture, hues = figure.subplots(1, 2, width_ratios=[1.2, 1])
-        picture.imshow(np.where(inside[..., None], rgb, rgb // 5))
-        picture.set_title(f"IoU with the table: {both:.3f}")
-        picture.axis("off")
+        show(picture, np.where(inside[..., None], rgb, rgb // 5), f"IoU with the table: {both:.3f}")
         hues.imshow(wheel, extent=(-0.5, 179.5, -0.12, -0.02), aspect="auto")
         for count, colour, name in zip(counts, ("tab:blue", "0.5"), ("table", "elsewhere"), strict=True):
             hues.plot(np.sqrt(count / max(c.max() for c in counts)), color=colour, label=name, lw=1.2)

@@ -40,9 +40,10 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def rays(u, v, K):
-    """Give q(u, v) for every pixel of an image, (H, W, 3)."""
-    return np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(u.shape)])
+def rays(shape, K, offset=0.0):
+    """Give q(u, v) for every pixel of an image; offset is added to both pixel coordinates."""
+    v, u = np.mgrid[: shape[0], : shape[1]] + offset
+    return np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(shape)])
 
 
 def holes(depth):
@@ -54,25 +55,26 @@ def holes(depth):
 )
 def u_is_the_row(depth, K):
     u, v = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    return holes(depth) * rays(u, v, K)
+    q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
+    return holes(depth) * q
 
 
 @wrong(
     QUESTION, "A wall seen head-on has one depth, and it must come out flat: is z the depth, or the length of the ray?"
 )
 def length_of_the_ray(depth, K):
-    P = back_project(depth, K)
-    return P * depth[..., None] / np.linalg.norm(P, axis=-1, keepdims=True)
+    q = rays(depth.shape, K)
+    return holes(depth) * q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 @wrong(QUESTION, "You are off by half a pixel: in this kit the first pixel's centre is at u = v = 0.")
 def centres_at_halves(depth, K):
-    return back_project(depth, K_of(K[0, 0], K[1, 1], K[0, 2] - 0.5, K[1, 2] - 0.5))
+    return holes(depth) * rays(depth.shape, K, 0.5)
 
 
 @wrong(QUESTION, "You are off by a pixel: the first one has u = v = 0, not 1.")
 def counted_from_one(depth, K):
-    return back_project(depth, K_of(K[0, 0], K[1, 1], K[0, 2] - 1.0, K[1, 2] - 1.0))
+    return holes(depth) * rays(depth.shape, K, 1.0)
 
 
 @wrong(QUESTION, "u and x go with fx and cx, the first row of K; v and y go with fy and cy.")
@@ -123,9 +125,10 @@ def holes_without_z_alone(depth, K):
 @wrong(QUESTION, "np.meshgrid with indexing='ij' stands on its side, and reshape does not turn it: which axis is u?")
 def grid_on_its_side(depth, K):
     u, v = (grid.reshape(depth.shape) for grid in np.meshgrid(*map(np.arange, depth.shape[::-1]), indexing="ij"))
-    return holes(depth) * rays(u, v, K)
+    q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
+    return holes(depth) * q
 
 
 @wrong(QUESTION, "An image of points is asked for, one at each pixel's place: what stands where there is no reading?")
 def list_of_points(depth, K):
-    return back_project(depth, K)[depth > 0.0]
+    return (holes(depth) * rays(depth.shape, K))[depth > 0.0]

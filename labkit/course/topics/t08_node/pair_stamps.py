@@ -60,6 +60,10 @@ QUESTION = Question(
     points=3,
     properties=(
         Property("one answer for each stamp of a", lambda arguments, j: np.shape(j) == np.shape(arguments[0])),
+        Property(
+            "each answer is -1, or the number of a stamp of b (from 0), not a stamp",
+            lambda arguments, j: all(-1 <= k < len(arguments[1]) for k in j),
+        ),
     ),
 )
 
