@@ -50,7 +50,8 @@ def test_two_ranks_go_through_the_losses_of_one_process(model, memory_gb, tmp_pa
     by_two(__file__, model, str(tmp_path / "two"), "2", str(memory_gb))
     together = json.loads((tmp_path / "two" / f"{model}.history.json").read_text())
     ours, theirs = ([row["loss"] for row in history] for history in (alone, together))
-    assert theirs[0] == pytest.approx(ours[0], rel=1e-5)  # 6e-4 without the whole batch's statistics
+    # Rounding grows where depth is as noisy as training makes it; 6e-4 without the whole batch's statistics.
+    assert theirs[0] == pytest.approx(ours[0], rel=2e-4 if model == "unet_rgbd" else 1e-5)
     assert theirs == pytest.approx(ours, rel=1e-3)
     written = {path.name for path in (tmp_path / "two").iterdir()}
     assert written == {f"{model}{end}" for end in (".pt", ".history.json", ".checkpoint.pt")}

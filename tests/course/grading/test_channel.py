@@ -134,7 +134,7 @@ def test_only_known_words_and_short_messages_are_repeated(reply, says):
 
 def test_a_call_that_changes_its_argument_says_so():
     cell = "def f(a, b, c):\n    b[0] = 9.0\n    c[1].append(0)\n    return a + b\n"
-    session, arguments = worker.Session({}), (np.ones(2), np.array([1.0, np.nan]), (1, [2]))
+    session, arguments = worker.Session({}, {}), (np.ones(2), np.array([1.0, np.nan]), (1, [2]))
     assert session.answer(("run", "f", cell)) == b"O"
     got = decode(session.answer(("call", "f", pickle.dumps(arguments))))
     assert isinstance(got, Changed) and got.position == 1 and got.value[0] == 10.0
