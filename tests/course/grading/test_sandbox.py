@@ -243,8 +243,10 @@ def test_a_worker_dies_with_its_grader():
     process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(grader)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout.readline() == "ready\n"
-        family = kit.descendants(process.pid)
-        assert len(family) >= 4  # bubblewrap, its reaper, the server, the child
+        deadline = time.monotonic() + 30
+        while len(family := kit.descendants(process.pid)) < 4:  # bubblewrap, its reaper, the server, the child
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
