@@ -1,5 +1,6 @@
 """The main job, shown: one scene from camera to lift, with a table of stages, a picture of every step and a film."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from jaxtyping import UInt8
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 from PIL import Image
+from tqdm.auto import tqdm
 
 from labkit.apps import perceive
 from labkit.apps.evaluation import lift
@@ -56,7 +58,7 @@ def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool |
         with timed(seconds, "render"):
             frame = world.render(size)
         pipeline = Pipeline(model, crf=crf)
-        with timed(seconds, "warm-up"):
+        with timed(seconds, "warm-up"), compiling_shown():
             pipeline.run(frame)  # a first run compiles and warms up; the second is what a robot waits for
         perception = pipeline.run(frame)
         seconds |= perception.seconds
@@ -65,6 +67,27 @@ def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool |
         with timed(seconds, "lift and film"):
             result = lift(world, perception)
     return Story(spec, frame, perception, result, film, true_centroids, seconds)
+
+
+@contextmanager
+def compiling_shown():
+    """Count the kernels on the terminal while numba compiles them: on a new machine that is most of the first run."""
+    from numba.core import event
+
+    from labkit.support.compiled import KERNELS
+
+    class Count(event.Listener):
+        def on_start(self, compilation):
+            if compilation.data["dispatcher"] in KERNELS:
+                bar.refresh()
+
+        def on_end(self, compilation):
+            if compilation.data["dispatcher"] in KERNELS:
+                bar.update()
+
+    text = "compiling, once on this machine: {n} of about 18 kernels, {elapsed}"
+    with tqdm(bar_format=text, delay=0.001) as bar, event.install_listener("numba:compile", Count()):
+        yield
 
 
 def report(story: Story) -> str:
