@@ -123,10 +123,29 @@ train: .venv/installed
 	mkdir -p $(@D)
 	touch $(@D)/installing
 	if [ ! -e $(@D)/bin/python ]; then
-	    echo "Setting up $(@D): once, a minute or two where packages come quickly."
+	    echo "Setting up $(@D) with $$("$$python" --version): once, a minute or two where packages come quickly."
 	    "$$python" -m venv $(@D)
 	fi
-	install() { $(@D)/bin/python -m pip install --disable-pip-version-check "$$@"; }
+	# pip says two thousand lines: they go to a file, and a terminal shows how far it is.
+	log=$(@D)/install.log
+	echo "Installing packages; what pip says goes to $$log."
+	how_far() {
+	    if names=$$(grep '^Installing collected packages' $$log); then
+	        echo "unpacking $$(tr , '\n' <<< "$$names" | wc -l) packages: $$(ls $(@D)/lib/python*/site-packages | grep -c dist-info) are there"
+	    else
+	        echo "finding and downloading packages: $$(grep -c '^Collecting' $$log)"
+	    fi
+	}
+	if [ -t 1 ]; then
+	    while sleep 1 && kill -0 $$$$ 2>/dev/null; do printf '\r\033[K  %s' "$$(how_far)"; done &
+	    trap "kill $$! 2>/dev/null; printf '\r\033[K'" EXIT
+	fi
+	install() {
+	    if ! $(@D)/bin/python -m pip install --disable-pip-version-check --progress-bar off "$$@" > $$log 2>&1; then
+	        printf '\n%s\n' "pip failed. The end of $$log:" "$$(tail -n 15 $$log)" >&2
+	        exit 1
+	    fi
+	}
 	if [ -n "$(TORCH_INDEX)" ]; then install --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"; fi
 	install -c constraints.txt setuptools
 	install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]' $(MORE)
