@@ -1,6 +1,7 @@
 """Right answers to the questions, written in other ways: loops, einsum, torch, float32, another formula.
 
 In `t04_iou`, those of topic 04_iou, `iou__loops` answers the question `iou`. Checks and grades must accept each.
+Those of one question differ in what a check can see: class, dtype, rounding, or what the task leaves free.
 """
 
 import importlib

@@ -3,15 +3,6 @@
 import numpy as np
 
 
-def class_shares__one_hot(y, C):
-    n = np.einsum("vuc->c", one_hot__eye(y, C).astype(np.float64))
-    return n / n.sum()
-
-
-def class_shares__float32(y, C):
-    return np.stack([np.mean(y[y != 255] == c, dtype=np.float32) for c in range(C)])
-
-
 def class_shares__torch(y, C):
     import torch
 
@@ -33,24 +24,12 @@ def labels_from_colours__loops(rgb, palette):
     return np.array([[names.get(tuple(pixel), 255) for pixel in row] for row in rgb.tolist()], np.uint8)
 
 
-def labels_from_colours__class_by_class(rgb, palette):
-    y = np.full(rgb.shape[:2], 255, np.uint8)
-    for c, colour in enumerate(palette):
-        y[(rgb == colour).all(axis=2)] = c
-    return y
-
-
 def labels_from_colours__as_numbers(rgb, palette):
     """Each colour as one number of 24 bits."""
     weights = np.array([65536, 256, 1])
     picture, table = rgb.astype(int) @ weights, palette.astype(int) @ weights
     found = picture[..., None] == table
     return np.where(found.any(axis=-1), found.argmax(axis=-1), 255)
-
-
-def labels_from_segmentation__modulo(segmentation, class_of_body):
-    with_nothing = np.append(class_of_body, np.uint8(0))
-    return with_nothing[np.where(segmentation < 0, -1, segmentation % (1 << 24))]
 
 
 def labels_from_segmentation__torch(segmentation, class_of_body):
@@ -68,10 +47,6 @@ def labels_from_segmentation__loops(segmentation, class_of_body):
     return labels
 
 
-def one_hot__eye(y, C):
-    return np.vstack([np.eye(C, dtype=np.uint8), np.zeros((1, C), np.uint8)])[np.where(y == 255, C, y)]
-
-
 def one_hot__planes(y, C):
     return np.stack([y == c for c in range(C)], axis=-1).astype(int)
 
@@ -81,20 +56,6 @@ def one_hot__torch(y, C):
 
     y = torch.as_tensor(y.astype(np.int64))
     return torch.nn.functional.one_hot(torch.where(y == 255, C, y), C + 1)[..., :C]
-
-
-def one_hot__loops(y, C):
-    Y = np.zeros((*y.shape, C), np.uint8)
-    for place, c in np.ndenumerate(y):
-        if c != 255:
-            Y[(*place, c)] = 1
-    return Y
-
-
-def resize_labels__take(y, height, width):
-    H, W = y.shape
-    rows = np.floor((np.arange(height) + 0.5) * H / height).astype(np.intp)
-    return y.take(rows, axis=0).take(np.floor((np.arange(width) + 0.5) * W / width).astype(np.intp), axis=1)
 
 
 def resize_labels__torch(y, height, width):

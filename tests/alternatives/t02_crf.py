@@ -19,15 +19,6 @@ def energy__loops(y, psi, weights):
     return total
 
 
-def energy__torch(y, psi, weights):
-    """In torch, with slices."""
-    y, psi, w = torch.as_tensor(y.astype(np.int64)), torch.as_tensor(psi), torch.as_tensor(weights)
-    total = psi.gather(2, y[..., None]).sum()
-    total += w[0, :, :-1][y[:, 1:] != y[:, :-1]].sum() + w[1, :-1][y[1:] != y[:-1]].sum()
-    total += w[2, :-1, :-1][y[1:, 1:] != y[:-1, :-1]].sum() + w[3, :-1, 1:][y[1:, :-1] != y[:-1, 1:]].sum()
-    return float(total)
-
-
 def energy__float32(y, psi, weights):
     """In single precision."""
     unary = np.take_along_axis(psi.astype(np.float32), y[..., None].astype(int), axis=2).sum()
@@ -35,13 +26,6 @@ def energy__float32(y, psi, weights):
     H, W = y.shape
     near = np.stack([labels[down : H + down, 1 + right : W + 1 + right] for down, right in STEPS])
     return unary + (weights.astype(np.float32) * (near != y)).sum()
-
-
-def energy__einsum(y, psi, weights):
-    """With one-hot labels: the product of two of them is 1 where they agree."""
-    Y = np.eye(psi.shape[2])[y]
-    near = np.stack([np.roll(Y, (-down, -right), (0, 1)) for down, right in PAIRS])
-    return (Y * psi).sum() + (weights * (1 - np.einsum("vuc,dvuc->dvu", Y, near))).sum()
 
 
 def icm_costs__by_energies(y, psi, weights, v, u):
@@ -68,16 +52,6 @@ def icm_costs__loop(y, psi, weights, v, u):
         w = weights[PAIRS.index(step), b, a] if step in PAIRS else w
         for c in range(len(costs)):
             costs[c] += w if c != y[b, a] else 0.0
-    return costs
-
-
-def icm_costs__padded(y, psi, weights, v, u):
-    """With a ring of pixels around the image that cost nothing."""
-    Y, w = np.pad(np.eye(psi.shape[2])[y], ((1, 1), (1, 1), (0, 0))), np.pad(weights, ((0, 0), (1, 1), (1, 1)))
-    v, u, costs = v + 1, u + 1, psi[v, u].copy()
-    for d, (down, right) in enumerate(PAIRS):
-        costs += w[d, v, u] * (1 - Y[v + down, u + right])
-        costs += w[d, v - down, u - right] * (1 - Y[v - down, u - right])
     return costs
 
 
@@ -111,17 +85,6 @@ def pair_weights__loops(image, lam, sigma_I, sigma_p):
     return w
 
 
-def pair_weights__padded(image, lam, sigma_I, sigma_p):
-    """With a ring of pixels that are infinitely far from every colour."""
-    far = np.pad(image / sigma_I, ((0, 1), (1, 1), (0, 0)), constant_values=np.inf)
-    H, W, _ = image.shape
-    w = []
-    for down, right in PAIRS:
-        d = far[down : H + down, 1 + right : W + 1 + right] - image / sigma_I
-        w.append(lam * np.exp(-0.5 * (np.einsum("ijk,ijk->ij", d, d) + (down + right**2) / sigma_p**2)))
-    return np.array(w)
-
-
 def row_labels__enumerated(psi, w):
     """All C^n labellings of the row."""
     n, C = psi.shape
@@ -140,24 +103,6 @@ def row_labels__by_min_marginals(psi, w):
         return np.array(best)
 
     return (forward(psi, w) + forward(psi[::-1], w[::-1])[::-1] - psi).argmin(axis=1)
-
-
-def row_labels__carried_along(psi, w):
-    """The cheapest labels up to each pixel, one list per class."""
-    ways = [(cost, [c]) for c, cost in enumerate(psi[0])]
-    for costs, weight in zip(psi[1:], w, strict=True):
-        ways = [
-            min((cost + weight * (way[-1] != c) + costs[c], [*way, c]) for cost, way in ways) for c in range(len(costs))
-        ]
-    return np.array(min(ways)[1])
-
-
-def terminal_capacities__torch(psi):
-    """In torch."""
-    psi = torch.as_tensor(psi)
-    lowest = psi.amin(dim=2, keepdim=True)
-    excess = psi - lowest
-    return excess[..., 1].numpy(), excess[..., 0].numpy(), float(lowest.sum())
 
 
 def terminal_capacities__by_difference(psi):
@@ -186,11 +131,3 @@ def unary_from_probabilities__torch(p, floor):
 def unary_from_probabilities__float32(p, floor):
     """In single precision, and with the cost cut off instead of the probability."""
     return np.minimum(-np.log(np.maximum(p.astype(np.float32), 1e-30)), np.float32(-np.log(floor)))
-
-
-def unary_from_probabilities__loops(p, floor):
-    """Probability by probability."""
-    psi = np.zeros(p.shape)
-    for index in np.ndindex(*p.shape):
-        psi[index] = -np.log(p[index] if p[index] > floor else floor)
-    return psi

@@ -11,13 +11,6 @@ def confusion_matrix__one_hot(y_true, y_pred, num_classes, ignore):
     return np.einsum("pi,pj->ij", Y[rows], Y[columns]).astype(np.int64)
 
 
-def confusion_matrix__torch(y_true, y_pred, num_classes, ignore):
-    import torch
-
-    rows, columns = (torch.from_numpy(y) for y in counted_pairs(y_true, y_pred, ignore))
-    return torch.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, -1).numpy()
-
-
 def confusion_matrix__loops(y_true, y_pred, num_classes, ignore):
     n = np.zeros((num_classes, num_classes), np.int64)
     for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
@@ -43,12 +36,6 @@ def iou__loops(n):
     return np.array(scores)
 
 
-def iou__einsum(n):
-    correct = np.einsum("ii->i", n)
-    union = np.einsum("ij->j", n) + np.einsum("ij->i", n) - correct
-    return np.divide(correct, union, out=np.full(len(n), np.nan), where=union > 0)
-
-
 def mean_iou__torch(n_frames):
     import torch
 
@@ -68,24 +55,9 @@ def mean_iou__loops(n_frames):
     return sum(scores) / len(scores)
 
 
-def mean_iou__einsum(n_frames):
-    correct = np.einsum("fii->i", n_frames)
-    union = np.einsum("fij->i", n_frames) + np.einsum("fij->j", n_frames) - correct
-    return (correct[union > 0] / union[union > 0]).mean()
-
-
 def merge_classes__blocks(n, group):
     classes = [np.flatnonzero(group == g) for g in np.unique(group)]
     return np.array([[n[np.ix_(rows, columns)].sum() for columns in classes] for rows in classes])
-
-
-def merge_classes__loops(n, group):
-    G = max(group.tolist()) + 1
-    merged = np.zeros((G, G), np.int64)
-    for i in range(len(group)):
-        for j in range(len(group)):
-            merged[group[i], group[j]] += n[i, j]
-    return merged
 
 
 def merge_classes__add_at(n, group):
@@ -103,30 +75,9 @@ def trimap_band__one_class_at_a_time(y, width):
     return (np.sum(near, axis=0) > 1) * (y != 255)
 
 
-def trimap_band__torch(y, width):
-    import torch
-
-    classes = torch.unique(torch.from_numpy(y[y != 255]))
-    masks = (torch.from_numpy(y)[None] == classes[:, None, None]).float()
-    near = torch.nn.functional.max_pool2d(masks, 2 * width + 1, stride=1, padding=width)
-    return (near.sum(0) > 1).numpy() & (y != 255)
-
-
 def trimap_band__loops(y, width):
     band = np.zeros(y.shape, bool)
     for v, u in np.argwhere(y != 255):
         window = y[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
         band[v, u] = len(set(window.ravel().tolist()) - {255}) > 1
     return band
-
-
-def trimap_band__extremes(y, width):
-    low, high = y.astype(int), np.where(y == 255, -1, y.astype(int))
-    for _ in range(width):
-        for axis in (0, 1):
-            reach = ((1, 1), (0, 0)) if axis == 0 else ((0, 0), (1, 1))
-            a, b = np.pad(low, reach, mode="edge"), np.pad(high, reach, mode="edge")
-            places = [np.arange(step, step + y.shape[axis]) for step in range(3)]
-            low = np.min([a.take(place, axis) for place in places], axis=0)
-            high = np.max([b.take(place, axis) for place in places], axis=0)
-    return (low < high) & (y < 255)

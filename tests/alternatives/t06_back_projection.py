@@ -3,7 +3,6 @@
 import numpy as np
 
 from labkit.course.topics.t06_back_projection import columns
-from labkit.course.topics.t06_back_projection.back_project import holes, rays
 
 
 def back_project__einsum(depth, K):
@@ -23,20 +22,6 @@ def back_project__torch(depth, K):
     return torch.stack([z * (u - K[0, 2]) / K[0, 0], z * (v - K[1, 2]) / K[1, 1], z], dim=-1).numpy()
 
 
-def back_project__closed_form(depth, K):
-    return holes(depth) * rays(depth.shape, K)
-
-
-def back_project__loops(depth, K):
-    P = np.full((*depth.shape, 3), np.nan)
-    K_inv = np.linalg.inv(K)
-    for v in range(depth.shape[0]):
-        for u in range(depth.shape[1]):
-            if depth[v, u] > 0.0:
-                P[v, u] = depth[v, u] * K_inv @ np.array([u, v, 1.0])
-    return P
-
-
 def cropped_intrinsics__torch(K, left, top, scale):
     import torch
 
@@ -44,15 +29,6 @@ def cropped_intrinsics__torch(K, left, top, scale):
     corner = torch.tensor([left - 0.5, top - 0.5], dtype=torch.float64)
     new = torch.eye(3, dtype=torch.float64)
     new[:2, :2], new[:2, 2] = scale * K[:2, :2], scale * (K[:2, 2] - corner) - 0.5
-    return new
-
-
-def cropped_intrinsics__by_hand(K, left, top, scale):
-    new = K.copy()
-    new[0] = scale * K[0]
-    new[1] = scale * K[1]
-    new[0, 2] = scale * (K[0, 2] - left + 0.5) - 0.5
-    new[1, 2] = scale * (K[1, 2] - top + 0.5) - 0.5
     return new
 
 
@@ -81,31 +57,6 @@ def fit_plane__torch(P, sigma):
     return normal.numpy(), torch.dot(normal, centre).item()
 
 
-def fit_plane__by_eigenvectors(P, sigma):
-    w = sigma**-2.0
-    centre = np.average(P, axis=0, weights=w)
-    normal = np.linalg.eigh(np.cov(P.T, aweights=w, ddof=0))[1][:, 0]
-    normal *= 1 if normal[2] > 0 else -1
-    return normal, normal @ centre
-
-
-def fit_plane__loops(P, sigma):
-    total = sum(1 / s**2 for s in sigma)
-    centre = sum(p / s**2 for p, s in zip(P, sigma, strict=True)) / total
-    scatter = np.zeros((3, 3))
-    for p, s in zip(P, sigma, strict=True):
-        scatter += np.outer(p - centre, p - centre) / s**2
-    values, vectors = np.linalg.eig(scatter)
-    normal = vectors[:, values.real.argmin()].real
-    return normal * np.sign(normal[2]), abs(normal[2]) / normal[2] * (normal @ centre)
-
-
-def height_noise__einsum(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    J = np.stack(columns(u, v, d, K), axis=1)
-    r, sigma = T_base_cam[2, :3], np.array([sigma_pixel, sigma_pixel, sigma_depth])
-    return np.sqrt(np.einsum("i,ij,j,kj,k->", r, J, sigma**2, J, r))
-
-
 def height_noise__torch(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     import torch
 
@@ -119,13 +70,6 @@ def height_noise__covariance(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = T_base_cam[:3, :3] @ np.stack(columns(u, v, d, K), axis=1)
     Sigma = J @ np.diag([sigma_pixel**2, sigma_pixel**2, sigma_depth**2]) @ J.T
     return float(np.sqrt(Sigma[2, 2]))
-
-
-def height_noise__loops(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    total = 0.0
-    for column, sigma in zip(columns(u, v, d, K), (sigma_pixel, sigma_pixel, sigma_depth), strict=True):
-        total += (sum(T_base_cam[2, i] * column[i] for i in range(3)) * sigma) ** 2
-    return total**0.5
 
 
 def undistort__halving(pixels, K, k):
@@ -148,15 +92,3 @@ def undistort__newton(pixels, K, k):
     for _ in range(20):
         r -= (r + k[0] * r**3 + k[1] * r**5 - seen) / (1 + 3 * k[0] * r**2 + 5 * k[1] * r**4)
     return c + f * x * np.where(seen > 0, r / np.where(seen > 0, seen, 1), 1)[:, None]
-
-
-def undistort__by_roots(pixels, K, k):
-    out = []
-    for pixel in pixels:
-        x = np.linalg.solve(K, [*pixel, 1.0])[:2]
-        seen = np.linalg.norm(x)
-        roots = np.roots([k[1], 0, k[0], 0, 1, -seen])
-        real = roots[np.abs(roots.imag) < 1e-9].real
-        r = min(real[real >= 0], default=0.0)
-        out.append((K @ [*(x * (r / seen if seen else 1.0)), 1.0])[:2])
-    return np.array(out)

@@ -4,17 +4,12 @@ import numpy as np
 
 from labkit.course.topics.t07_grasp.grasp_pose import pose, unit
 from labkit.course.topics.t07_grasp.pad_slice import in_grasp, middle_and_width
-from labkit.course.topics.t07_grasp.points_in_fingers import in_boxes, moved
+from labkit.course.topics.t07_grasp.points_in_fingers import in_boxes
 
 
 def closing_yaw__across_the_long_axis(Sigma):
     x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, -1]
     return np.arctan2(y, x) - np.pi / 2
-
-
-def closing_yaw__svd(Sigma):
-    axes, _, _ = np.linalg.svd(Sigma[:2, :2])
-    return float(np.arctan2(*axes[::-1, -1]))
 
 
 def closing_yaw__torch(Sigma):
@@ -34,16 +29,6 @@ def closing_yaw__formula(Sigma):
     return (long + np.pi / 2) % np.pi
 
 
-def closing_yaw__fan(Sigma):
-    low, high = 0.0, np.pi
-    for _ in range(12):  # a fan of directions, ever finer round the one of least variance
-        yaws = np.linspace(low, high, 61)
-        d = np.stack([np.cos(yaws), np.sin(yaws)])
-        best = yaws[np.einsum("in,ij,jn->n", d, Sigma[:2, :2], d).argmin()]
-        low, high = best - (high - low) / 20, best + (high - low) / 20
-    return best
-
-
 def grasp_height__torch(P, table_z, palm, tips, clearance):
     import torch
 
@@ -55,18 +40,6 @@ def grasp_height__torch(P, table_z, palm, tips, clearance):
 def grasp_height__float32(P, table_z, palm, tips, clearance):
     z = P[:, 2].astype(np.float32)
     return np.float32(max(z.max() - np.float32(palm), z.min(), np.float32(table_z + clearance)) + np.float32(tips))
-
-
-def grasp_height__loops(P, table_z, palm, tips, clearance):
-    low, high = float("inf"), -float("inf")
-    for _, _, z in P.tolist():
-        low, high = min(low, z), max(high, z)
-    bound = high - palm
-    if low > bound:
-        bound = low
-    if table_z + clearance > bound:
-        bound = table_z + clearance
-    return bound + tips
 
 
 def grasp_pose__crossed(position, approach, closing):
@@ -94,12 +67,6 @@ def grasp_pose__float32(position, approach, closing):
     return grasp_pose__crossed(position, approach, closing).astype(np.float32)
 
 
-def grasp_pose__qr(position, approach, closing):
-    z, y = np.linalg.qr(np.column_stack([approach, closing]))[0].T
-    z = z * np.sign(z @ approach)
-    return pose(np.cross(y, z), y, z, position)
-
-
 def pad_slice__float32(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp).astype(np.float32)
     return middle_and_width(y[np.abs(x) <= np.float32(half)])
@@ -110,27 +77,9 @@ def pad_slice__by_inverse(P, T_base_grasp, half):
     return middle_and_width(homogeneous[np.abs(homogeneous[:, 0]) <= half, 1])
 
 
-def pad_slice__loops(P, T_base_grasp, half):
-    low, high = float("inf"), -float("inf")
-    for p in P:
-        x, y = (float(np.dot(T_base_grasp[:3, k], p - T_base_grasp[:3, 3])) for k in (0, 1))
-        if -half <= x <= half:
-            low, high = min(low, y), max(high, y)
-    return (low + (high - low) / 2, high - low) if high >= low else (0.0, 0.0)
-
-
-def points_in_fingers__einsum(P, T_base_grasp, *boxes):
-    x, y, z = np.einsum("ik,ni->kn", T_base_grasp[:3, :3], P - T_base_grasp[:3, 3])
-    return in_boxes(x, y, z, *boxes)
-
-
 def points_in_fingers__float32(P, T_base_grasp, *boxes):
     R, t = T_base_grasp[:3, :3].astype(np.float32), T_base_grasp[:3, 3]
     return in_boxes(*((P - t).astype(np.float32) @ R).T, *boxes)
-
-
-def points_in_fingers__by_inverse(P, T_base_grasp, width, half, thickness, tips):
-    return in_boxes(*moved(P, np.linalg.inv(T_base_grasp)), width, half, thickness, tips)
 
 
 def points_in_fingers__loops(P, T_base_grasp, width, half, thickness, tips):
@@ -147,11 +96,6 @@ def slip_across__torch(T_base_grasp, middle):
     T = torch.from_numpy(T_base_grasp)
     x, y, _ = torch.linalg.solve(T[:3, :3], torch.from_numpy(np.asarray(middle)) - T[:3, 3])
     return 1000.0 * y.abs(), 1000.0 * x.abs()
-
-
-def slip_across__by_inverse(T_base_grasp, middle):
-    off = np.linalg.inv(T_base_grasp) @ np.append(middle, 1.0)
-    return abs(1000.0 * off[1]), abs(1000.0 * off[0])
 
 
 def slip_across__by_products(T_base_grasp, middle):

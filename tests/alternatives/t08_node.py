@@ -4,16 +4,8 @@ import struct
 
 import numpy as np
 
-from labkit.course.topics.t08_node.pack_cloud import finite
 from labkit.course.topics.t08_node.pose_at import neighbours, outside
 from labkit.course.topics.t08_node.quaternion import quaternion
-
-
-def decode_depth__struct(data, height, width, step, is_bigendian):
-    row = struct.Struct(f"{'>' if is_bigendian else '<'}{width}H")
-    numbers = np.array([row.unpack_from(bytes(data), v * step) for v in range(height)], np.float32)
-    numbers[numbers == 0] = np.nan
-    return numbers / np.float32(1000)
 
 
 def decode_depth__torch(data, height, width, step, is_bigendian):
@@ -24,17 +16,6 @@ def decode_depth__torch(data, height, width, step, is_bigendian):
     high, low = (0, 1) if is_bigendian else (1, 0)
     numbers = 256 * pairs[..., high] + pairs[..., low]
     return torch.where(numbers > 0, numbers / 1000, torch.nan)
-
-
-def decode_depth__loops(data, height, width, step, is_bigendian):
-    depth = np.full((height, width), np.nan)
-    for v in range(height):
-        for u in range(width):
-            first, second = int(data[v * step + 2 * u]), int(data[v * step + 2 * u + 1])
-            number = 256 * first + second if is_bigendian else first + 256 * second
-            if number:
-                depth[v, u] = number / 1000.0
-    return depth
 
 
 def decode_depth__strided(data, height, width, step, is_bigendian):
@@ -55,13 +36,6 @@ def pack_cloud__torch(P):
     cloud = cloud[torch.isfinite(cloud).all(dim=1)].to(torch.float32)
     numbers = torch.cat([cloud, torch.zeros(len(cloud), 1)], dim=1)
     return numbers.contiguous().view(torch.uint8).reshape(-1)
-
-
-def pack_cloud__structured(P):
-    points = np.zeros(len(finite(P)), np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("pad", "V4")]))
-    for axis, name in enumerate("xyz"):
-        points[name] = finite(P)[:, axis]
-    return np.frombuffer(points.tobytes(), np.uint8)
 
 
 def pair_stamps__torch(a, b, slop):
@@ -88,20 +62,6 @@ def pair_stamps__loops(a, b, slop):
     return np.array(found, int)
 
 
-def pair_stamps__by_searching(a, b, slop):
-    def nearest(of, among):
-        after = np.searchsorted(among, of).clip(0, len(among) - 1)
-        before = (after - 1).clip(0)
-        best = np.where(np.abs(of - among[before]) <= np.abs(among[after] - of), before, after)
-        return np.searchsorted(among, among[best])  # the first of equal stamps
-
-    if len(b) == 0:
-        return np.full(len(a), -1)
-    best = nearest(a, b)
-    mutual = nearest(b, a)[best] == np.arange(len(a))
-    return np.where(mutual & (np.abs(a - b[best]) <= slop), best, -1)
-
-
 def pose_at__torch(stamps, positions, quaternions, t):
     import torch
 
@@ -126,23 +86,6 @@ def pose_at__by_a_frame(stamps, positions, quaternions, t):
     return outside(stamps, t) or (np.array(place), -turn)
 
 
-def pose_at__by_an_angle(stamps, positions, quaternions, t):
-    """Turn from a by a share of the rotation from a to b, whose axis and angle its quaternion says."""
-
-    def product(p, q):
-        v = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
-        return np.array([*v, p[3] * q[3] - p[:3] @ q[:3]])
-
-    i, share = neighbours(stamps, t)
-    a, b = quaternions[i], quaternions[i + 1]
-    x = product(b, a * [-1.0, -1.0, -1.0, 1.0])
-    x = x if x[3] >= 0.0 else -x
-    sine = np.linalg.norm(x[:3])
-    half = share * np.arctan2(sine, x[3])
-    part = np.array([*(np.sin(half) * x[:3] / max(sine, 1e-12)), np.cos(half)])
-    return outside(stamps, t) or (positions[i] + share * (positions[i + 1] - positions[i]), product(part, a))
-
-
 def quaternion__the_other_of_two(R):
     return -quaternion(R)
 
@@ -159,16 +102,3 @@ def quaternion__eigen(R):
     S[:3, 3] = S[3, :3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     S[3, 3] = np.trace(R)
     return np.linalg.eigh(S)[1][:, -1].astype(np.float32)
-
-
-def quaternion__cases(R):
-    i = int(np.argmax([*np.diag(R), np.trace(R)]))
-    j, k = (i + 1) % 3, (i + 2) % 3
-    if i == 3:
-        w = 0.5 * np.sqrt(1.0 + np.trace(R))
-        return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w**2]) / (4.0 * w)
-    q = np.zeros(4)
-    q[i] = 0.5 * np.sqrt(1.0 + R[i, i] - R[j, j] - R[k, k])
-    q[j], q[k] = (R[i, j] + R[j, i]) / (4.0 * q[i]), (R[i, k] + R[k, i]) / (4.0 * q[i])
-    q[3] = (R[k, j] - R[j, k]) / (4.0 * q[i])
-    return q

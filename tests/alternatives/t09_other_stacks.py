@@ -20,38 +20,11 @@ def choose_region__torch(features, mean, covariance, allowed):
     return distance.argmin() + 1 if allowed.any() else 0
 
 
-def choose_region__loops(features, mean, covariance, allowed):
-    best, number, P = np.inf, 0, np.linalg.inv(covariance)
-    for i in range(len(features)):
-        off = features[i] - mean
-        if allowed[i] and off @ P @ off < best:
-            best, number = off @ P @ off, i + 1
-    return number
-
-
-def choose_region__einsum(features, mean, covariance, allowed):
-    off = features - mean
-    return chosen(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off), allowed)
-
-
 def engine_contract__torch(reference, other, tolerance):
     z, y = torch.from_numpy(np.array(reference)), torch.from_numpy(np.array(other))
     best = z.topk(2, dim=0).values
     changed = ((z.argmax(0) != y.argmax(0)) | y.isnan().any(0)).double().mean()
     return ((z - y).abs() <= tolerance).all(), changed, (best[0] - best[1] <= 2 * tolerance).double().mean()
-
-
-def engine_contract__loops(reference, other, tolerance):
-    _C, H, W = reference.shape
-    kept, changed, close = True, 0, 0
-    for v in range(H):
-        for u in range(W):
-            z, y = reference[:, v, u].tolist(), other[:, v, u].tolist()
-            kept = kept and all(abs(a - b) <= tolerance for a, b in zip(z, y, strict=True))
-            changed += any(b != b for b in y) or z.index(max(z)) != y.index(max(y))
-            best, second = sorted(z)[:-3:-1]
-            close += best - second <= 2 * tolerance
-    return kept, changed / (H * W), close / (H * W)
 
 
 def engine_contract__without_the_best(reference, other, tolerance):
@@ -69,33 +42,11 @@ def enlarge__torch(labels, size):
     return torch.nn.functional.interpolate(image, size[::-1], mode="nearest-exact")[0, 0].long()
 
 
-def enlarge__loops(labels, size):
-    W, H = size
-    h, w = labels.shape
-    out = np.zeros((H, W), labels.dtype)
-    for v in range(H):
-        for u in range(W):
-            out[v, u] = labels[int((v + 0.5) * h / H), int((u + 0.5) * w / W)]
-    return out
-
-
 def enlarge__take(labels, size):
     rows, columns = (
         ((np.arange(n) + 0.5) * old / n).astype(int) for n, old in zip(size[::-1], labels.shape, strict=True)
     )
     return labels.take(rows, axis=0).take(columns, axis=1)
-
-
-def hsv_mask__by_table(hsv, lower, upper):
-    hues = np.zeros(256, bool)
-    hue = int(lower[0])
-    while True:
-        hues[hue] = True
-        if hue == int(upper[0]):
-            break
-        hue = (hue + 1) % 180
-    s, v = hsv[..., 1], hsv[..., 2]
-    return hues[hsv[..., 0]] * (s >= lower[1]) * (s <= upper[1]) * (v >= lower[2]) * (v <= upper[2])
 
 
 def hsv_mask__torch(hsv, lower, upper):
@@ -104,17 +55,6 @@ def hsv_mask__torch(hsv, lower, upper):
     above, below = x >= low, x <= high
     hue = above[..., 0] | below[..., 0] if low[0] > high[0] else above[..., 0] & below[..., 0]
     return hue & (above & below)[..., 1:].all(dim=-1)
-
-
-def hsv_mask__loops(hsv, lower, upper):
-    mask = np.zeros(hsv.shape[:2], bool)
-    for v in range(hsv.shape[0]):
-        for u in range(hsv.shape[1]):
-            h, s, x = (int(value) for value in hsv[v, u])
-            round_ = lower[0] > upper[0]
-            hue = (h >= lower[0] or h <= upper[0]) if round_ else lower[0] <= h <= upper[0]
-            mask[v, u] = hue and lower[1] <= s <= upper[1] and lower[2] <= x <= upper[2]
-    return mask
 
 
 def hsv_mask__modulo(hsv, lower, upper):
@@ -133,21 +73,6 @@ def make_blob__einsum(bgr, multiple):
     return np.einsum("hwc,dc->dhw", padded(bgr, multiple).astype(np.float32), swap / np.float32(255))[None]
 
 
-def make_blob__loops(bgr, multiple):
-    H, W, _ = bgr.shape
-    tall, wide = H, W
-    while tall % multiple:
-        tall += 1
-    while wide % multiple:
-        wide += 1
-    blob = np.zeros((1, 3, tall, wide), np.float32)
-    for v in range(H):
-        for u in range(W):
-            for c in range(3):
-                blob[0, c, v, u] = bgr[v, u, 2 - c] / 255.0
-    return blob
-
-
 def measure_pieces__einsum(pieces):
     H, W = pieces.shape
     member = pieces[None] == np.arange(1, pieces.max() + 1)[:, None, None]
@@ -156,22 +81,6 @@ def measure_pieces__einsum(pieces):
     columns, rows = member.any(axis=1), member.any(axis=2)
     last = W - 1 - columns[:, ::-1].argmax(axis=1), H - 1 - rows[:, ::-1].argmax(axis=1)
     return area, middle / area[:, None], np.stack([columns.argmax(axis=1), rows.argmax(axis=1), *last], axis=1)
-
-
-def measure_pieces__loops(pieces):
-    n = int(pieces.max())
-    area, total = [0] * n, [[0, 0] for _ in range(n)]
-    box = [[10**9, 10**9, -1, -1] for _ in range(n)]
-    for v in range(pieces.shape[0]):
-        for u in range(pieces.shape[1]):
-            i = int(pieces[v, u]) - 1
-            if i >= 0:
-                area[i] += 1
-                total[i][0] += u
-                total[i][1] += v
-                box[i] = [min(box[i][0], u), min(box[i][1], v), max(box[i][2], u), max(box[i][3], v)]
-    area = np.array(area)
-    return area, np.array(total) / area[:, None], np.array(box)
 
 
 def measure_pieces__bincount(pieces):
