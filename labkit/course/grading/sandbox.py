@@ -90,7 +90,7 @@ class Server:
     """A sandbox with some packages loaded, in which `fork` starts a fresh child for each answer, one at a time."""
 
     def __init__(self, packages: Sequence[str], limits: Limits):
-        self.packages, self.limits = tuple(packages), limits
+        self.packages, self.limits, self.forked = tuple(packages), limits, False
         ours, theirs = socket.socketpair()
         with theirs:
             command = [*bubblewrap(self.packages), options_for(packages, limits, unsafe=False)]
@@ -103,13 +103,14 @@ class Server:
 
     def hears(self, word: bytes, seconds: float) -> bool:
         """Whether the server says a word in time."""
-        self.control.settimeout(seconds)
-        with suppress(OSError):
+        with suppress(OSError):  # of a server that has ended, too
+            self.control.settimeout(seconds)
             return self.control.recv(1) == word
         return False
 
     def fork(self) -> Worker:
         """Start a child that has the packages and the limits, and has run nothing yet."""
+        self.forked = True
         requests, to_child = os.pipe()
         from_child, replies = os.pipe()
         try:
@@ -185,13 +186,26 @@ def fresh_worker(packages: Sequence[str], limits: Limits, unsafe: bool = False) 
         with plain_worker(packages, limits) as started:
             yield started
         return
-    server = servers.take(packages, limits)
+    server, started = greeted(packages, limits)
     try:
-        with server.fork() as started:
-            started.greet(limits.start_s)
+        with started:
             yield started
     finally:
         servers.give_back(server)
+
+
+def greeted(packages: Sequence[str], limits: Limits) -> tuple[Server, Worker]:
+    """A server with a child that is ready; a server that ended while it was idle is replaced, which costs nobody."""
+    while True:
+        server = servers.take(packages, limits)
+        is_new, started = not server.forked, server.fork()
+        try:
+            started.greet(limits.start_s)
+            return server, started
+        except WorkerLost:
+            server.close()
+            if is_new:
+                raise
 
 
 def plain_worker(packages: Sequence[str], limits: Limits) -> Worker:

@@ -33,15 +33,16 @@ the kernel:  keyctl 250 219, add_key 248 217, request_key 249 218, bpf 321 280, 
              io_uring_setup 425 425, userfaultfd 323 282, socket 41 198, syslog 103 116
 """
 PRLIMIT = (302, 261)  # refused for any process but the own one, which has the number 0 here
-FCNTL = (72, 25)
-# Commands of fcntl that lock or watch a file: F_SETLK, F_SETLKW, F_OFD_SETLK, F_OFD_SETLKW, F_SETLEASE, F_NOTIFY.
-LOCKS = (6, 7, 37, 38, 1024, 1026)
+# Calls that are refused for some values of an argument: numbers of the call, the argument, the values.
+# fcntl that locks or watches a file: F_SETLK, F_SETLKW, F_OFD_SETLK, F_OFD_SETLKW, F_SETLEASE, F_NOTIFY.
+# madvise that moves pages in or out: MADV_WILLNEED, MADV_COLD, MADV_PAGEOUT, MADV_POPULATE_READ, MADV_POPULATE_WRITE.
+BY_ARGUMENT = (((72, 25), 2, (6, 7, 37, 38, 1024, 1026)), ((28, 233), 3, (3, 20, 21, 22, 23)))
 CLONE, CLONE3 = (56, 220), (435, 435)
 CLONE_THREAD = 0x00010000
 X32_CALLS = 0x40000000  # the x32 calls of an x86-64 kernel: other numbers for the same things
 
 LOAD, JUMP_IF_EQUAL, JUMP_IF_GREATER_EQUAL, JUMP_IF_SET, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-NUMBER, ARCHITECTURE, FIRST_ARGUMENT, SECOND_ARGUMENT = 0, 4, 16, 24  # where they stand in struct seccomp_data
+NUMBER, ARCHITECTURE, FIRST_ARGUMENT = 0, 4, 16  # where they stand in struct seccomp_data; 8 bytes an argument
 ALLOW, KILL = 0x7FFF0000, 0x80000000
 
 
@@ -68,10 +69,12 @@ def program(machine: str | None = None) -> bytes:
             lines += [(JUMP_IF_EQUAL, 0, 1, number), (RETURN, 0, 0, refuse(errno.EPERM))]
     lines += [(JUMP_IF_EQUAL, 0, 4, PRLIMIT[column]), (LOAD, 0, 0, FIRST_ARGUMENT), (JUMP_IF_EQUAL, 0, 1, 0)]
     lines += [(RETURN, 0, 0, ALLOW), (RETURN, 0, 0, refuse(errno.EPERM))]
-    lines += [(JUMP_IF_EQUAL, 0, 2 * len(LOCKS) + 2, FCNTL[column]), (LOAD, 0, 0, SECOND_ARGUMENT)]
-    for command in LOCKS:
-        lines += [(JUMP_IF_EQUAL, 0, 1, command), (RETURN, 0, 0, refuse(errno.EPERM))]
-    lines += [(RETURN, 0, 0, ALLOW)]
+    for call, position, values in BY_ARGUMENT:
+        argument = FIRST_ARGUMENT + 8 * (position - 1)
+        lines += [(JUMP_IF_EQUAL, 0, 2 * len(values) + 2, call[column]), (LOAD, 0, 0, argument)]
+        for value in values:
+            lines += [(JUMP_IF_EQUAL, 0, 1, value), (RETURN, 0, 0, refuse(errno.EPERM))]
+        lines += [(RETURN, 0, 0, ALLOW)]
     # The flags of clone3 are in memory, where a filter cannot look; told that there is no such call, libc uses clone.
     lines += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, refuse(errno.ENOSYS))]
     lines += [(JUMP_IF_EQUAL, 1, 0, CLONE[column]), (RETURN, 0, 0, ALLOW), (LOAD, 0, 0, FIRST_ARGUMENT)]

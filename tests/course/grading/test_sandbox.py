@@ -137,6 +137,9 @@ def test_memory_a_file_and_the_time_of_a_processor_have_an_end(worker):
         "fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_RDLCK)",
         "fcntl.fcntl(os.open('/', 0), fcntl.F_NOTIFY, fcntl.DN_ACCESS)",
         "0 if libc.syscall(162) == 0 else 1 / 0",  # sync
+        "0 if libc.madvise(mapped, 4096, 3) == 0 else 1 / 0",  # MADV_WILLNEED
+        "0 if libc.madvise(mapped, 4096, 20) == 0 else 1 / 0",  # MADV_COLD
+        "0 if libc.madvise(mapped, 4096, 21) == 0 else 1 / 0",  # MADV_PAGEOUT
     ],
 )
 def test_system_calls_that_answers_do_not_need_are_refused(worker, call):
@@ -272,11 +275,20 @@ def test_no_answer_finds_what_an_earlier_one_left():
     with sandbox.fresh_worker(("numpy",), LIMITS) as second:
         kept, other = told(second, look)
     assert kept == 0 and other != number
-    (server,) = sandbox.servers.idle[("numpy",), LIMITS]
-    server.process.kill()
-    server.process.wait()
-    with sandbox.fresh_worker(("numpy",), LIMITS) as third:  # a server that ended is replaced
-        assert told(third, "return 2") == 2
+
+
+def test_a_server_that_ended_costs_nobody_and_one_that_an_answer_ends_costs_that_answer():
+    with sandbox.fresh_worker(("numpy",), LIMITS):
+        pass
+    (idle,) = sandbox.servers.idle[("numpy",), LIMITS]
+    idle.control.close()  # its process is alive, as that of a server is which ends right now
+    with sandbox.fresh_worker(("numpy",), LIMITS) as started:
+        assert told(started, "return 2") == 2
+        started.kill.__self__.close()
+        with pytest.raises(WorkerLost):
+            started.ask(("run", "f", "1"), 5.0)
+    with sandbox.fresh_worker(("numpy",), LIMITS) as started:
+        assert told(started, "return 2") == 2
 
 
 def test_closing_ends_everything():
