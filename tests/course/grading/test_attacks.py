@@ -127,20 +127,6 @@ def test_an_odd_submission_is_graded_or_has_its_reason(hostile_class, odd):
     assert said.startswith(odd.says or "right in all")
 
 
-def test_no_attack_and_no_odd_submission_is_accepted_or_rejected_falsely(hostile_class, capsys):
-    records = hostile_class[2]
-    accepted = [attack.name for attack in ATTACKS if points(records[attack.name])["iou"] > 0.0]
-    graded = {odd.name: points(records[name_of(odd.name)]).get("iou", 0.0) for odd in ODD}
-    accepted += [odd.name for odd in ODD if graded[odd.name] > 0.0 and not odd.right]
-    rejected = [odd.name for odd in ODD if graded[odd.name] == 0.0 and odd.right]
-    with capsys.disabled():
-        right = sum(odd.right for odd in ODD)
-        wrong = len(ATTACKS) + len(ODD) - right
-        print(f"\n{len(ATTACKS)} attacks, {len(ODD)} odd submissions: ", end="")
-        print(f"false accepts {len(accepted)} of {wrong}, false rejects {len(rejected)} of {right}")
-    assert not accepted and not rejected
-
-
 def test_the_honest_student_keeps_the_grade(hostile_class):
     course, _, records, _ = hostile_class
     assert records["honest"].points == REST + POINTS["iou"]

@@ -1,4 +1,7 @@
-"""A class of synthetic students over all labs: every grade as constructed, nothing wrong passes or right fails."""
+"""A class of synthetic students over all labs: every grade as constructed, nothing wrong passes or right fails.
+
+Students hand in all misconceptions, alternatives and spoilt answers; the attacks are in test_attacks.
+"""
 
 import grading_course as kit
 import pytest
@@ -8,7 +11,6 @@ from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import TOPICS
 
 SEED = "a hidden seed"
-totals = {"students": 0, "wrong": 0, "accepted": 0, "right": 0, "rejected": 0}
 
 
 @pytest.mark.parametrize("topic", TOPICS)
@@ -21,21 +23,7 @@ def test_every_grade_is_as_constructed(topic, tmp_path):
     assert [record.student for record in graded.records] == sorted(students)
     odd = []
     for record in graded.records:
-        totals["students"] += 1
         for result in record.results:
             expected, got = students[record.student][1][result.question], result.points == result.max_points
-            totals["right" if expected else "wrong"] += 1
-            totals["rejected" if expected else "accepted"] += got != expected
             odd += [(record.student, result)] if got != expected else []
     assert not odd
-
-
-def test_no_false_accepts_and_no_false_rejects(capsys):
-    """Over all misconceptions, alternatives and spoilt answers; those of tests/attacks are in test_grading_attacks."""
-    with capsys.disabled():
-        print(
-            "\n{students} synthetic students: false accepts {accepted} of {wrong}, "
-            "false rejects {rejected} of {right}".format(**totals)
-        )
-    assert totals["students"] >= 100 and totals["wrong"] > 200 and totals["right"] > 200
-    assert totals["accepted"] == totals["rejected"] == 0
