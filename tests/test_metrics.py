@@ -114,18 +114,6 @@ def test_counts_and_scores_agree_with_scikit_learn(seed):
     np.testing.assert_allclose(recall, sklearn.metrics.recall_score(*pair, average=None), rtol=1e-14)
 
 
-@untimed
-@given(label_pairs())
-def test_iou_is_intersection_over_union_of_the_masks_and_nan_without_either(pair):
-    y_true, y_pred = pair
-    scores = metrics.iou(metrics.confusion_matrix(y_true, y_pred, C))
-    for c in range(C):
-        true, pred = y_true == c, (y_pred == c) & (y_true != 255)
-        union = np.count_nonzero(true | pred)
-        expected = np.count_nonzero(true & pred) / union if union else np.nan
-        np.testing.assert_equal(scores[c], expected)
-
-
 @pytest.mark.parametrize(
     ("n", "iou", "mean", "accuracy"),
     [

@@ -64,11 +64,6 @@ def test_free_energy_bounds_log_Z_and_falls_with_every_sweep(seed, connectivity)
     assert falling[-1] >= -log_partition(crf)
 
 
-def test_the_free_energy_of_independent_pixels_is_minus_log_Z():
-    crf = random_crf(7, 3, 4, 2, lam=0.0)
-    assert free_energy(crf, softmax(-crf.unary, axis=2)) == pytest.approx(-log_partition(crf))
-
-
 def test_mean_field_stops_where_each_pixel_is_the_softmax_of_its_mean_cost():
     crf = random_crf(6, 4, 5, 3, 4, lam=0.4)
     q = mean_field_marginals(crf, 200)
