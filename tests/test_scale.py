@@ -18,6 +18,7 @@ from labkit.support.executors import executor_for
 pytest.importorskip("distributed")
 ROOT = Path(__file__).parent.parent
 HERE = ("--host", "tcp://127.0.0.1")
+PATIENCE = 240  # seconds
 
 
 def start(*words: str, path: Path = ROOT) -> subprocess.Popen:
@@ -53,7 +54,7 @@ def cluster(tmp_path_factory):
 def two_workers(cluster):
     client, worker = cluster
     workers = [worker(), worker()]
-    client.wait_for_workers(2, timeout=60)
+    client.wait_for_workers(2, timeout=PATIENCE)
     return client, workers
 
 
@@ -78,7 +79,7 @@ def test_a_worker_killed_in_the_middle_costs_nothing_but_time(two_workers, tmp_p
                 return future
 
         data_gen.generate(tmp_path / "there", seeds, "test", (64, 48), Watched(), progress=False)
-    assert workers[0].wait(timeout=30) == -signal.SIGKILL
+    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
     assert files(tmp_path / "there") == files(tmp_path / "here")
 
 
@@ -102,7 +103,7 @@ def test_a_worker_with_another_kit_is_refused_in_a_line(cluster, tmp_path):
         file.write("# newer\n")
     before = len(client.scheduler_info()["workers"])
     other = worker(tmp_path)
-    client.wait_for_workers(before + 1, timeout=60)
+    client.wait_for_workers(before + 1, timeout=PATIENCE)
     refused = pytest.raises(ValueError, match=r"dask: expected workers with labkit .*, got .* at tcp://")
     with refused, executor_for(dask=client.scheduler.address):
         pass

@@ -204,7 +204,8 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
         "def iou(n):\n    x = 1\n    return helper(n)",
         "iou = check('04_iou.iou', iou)",
         "def iou(n):\n    while True: pass",
-        "import labkit.course.checking; labkit.course.checking.LIMIT_S = 0.3\niou = check('04_iou.iou', iou)",
+        "from labkit.course import checking\nlimit, checking.LIMIT_S = checking.LIMIT_S, 0.3\n"
+        "iou = check('04_iou.iou', iou)\nchecking.LIMIT_S = limit",
         "def iou(n):\n    i = np.diag(n)\n    with np.errstate(invalid='ignore'):\n"
         "        return i / (n.sum(0) + n.sum(1) - i)",
         "mine = iou\niou = check('04_iou.iou', iou)\nprint(iou is mine)",

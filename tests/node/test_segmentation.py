@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from peers import MS, small, wait_for
+from peers import MS, PATIENCE, small, wait_for
 from scenes import box, scene
 
 from labkit.labels import SURFACE, one_hot, overlay
@@ -127,7 +127,7 @@ def test_a_slow_node_answers_the_newest_of_a_fast_camera(frame):
 
     def slow(rgb):
         entered.set()
-        assert go_on.wait(10)
+        assert go_on.wait(PATIENCE)
         return one_hot(frame.labels).astype(np.float32)
 
     out = Listener(bus, "mask")
@@ -135,7 +135,7 @@ def test_a_slow_node_answers_the_newest_of_a_fast_camera(frame):
     camera = Camera(bus)
     with spinning(node):
         camera.publish(frame, 0)
-        assert entered.wait(10)
+        assert entered.wait(PATIENCE)
         for stamp in (1, 2, 3):  # while the first is worked on
             camera.publish(frame, stamp * 100 * MS)
         go_on.set()
@@ -226,7 +226,7 @@ def test_a_broken_stage_ends_a_frame_and_not_the_node(frame, caplog):
 
 
 def test_a_frame_waits_for_its_transform_and_without_one_it_is_skipped(frame, caplog):
-    node, camera, _, bus = system(frame, patience=5.0)
+    node, camera, _, bus = system(frame, patience=PATIENCE)
     send(bus, messages(frame, 50 * MS))
     late = threading.Timer(0.1, camera.publish, (frame, 50 * MS))  # brings the transform, and another frame
     late.start()

@@ -385,15 +385,14 @@ def test_an_endless_loop_ends_and_is_not_called_again(answer):
         calls.append(1)
         return answer(n)
 
-    found = judge(QUESTION, counted, seed=3, limit_s=0.2)
+    found = judge(QUESTION, counted, seed=3, limit_s=0.5)
     assert found.problem.kind == "time" and found.case == 0
     assert len(calls) == 1
 
 
 def test_the_time_is_for_all_cases_together():
-    outputs, _ = run(lambda n: time.sleep(0.15) or 1.0, [(1,)] * 6, limit_s=0.4)
-    kinds = [isinstance(got, Problem) for got in outputs]
-    assert kinds == sorted(kinds) and not kinds[0] and kinds[-1] and len(kinds) == 6
+    outputs, _ = run(lambda seconds: time.sleep(seconds) or 1.0, [(0.0,), (2.0,), (2.0,), (0.0,)], limit_s=3.0)
+    assert [getattr(got, "kind", "right") for got in outputs] == ["right", "right", "time", "time"]
 
 
 def test_another_alarm_is_set_again():
@@ -403,7 +402,7 @@ def test_another_alarm_is_set_again():
     try:
         assert kind(lambda n: iou(n)) is None
         judge(QUESTION, forever, seed=3, limit_s=0.1)
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 60
         while not rung and time.monotonic() < deadline:
             time.sleep(0.01)
         assert rung == [1]

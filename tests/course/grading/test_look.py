@@ -31,7 +31,8 @@ LEAVES = "import os\n\ndef iou(n):\n    os._exit(0)\n"
 
 
 def run_of(source: str) -> Run:
-    return Run(find("04_iou.iou"), Program((("iou", source),)), Limits(question_s=10.0), unsafe=False)
+    limits = Limits(question_s=1.0 if "while" in source else 200.0)
+    return Run(find("04_iou.iou"), Program((("iou", source),)), limits, unsafe=False)
 
 
 def test_the_students_line_is_told():

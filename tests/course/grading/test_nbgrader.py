@@ -82,7 +82,6 @@ def test_a_score_that_is_not_the_kits_is_put_right(course):
     assert grade(course).graded_now == 0 and scores(course) == POINTS
 
 
-@pytest.mark.timeout(600)
 def test_formgraders_button_refuses_too(course, tmp_path_factory):
     """What the bolt in formgrader's table asks its server for, whose log it then shows."""
     with serving.jupyterlab(course, tmp_path_factory.mktemp("jupyter")) as url:
