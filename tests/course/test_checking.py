@@ -29,7 +29,7 @@ QUESTION = Question(
     reference=share,
     inputs=lambda rng: (rng.random((2, 3)) + 0.1,),
     by_hand=((np.array([[1.0, 3.0]]),),),
-    properties=(Property("shares are not over two", lambda args, got: bool(np.max(got) <= 2)),),
+    properties=[Property("shares are not over two", lambda n, got: bool(np.max(got) <= 2))],
     misconceptions=[Misconception(lambda n: n / n.sum(axis=1, keepdims=True), "Do all of them sum to one?")],
 )
 

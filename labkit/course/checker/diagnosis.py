@@ -223,7 +223,7 @@ def fulfilled(prop: Property, case: Case, got: object) -> bool:
     """Whether a property holds; one that cannot even be computed counts as held."""
     try:
         with np.errstate(all="ignore"):
-            return bool(prop.holds(copy.deepcopy(case.args), copy.deepcopy(got)))
+            return bool(prop.holds(*copy.deepcopy(case.args), copy.deepcopy(got)))
     except Exception:
         return True
 

@@ -25,39 +25,45 @@ class Misconception:
 
 @dataclass(frozen=True)
 class Property:
-    """Something that every right answer fulfils: in words, and as a function (arguments, output) -> bool."""
+    """Something that every right answer fulfils: in words, and as a function (*arguments, output) -> bool."""
 
     says: str
-    holds: Callable[[tuple, object], bool]
+    holds: Callable[..., bool]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Question:
     """One blank of a lab: a function of arrays to an array, a number, or a tuple of these.
 
-    name: "04_iou.iou", the topic and the function's name, which is the grade id of its cell. reference: the right
-    answer, short and complete in itself. inputs: function of a numpy Generator to the arguments of one random case,
-    asymmetric so that swaps show. by_hand: arguments of cases small enough to do by hand; each is always tried.
-    random_cases: how many cases are drawn. rtol, atol: which fractions count as equal; integers and truth values are
-    compared exactly. same_dtype: whether the dtype is asked for, too. points: what the blank is worth. properties: what
-    the check may say about a wrong output that nothing else explains. misconceptions: filled by `wrong`.
-    canonical: maps an output to the one form of those that are equally right (the sign of an axis, say). forbidden:
-    modules that would do the work; they do not exist where answers are graded.
+    reference: the right answer, short and complete in itself. name: "04_iou.iou", the topic and the function's name,
+    which is the grade id of its cell; by default where the reference stands, labkit.course.topics.t04_iou.iou. inputs:
+    function of a numpy Generator to the arguments of one random case, asymmetric so that swaps show. by_hand: arguments
+    of cases small enough to do by hand; each is always tried. random_cases: how many cases are drawn. rtol, atol: which
+    fractions count as equal; integers and truth values are compared exactly. same_dtype: whether the dtype is asked
+    for, too. points: what the blank is worth. properties: what the check may say about a wrong output that nothing else
+    explains, filled by `holds`; misconceptions, by `wrong`. canonical: maps an output to the one form of those that are
+    equally right (the sign of an axis, say). forbidden: modules that would do the work; they do not exist where answers
+    are graded.
     """
 
-    name: str
     reference: Callable
     inputs: Callable[[np.random.Generator], tuple]
+    name: str = ""
     by_hand: tuple[tuple, ...] = ()
     random_cases: int = 4
     rtol: float = 1e-4
     atol: float = 1e-6
     same_dtype: bool = False
     points: int = 2
-    properties: tuple[Property, ...] = ()
+    properties: list[Property] = field(default_factory=list)
     misconceptions: list[Misconception] = field(default_factory=list)
     canonical: Callable = lambda output: output
     forbidden: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if not self.name:
+            *_, topic, function = self.reference.__module__.split(".")
+            object.__setattr__(self, "name", f"{topic.removeprefix('t')}.{function}")
 
     @property
     def topic(self) -> str:
@@ -80,25 +86,40 @@ class Question:
         return inspect.getsource(inspect.unwrap(self.reference))
 
 
-def wrong(question: Question, hint: str, **variants: Sequence) -> Callable[[Callable], Callable]:
-    """Decorate a wrong answer to a question: whoever's answer gives its outputs gets the hint.
+def wrong(hint: str, **variants: Sequence) -> Callable[[Callable], Callable]:
+    """Decorate a wrong answer to its module's QUESTION: whoever's answer gives its outputs gets the hint.
 
     variants: values of one more argument of the answer; with each it is a wrong answer of its own.
 
-    >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(),))
-    >>> @wrong(double, "Twice, not a power.", exponent=(2, 3))
+    >>> QUESTION = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(),))
+    >>> @wrong("Twice, not a power.", exponent=(2, 3))
     ... def power(x, exponent):
     ...     return x**exponent
-    >>> [misconception.name for misconception in double.misconceptions]
+    >>> [misconception.name for misconception in QUESTION.misconceptions]
     ['power exponent 2', 'power exponent 3']
     """
 
     def add(answer: Callable) -> Callable:
         given = [with_argument(answer, name, value) for name, values in variants.items() for value in values]
-        question.misconceptions.extend(Misconception(variant, hint) for variant in given or [answer])
+        question_beside(answer).misconceptions.extend(Misconception(variant, hint) for variant in given or [answer])
         return answer
 
     return add
+
+
+def holds(says: str) -> Callable[[Callable], Callable]:
+    """Decorate a function (*arguments, output) -> bool that is true of every right answer to its module's QUESTION."""
+
+    def add(function: Callable) -> Callable:
+        question_beside(function).properties.append(Property(says, function))
+        return function
+
+    return add
+
+
+def question_beside(function: Callable) -> Question:
+    """The QUESTION of the module that a function stands in."""
+    return inspect.unwrap(function).__globals__["QUESTION"]
 
 
 def with_argument(answer: Callable, name: str, value: object) -> Callable:

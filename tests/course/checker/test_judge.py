@@ -14,7 +14,7 @@ import torch
 from labkit.course.checker.comparison import Problem, compare, expected_cases, plain
 from labkit.course.checker.diagnosis import Sentence, recognise
 from labkit.course.checker.judge import verdict
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Misconception, Property, Question, wrong
 from labkit.course.checker.run import Printed, call, judge, run
 
 
@@ -28,22 +28,22 @@ QUESTION = Question(
     reference=iou,
     inputs=lambda rng: (rng.integers(1, 9, (3, 3)),),
     by_hand=((np.array([[3, 1], [2, 5]]),), (np.array([[3, 1, 0], [2, 5, 0], [0, 0, 0]]),)),
-    properties=(Property("no class has an IoU over one", lambda args, got: bool(np.nanmax(got) <= 1)),),
+    properties=[Property("no class has an IoU over one", lambda n, got: bool(np.nanmax(got) <= 1))],
 )
-PLAIN = replace(QUESTION, properties=(), misconceptions=[])
+PLAIN = replace(QUESTION, properties=[], misconceptions=[])
 
 
-@wrong(QUESTION, "who pays for false alarms?")
+@wrong("who pays for false alarms?")
 def recall(n):
     return np.diagonal(n) / n.sum(axis=1)
 
 
-@wrong(QUESTION, "one number per class")
+@wrong("one number per class")
 def whole(n):
     return np.trace(n) / n.sum()
 
 
-@wrong(QUESTION, "how many classes are there?")
+@wrong("how many classes are there?")
 def broken(n):
     return n[:, 7]
 
@@ -253,9 +253,8 @@ def test_one_that_behaves_so_on_some_cases_only_earns_none():
 
 
 def test_a_misconception_may_raise_where_the_answer_does():
-    question = replace(QUESTION, misconceptions=[])
-    sometimes = wrong(question, "hint")(lambda n: 2 * iou(n) if len(n) == 3 else n[9])
-    assert judge(question, sometimes, seed=3).hint == "hint"
+    sometimes = Misconception(lambda n: 2 * iou(n) if len(n) == 3 else n[9], "hint")
+    assert judge(replace(QUESTION, misconceptions=[sometimes]), sometimes.answer, seed=3).hint == "hint"
 
 
 def test_verdicts_are_made_of_outputs_that_came_from_anywhere():

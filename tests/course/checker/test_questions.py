@@ -166,7 +166,7 @@ def test_cases_are_the_seeds_and_hold_what_is_claimed(name):
     for case in (*first, *other):
         assert not isinstance(case.expected, Problem), case.expected
         for prop in question.properties:
-            assert prop.holds(case.args, case.expected), prop.says
+            assert prop.holds(*case.args, case.expected), prop.says
 
 
 def same(a, b) -> bool:

@@ -18,7 +18,6 @@ def _many_labels(rng):
 
 
 QUESTION = Question(
-    name="01_labels.class_shares",
     reference=class_shares,
     inputs=_many_labels,
     by_hand=(
@@ -37,69 +36,69 @@ def counts(y, C):
     return np.bincount(y[y != 255], minlength=C)
 
 
-@wrong(QUESTION, "Your shares do not add up to 1: which pixels did nobody judge?")
+@wrong("Your shares do not add up to 1: which pixels did nobody judge?")
 def of_all_pixels(y, C):
     return counts(y, C) / y.size
 
 
-@wrong(QUESTION, "Pixels of 255 are counted as class 0: nobody has judged them, so they belong to no class.")
+@wrong("Pixels of 255 are counted as class 0: nobody has judged them, so they belong to no class.")
 def unjudged_is_background(y, C):
     return np.bincount(np.where(y == 255, 0, y).ravel(), minlength=C) / y.size
 
 
-@wrong(QUESTION, "Background (class 0) is a class like the others here.")
+@wrong("Background (class 0) is a class like the others here.")
 def without_background(y, C):
     n = counts(y, C)
     return np.append(0.0, n[1:] / max(n[1:].sum(), 1))
 
 
-@wrong(QUESTION, "Some rows have fewer judged pixels than others: count over the whole image, divide once.")
+@wrong("Some rows have fewer judged pixels than others: count over the whole image, divide once.")
 def mean_of_rows(y, C):
     """Average the shares of the image's rows, though some rows count fewer pixels."""
     return np.mean([counts(row, C) / np.count_nonzero(row != 255) for row in y if (row != 255).any()], axis=0)
 
 
-@wrong(QUESTION, "A class without pixels has a share as well, 0: the result has always C entries.")
+@wrong("A class without pixels has a share as well, 0: the result has always C entries.")
 def only_what_occurs(y, C):
     n = counts(y, C)
     return n[n > 0] / n.sum()
 
 
-@wrong(QUESTION, "That is one over the share (a weight, topic 05): rare is small here.")
+@wrong("That is one over the share (a weight, topic 05): rare is small here.")
 def inverse_shares(y, C):
     n = counts(y, C)
     return n.sum() / np.maximum(n, 1)
 
 
-@wrong(QUESTION, "np.bincount ends at the largest label that occurs: what makes it as long as C?")
+@wrong("np.bincount ends at the largest label that occurs: what makes it as long as C?")
 def up_to_the_largest_label(y, C):
     n = np.bincount(y[y != 255])
     return n / n.sum()
 
 
-@wrong(QUESTION, "np.histogram spreads its bins from the least value to the largest: where does that of class 1 begin?")
+@wrong("np.histogram spreads its bins from the least value to the largest: where does that of class 1 begin?")
 def bins_between_the_extremes(y, C):
     n, _ = np.histogram(y[y != 255], bins=C)
     return n / n.sum()
 
 
-@wrong(QUESTION, "A byte ends at 255. How many pixels of one class can an image have?")
+@wrong("A byte ends at 255. How many pixels of one class can an image have?")
 def counted_in_bytes(y, C):
     n = counts(y, C).astype(np.uint8)
     return n / n.sum()
 
 
-@wrong(QUESTION, "Clipping 255 to the largest class makes votes for that class of pixels that nobody judged.")
+@wrong("Clipping 255 to the largest class makes votes for that class of pixels that nobody judged.")
 def unjudged_as_the_last_class(y, C):
     return np.bincount(np.minimum(y, C - 1).ravel(), minlength=C) / y.size
 
 
-@wrong(QUESTION, "np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")
+@wrong("np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")
 def unjudged_as_a_class(y, C):
     return np.bincount(y.ravel(), minlength=C) / y.size
 
 
-@wrong(QUESTION, "Between C edges there are C - 1 bins, and the last holds two classes: how many edges do C bins need?")
+@wrong("Between C edges there are C - 1 bins, and the last holds two classes: how many edges do C bins need?")
 def edges_of_one_bin_too_few(y, C):
     n, _ = np.histogram(y[y != 255], bins=np.arange(C))
     return np.append(n, 0) / n.sum()

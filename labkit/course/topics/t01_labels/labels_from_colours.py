@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def labels_from_colours(rgb, palette):
@@ -37,7 +37,6 @@ _NEARLY = np.array(
 
 
 QUESTION = Question(
-    name="01_labels.labels_from_colours",
     reference=labels_from_colours,
     inputs=_picture,
     by_hand=(
@@ -46,14 +45,13 @@ QUESTION = Question(
         (_NEARLY, _PALETTE),
     ),
     points=3,
-    properties=(
-        Property(
-            "a pixel is 255 where no class has exactly its colour",
-            lambda arguments, y: bool(np.all(y[~(arguments[0][:, :, None] == arguments[1]).all(-1).any(-1)] == 255)),
-        ),
-    ),
-    forbidden=("labkit",),
 )
+
+
+@holds("a pixel is 255 where no class has exactly its colour")
+def unknown_is_255(rgb, palette, y):
+    return np.all(y[~(rgb[:, :, None] == palette).all(-1).any(-1)] == 255)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -68,7 +66,7 @@ def first_of(same, otherwise=255):
     return np.where(same.any(axis=-1), same.argmax(axis=-1), otherwise)
 
 
-@wrong(QUESTION, "A mixed colour has no class: the nearest one may belong to a class that was never there.")
+@wrong("A mixed colour has no class: the nearest one may belong to a class that was never there.")
 def nearest_colour(rgb, palette):
     """Whatever colour lies nearest."""
     distance = ((rgb[:, :, None, :].astype(float) - palette) ** 2).sum(axis=-1)
@@ -84,63 +82,63 @@ ALL_THREE = "Two colours are the same if all three channels are: is one of them 
 NOT_THE_SUM = "Different colours can be equally bright: compare the channels, not their sum."
 
 
-@wrong(QUESTION, ALL_THREE)
+@wrong(ALL_THREE)
 def any_channel(rgb, palette):
     """One channel that fits is taken for all; the first such class counts."""
     return first_of(matches(rgb, palette).any(axis=-1))
 
 
-@wrong(QUESTION, ALL_THREE)
+@wrong(ALL_THREE)
 def any_channel_of_the_last(rgb, palette):
     """The same, and the last such class counts."""
     return last_of(matches(rgb, palette).any(axis=-1))
 
 
-@wrong(QUESTION, NOT_THE_SUM)
+@wrong(NOT_THE_SUM)
 def by_brightness(rgb, palette):
     """The sum of the channels compared; the first such class counts."""
     return first_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
 
 
-@wrong(QUESTION, NOT_THE_SUM)
+@wrong(NOT_THE_SUM)
 def by_brightness_of_the_last(rgb, palette):
     """The same, and the last such class counts."""
     return last_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
 
 
-@wrong(QUESTION, "An unknown colour is 255, not 0: what does yours start from, and what is argmax of a row of False?")
+@wrong("An unknown colour is 255, not 0: what does yours start from, and what is argmax of a row of False?")
 def unknown_becomes_0(rgb, palette):
     """Unknown colours become class 0."""
     return first_of(matches(rgb, palette).all(axis=-1), 0)
 
 
-@wrong(QUESTION, "Bytes wrap round: 16 * 16 is 256, and a byte holds 0 for it. Compare the channels themselves.")
+@wrong("Bytes wrap round: 16 * 16 is 256, and a byte holds 0 for it. Compare the channels themselves.")
 def squares_of_bytes(rgb, palette):
     return last_of((((rgb[:, :, None].astype(int) - palette) ** 2) % 256 == 0).all(axis=-1))
 
 
-@wrong(QUESTION, "Each turn of your loop undoes the one before: a pixel without this class's colour keeps what it has.")
+@wrong("Each turn of your loop undoes the one before: a pixel without this class's colour keeps what it has.")
 def last_class_alone(rgb, palette):
     return np.where((rgb == palette[-1]).all(axis=-1), len(palette) - 1, 255)
 
 
-@wrong(QUESTION, "Several classes may have the same red: which channels does your comparison leave out?")
+@wrong("Several classes may have the same red: which channels does your comparison leave out?")
 def red_alone(rgb, palette):
     return last_of(matches(rgb, palette)[..., 0])
 
 
-@wrong(QUESTION, "np.isin asks whether a number stands anywhere in the colour: is [0, 0, 255] the same as [255, 0, 0]?")
+@wrong("np.isin asks whether a number stands anywhere in the colour: is [0, 0, 255] the same as [255, 0, 0]?")
 def channels_in_any_order(rgb, palette):
     return last_of((rgb[:, :, None, :, None] == palette[:, None, :]).any(axis=-1).all(axis=-1))
 
 
-@wrong(QUESTION, "Which channel comes first in an RGB image?")
+@wrong("Which channel comes first in an RGB image?")
 def blue_first(rgb, palette):
     """The picture read as BGR."""
     return first_of(matches(rgb[..., ::-1], palette).all(axis=-1))
 
 
-@wrong(QUESTION, "argmax is 0 where class 0 fits, and where no class fits: what tells the two apart?")
+@wrong("argmax is 0 where class 0 fits, and where no class fits: what tells the two apart?")
 def class_0_becomes_unknown(rgb, palette):
     y = first_of(matches(rgb, palette).all(axis=-1), 0)
     return np.where(y == 0, 255, y)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def labels_from_segmentation(segmentation, class_of_body):
@@ -30,7 +30,6 @@ def _raw_mask(rng):
 
 
 QUESTION = Question(
-    name="01_labels.labels_from_segmentation",
     reference=labels_from_segmentation,
     inputs=_raw_mask,
     by_hand=(
@@ -38,14 +37,14 @@ QUESTION = Question(
         (np.array([[65537, 65538 + (127 << 24)]], np.int32), (np.arange(5, 65545) // 7 % 4).astype(np.uint8)),  # many
         (np.array([[5 << 24, 3 + (12 << 24)]], np.int32), np.array([2, 0, 0, 255], np.uint8)),  # a body not judged
     ),
-    properties=(
-        Property(
-            "where nothing is seen (-1), the label is 0",
-            lambda arguments, labels: not np.any(labels[arguments[0] == -1]),
-        ),
-    ),
     forbidden=("pybullet",),
 )
+
+
+@holds("where nothing is seen (-1), the label is 0")
+def nothing_is_0(segmentation, class_of_body, labels):
+    return not np.any(labels[segmentation == -1])
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -54,9 +53,7 @@ def numbers_and_seen(segmentation):
     return segmentation & 0xFFFFFF, segmentation >= 0
 
 
-@wrong(
-    QUESTION, "The robot has holes: values in the millions are body + ((link + 1) << 24). How do you get the body back?"
-)
+@wrong("The robot has holes: values in the millions are body + ((link + 1) << 24). How do you get the body back?")
 def base_links_only(segmentation, class_of_body):
     """Compare the raw values with body numbers: whatever has link bits matches none."""
     labels = np.zeros(segmentation.shape, np.uint8)
@@ -65,42 +62,42 @@ def base_links_only(segmentation, class_of_body):
     return labels
 
 
-@wrong(QUESTION, "Where nothing is seen stands -1, and in NumPy the index -1 means the last entry.")
+@wrong("Where nothing is seen stands -1, and in NumPy the index -1 means the last entry.")
 def nothing_is_the_last_body(segmentation, class_of_body):
     body, seen = numbers_and_seen(segmentation)
     return class_of_body[np.where(seen, body, -1)]
 
 
-@wrong(QUESTION, "You keep the upper bits, which are the link: which bits hold the body?")
+@wrong("You keep the upper bits, which are the link: which bits hold the body?")
 def link_for_body(segmentation, class_of_body):
     link = (segmentation >> 24) % len(class_of_body)
     return np.where(segmentation >= 0, class_of_body[link], 0)
 
 
-@wrong(QUESTION, "These are body numbers: one more step leads to the class, and class_of_body knows it.")
+@wrong("These are body numbers: one more step leads to the class, and class_of_body knows it.")
 def body_for_class(segmentation, class_of_body):
     body, seen = numbers_and_seen(segmentation)
     return np.where(seen, body, 0)
 
 
-@wrong(QUESTION, "The lower 24 bits of -1 are all ones, 16777215: look up only the pixels where something is seen.")
+@wrong("The lower 24 bits of -1 are all ones, 16777215: look up only the pixels where something is seen.")
 def nothing_looked_up(segmentation, class_of_body):
     """IndexError, wherever nothing is seen."""
     return class_of_body[segmentation & 0xFFFFFF]
 
 
-@wrong(QUESTION, "The body has 24 bits, six hexadecimal digits: how many does your mask keep?")
+@wrong("The body has 24 bits, six hexadecimal digits: how many does your mask keep?")
 def sixteen_bits(segmentation, class_of_body):
     return np.where(segmentation >= 0, class_of_body[np.where(segmentation >= 0, segmentation & 0xFFFF, 0)], 0)
 
 
-@wrong(QUESTION, "The upper bits are the link plus one, not the body: which bits hold the body?")
+@wrong("The upper bits are the link plus one, not the body: which bits hold the body?")
 def link_looked_up(segmentation, class_of_body):
     """IndexError, where a link's number is no body's."""
     return np.where(segmentation >= 0, class_of_body[np.maximum(segmentation >> 24, 0)], 0)
 
 
-@wrong(QUESTION, "You find the base and link 0 alone, and a body may have many links. What holds for all of them?")
+@wrong("You find the base and link 0 alone, and a body may have many links. What holds for all of them?")
 def first_link_alone(segmentation, class_of_body):
     labels = np.zeros(segmentation.shape, np.uint8)
     for body, c in enumerate(class_of_body):
@@ -108,6 +105,6 @@ def first_link_alone(segmentation, class_of_body):
     return labels
 
 
-@wrong(QUESTION, "These are body numbers: one more step leads to the class, and class_of_body knows it.")
+@wrong("These are body numbers: one more step leads to the class, and class_of_body knows it.")
 def body_in_a_byte_for_class(segmentation, class_of_body):
     return body_for_class(segmentation, class_of_body).astype(np.uint8)

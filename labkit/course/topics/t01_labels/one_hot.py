@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 from labkit.course.topics.t01_labels import labels_and_classes
 
 
@@ -12,42 +12,41 @@ def one_hot(y, C):
 
 
 QUESTION = Question(
-    name="01_labels.one_hot",
     reference=one_hot,
     inputs=labels_and_classes,
     by_hand=((np.array([[0, 2]], np.uint8), 3), (np.array([[1, 255], [0, 3], [2, 2]], np.uint8), 5)),
     random_cases=6,
     points=1,
-    properties=(
-        Property(
-            "over the last axis it sums to 1, and to 0 where the pixel is ignored",
-            lambda arguments, Y: np.array_equal(np.sum(Y, axis=-1), arguments[0] != 255),
-        ),
-    ),
     forbidden=("sklearn",),
 )
+
+
+@holds("over the last axis it sums to 1, and to 0 where the pixel is ignored")
+def sums_to_1(y, C, Y):
+    return np.array_equal(np.sum(Y, axis=-1), y != 255)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "255 was pressed into the range of classes: what should the C entries of such a pixel be?")
+@wrong("255 was pressed into the range of classes: what should the C entries of such a pixel be?")
 def ignored_as_last_class(y, C):
     return np.eye(C, dtype=np.uint8)[np.minimum(y, C - 1)]
 
 
-@wrong(QUESTION, "A class that is not in this image has a plane too, of zeros: there are always C of them.")
+@wrong("A class that is not in this image has a plane too, of zeros: there are always C of them.")
 def classes_that_occur(y, C):
     return (y[..., None] == np.unique(y[y != 255])).astype(np.uint8)
 
 
-@wrong(QUESTION, "Add up the entries of a pixel that nobody judged, 255: what should come out, and what does in yours?")
+@wrong("Add up the entries of a pixel that nobody judged, 255: what should come out, and what does in yours?")
 def ignored_is_shared_out(y, C):
     Y = (y[..., None] == np.arange(C)).astype(float)
     Y[y == 255] = 1 / C
     return Y
 
 
-@wrong(QUESTION, "The course has four classes, and the function gets C: how many does yours mark?")
+@wrong("The course has four classes, and the function gets C: how many does yours mark?")
 def four_classes(y, C):
     Y = one_hot(y, C)
     Y[..., 4:] = 0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def resize_labels(y, height, width):
@@ -38,7 +38,6 @@ _LARGE = (np.add.outer(np.arange(301), 2 * np.arange(307)) % 5).astype(np.uint8)
 
 
 QUESTION = Question(
-    name="01_labels.resize_labels",
     reference=resize_labels,
     inputs=_labels_and_size,
     by_hand=(
@@ -50,14 +49,14 @@ QUESTION = Question(
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
     ),
     points=4,
-    properties=(
-        Property(
-            "no label is there that was not there before",
-            lambda arguments, y: set(np.unique(y).tolist()) <= set(np.unique(arguments[0]).tolist()),
-        ),
-    ),
     forbidden=("cv2", "PIL", "skimage"),
 )
+
+
+@holds("no label is there that was not there before")
+def no_label_is_new(y, height, width, resized):
+    return set(np.unique(resized).tolist()) <= set(np.unique(y).tolist())
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -68,63 +67,61 @@ def copied(y, size, index):
     return y[rows[:, None], columns]
 
 
-@wrong(QUESTION, "np.unique before and after? The mean of classes 1 and 3 is not class 2: labels cannot be averaged.")
+@wrong("np.unique before and after? The mean of classes 1 and 3 is not class 2: labels cannot be averaged.")
 def bilinear(y, height, width):
     import cv2
 
     return np.round(cv2.resize(y.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)).astype(np.uint8)
 
 
-@wrong(
-    QUESTION, "All is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner."
-)
+@wrong("All is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner.")
 def from_the_corner(y, height, width):
     return copied(y, (height, width), lambda i, n, old: i * old // n)
 
 
-@wrong(QUESTION, "You lay the first and last centres on each other; here the images' edges lie on each other.")
+@wrong("You lay the first and last centres on each other; here the images' edges lie on each other.")
 def corner_to_corner(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round(np.linspace(0, old - 1, n)))
 
 
-@wrong(QUESTION, "The half belongs to the new pixel: it is added before you scale, (i + 0.5) * H / h, not afterwards.")
+@wrong("The half belongs to the new pixel: it is added before you scale, (i + 0.5) * H / h, not afterwards.")
 def half_added_afterwards(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum(i * old / n + 0.5, old - 1))
 
 
-@wrong(QUESTION, "Subtract no 0.5 before floor: here old pixel u reaches from u to u + 1, and its centre is u + 0.5.")
+@wrong("Subtract no 0.5 before floor: here old pixel u reaches from u to u + 1, and its centre is u + 0.5.")
 def half_subtracted(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * old / n - 0.5)
 
 
-@wrong(QUESTION, "Rows are multiplied by H / height, old by new: is yours height / H?")
+@wrong("Rows are multiplied by H / height, old by new: is yours height / H?")
 def scaled_by_new_over_old(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * n / old)
 
 
-@wrong(QUESTION, "np.resize repeats the numbers row after row: is your image still the same scene?")
+@wrong("np.resize repeats the numbers row after row: is your image still the same scene?")
 def refilled(y, height, width):
     return np.resize(y, (height, width))
 
 
-@wrong(QUESTION, "The whole scene should be in the new image, in another size.")
+@wrong("The whole scene should be in the new image, in another size.")
 def padded_or_cropped(y, height, width):
     H, W = y.shape
     return np.pad(y, ((0, max(height - H, 0)), (0, max(width - W, 0))), mode="edge")[:height, :width]
 
 
-@wrong(QUESTION, "On the border of two old pixels, floor takes the later one: which one does np.round take?")
+@wrong("On the border of two old pixels, floor takes the later one: which one does np.round take?")
 def rounded(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n - 0.5))
 
 
-@wrong(QUESTION, "The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+@wrong("The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
 def rounded_up(y, height, width):
     """IndexError, where the last centre is rounded to the number of pixels."""
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n))
 
 
-@wrong(QUESTION, "A new pixel copies the one old pixel under its centre: how many old pixels does yours ask?")
+@wrong("A new pixel copies the one old pixel under its centre: how many old pixels does yours ask?")
 def voted(y, height, width):
     """The most frequent label of the old pixels that a new one covers."""
 
@@ -138,26 +135,26 @@ def voted(y, height, width):
     return out
 
 
-@wrong(QUESTION, "Columns are counted along W and rows along H: you take H for both.")
+@wrong("Columns are counted along W and rows along H: you take H for both.")
 def height_for_both(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * len(y) / n)
 
 
-@wrong(QUESTION, "Columns have a factor of their own, W / width: yours are scaled by H / height, as rows are.")
+@wrong("Columns have a factor of their own, W / width: yours are scaled by H / height, as rows are.")
 def columns_scaled_as_rows(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))
 
 
-@wrong(QUESTION, "The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+@wrong("The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
 def rounded_up_and_clipped(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n).clip(0, old - 1))
 
 
-@wrong(QUESTION, "In floats 7.5 / 11 * 22 is less than 15: in which order does the formula multiply and divide?")
+@wrong("In floats 7.5 / 11 * 22 is less than 15: in which order does the formula multiply and divide?")
 def divided_before_multiplied(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) / n * old)
 
 
-@wrong(QUESTION, "In floats 24.5 * (8 / 49) is less than 4: in which order does the formula multiply and divide?")
+@wrong("In floats 24.5 * (8 / 49) is less than 4: in which order does the formula multiply and divide?")
 def multiplied_by_the_quotient(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * (old / n))

@@ -24,7 +24,6 @@ _PENCIL = (
 
 
 QUESTION = Question(
-    name="02_crf.energy",
     reference=energy,
     inputs=labelled_model,
     by_hand=(
@@ -38,19 +37,18 @@ QUESTION = Question(
         ),
     ),
     points=3,
-    forbidden=("labkit",),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "What does agreement cost in the Potts model? Label everything alike: only unary costs may remain.")
+@wrong("What does agreement cost in the Potts model? Label everything alike: only unary costs may remain.")
 def spins(y, psi, weights):
     """Agreement is rewarded by w, disagreement costs w, as for spins of +1 and -1."""
     return unary_part(y, psi) + (weights * np.where(disagreeing(y), 1, -1)).sum()
 
 
-@wrong(QUESTION, "Classes have names, not sizes: a pair (0, 2) disagrees no more than a pair (0, 1).")
+@wrong("Classes have names, not sizes: a pair (0, 2) disagrees no more than a pair (0, 1).")
 def label_steps(y, psi, weights):
     """Labels subtracted as if they were numbers."""
     y_as_numbers = y.astype(int)
@@ -58,31 +56,31 @@ def label_steps(y, psi, weights):
     return unary_part(y, psi) + (weights * np.stack(steps)).sum()
 
 
-@wrong(QUESTION, "The weight is paid where neighbours differ: what does an image of one label cost?")
+@wrong("The weight is paid where neighbours differ: what does an image of one label cost?")
 def agreement_charged(y, psi, weights):
     """The weight paid where neighbours agree."""
     return unary_part(y, psi) + (weights * ~disagreeing(y)).sum()
 
 
-@wrong(QUESTION, "Each pair stands once in weights, at the pixel that owns it: does yours visit it from one end only?")
+@wrong("Each pair stands once in weights, at the pixel that owns it: does yours visit it from one end only?")
 def pairs_twice(y, psi, weights):
     """Each pair counted from both ends."""
     return unary_part(y, psi) + 2.0 * (weights * disagreeing(y)).sum()
 
 
-@wrong(QUESTION, "A pixel in the middle has eight neighbours: how many kinds of pairs does yours add up?")
+@wrong("A pixel in the middle has eight neighbours: how many kinds of pairs does yours add up?")
 def four_neighbours(y, psi, weights):
     """The diagonals forgotten."""
     return unary_part(y, psi) + (weights * disagreeing(y))[:2].sum()
 
 
-@wrong(QUESTION, "weights[3] belongs to the neighbour below to the left: which way does your shift go?")
+@wrong("weights[3] belongs to the neighbour below to the left: which way does your shift go?")
 def both_diagonals_to_the_right(y, psi, weights):
     """The second diagonal taken for the first."""
     return unary_part(y, psi) + (weights * disagreeing(y, (*PAIRS[:3], PAIRS[2]))).sum()
 
 
-@wrong(QUESTION, "weights[3] belongs to the neighbour below to the left: in which column do you look for it?")
+@wrong("weights[3] belongs to the neighbour below to the left: in which column do you look for it?")
 def both_diagonals_to_the_right_in_loops(y, psi, weights):
     """The same in loops, which leave out the pairs that would end outside."""
     inside = weights.copy()
@@ -90,19 +88,19 @@ def both_diagonals_to_the_right_in_loops(y, psi, weights):
     return both_diagonals_to_the_right(y, psi, inside)
 
 
-@wrong(QUESTION, "A pair's weight stands at the pixel that owns it, (v, u): do you read it at the neighbour's place?")
+@wrong("A pair's weight stands at the pixel that owns it, (v, u): do you read it at the neighbour's place?")
 def weights_of_the_neighbours(y, psi, weights):
     moved = np.stack([np.roll(w, (-down, -right), (0, 1)) for w, (down, right) in zip(weights, PAIRS, strict=True)])
     return unary_part(y, psi) + (np.where(weights > 0.0, moved, 0.0) * disagreeing(y)).sum()
 
 
-@wrong(QUESTION, "np.roll by +1 brings the left neighbour: with which sign does the right one come?")
+@wrong("np.roll by +1 brings the left neighbour: with which sign does the right one come?")
 def rolled_backwards(y, psi, weights):
     """Each pair compared with the neighbour on the other side."""
     return unary_part(y, psi) + (weights * disagreeing(y, [(-down, -right) for down, right in PAIRS])).sum()
 
 
-@wrong(QUESTION, "weights[3] stands at the upper pixel of its pair: is that the left one of the two?")
+@wrong("weights[3] stands at the upper pixel of its pair: is that the left one of the two?")
 def fourth_kind_at_the_lower_column(y, psi, weights):
     """The last kind of pairs multiplied by the weights one column to the left of theirs."""
     left = np.roll(weights[3], 1, axis=1)
@@ -110,39 +108,39 @@ def fourth_kind_at_the_lower_column(y, psi, weights):
     return unary_part(y, psi) + (np.stack([*weights[:3], left]) * disagreeing(y)).sum()
 
 
-@wrong(QUESTION, "A pixel pays for the label that y gives it: does yours pay for its cheapest class?")
+@wrong("A pixel pays for the label that y gives it: does yours pay for its cheapest class?")
 def cheapest_classes(y, psi, weights):
     """The pixels' minima in the place of what the labels cost."""
     return psi.min(axis=2).sum() + (weights * disagreeing(y)).sum()
 
 
-@wrong(QUESTION, "A difference of bytes wraps round, 0 - 1 is 255; and only whether two labels differ counts.")
+@wrong("A difference of bytes wraps round, 0 - 1 is 255; and only whether two labels differ counts.")
 def byte_steps(y, psi, weights):
     steps = np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
     return unary_part(y, psi) + (weights * steps).sum()
 
 
-@wrong(QUESTION, "The last row and the last column have costs and pairs as well: how far do your loops go?")
+@wrong("The last row and the last column have costs and pairs as well: how far do your loops go?")
 def loops_too_short(y, psi, weights):
     return unary_part(y[:-1, :-1], psi[:-1, :-1]) + (weights * disagreeing(y))[:, :-1, :-1].sum()
 
 
-@wrong(QUESTION, "The last row has pairs to the right, the last column pairs downward: how far do your loops go?")
+@wrong("The last row has pairs to the right, the last column pairs downward: how far do your loops go?")
 def pairs_of_the_last_row_and_column_skipped(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, :-1].sum()
 
 
-@wrong(QUESTION, "A loop that leaves out the border loses its pairs: ask each neighbour whether it is in the image.")
+@wrong("A loop that leaves out the border loses its pairs: ask each neighbour whether it is in the image.")
 def pairs_of_the_border_skipped(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, 1:-1].sum()
 
 
-@wrong(QUESTION, "A pair that disagrees pays its own weight: what does each of them pay in yours?")
+@wrong("A pair that disagrees pays its own weight: what does each of them pay in yours?")
 def disagreements_counted(y, psi, weights):
     return unary_part(y, psi) + np.count_nonzero((weights > 0.0) & disagreeing(y))
 
 
-@wrong(QUESTION, "A pixel pays for one class, its label's: how many entries of psi[v, u] does yours add up?")
+@wrong("A pixel pays for one class, its label's: how many entries of psi[v, u] does yours add up?")
 def costs_of_all_classes(y, psi, weights):
     return psi.sum() + (weights * disagreeing(y)).sum()
 
@@ -150,7 +148,7 @@ def costs_of_all_classes(y, psi, weights):
 ORDER = "weights holds the kinds right, below, below right, below left: do your steps stand in this order?"
 
 
-@wrong(QUESTION, ORDER)
+@wrong(ORDER)
 def diagonals_exchanged(y, psi, weights):
     """In loops, which leave out the pairs that would end outside."""
     inside = weights.copy()
@@ -158,7 +156,7 @@ def diagonals_exchanged(y, psi, weights):
     return unary_part(y, psi) + (inside * disagreeing(y, [PAIRS[d] for d in (0, 1, 3, 2)])).sum()
 
 
-@wrong(QUESTION, ORDER)
+@wrong(ORDER)
 def right_and_below_exchanged(y, psi, weights):
     """In loops, which leave out the pairs that would end outside."""
     inside = weights.copy()

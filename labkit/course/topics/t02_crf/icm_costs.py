@@ -33,7 +33,6 @@ _PIXELS = ((1, 1), (1, 2), (0, 0), (2, 3), (0, 3), (2, 0), (1, 0), (0, 2))  # th
 
 
 QUESTION = Question(
-    name="02_crf.icm_costs",
     reference=icm_costs,
     inputs=_pixel_of_a_model,
     by_hand=(
@@ -41,7 +40,6 @@ QUESTION = Question(
         (np.minimum(_LABELS, 1), *_MODEL, *_PIXELS[-1]),  # class 2 has a cost, though no pixel has it
     ),
     points=3,
-    forbidden=("labkit",),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
@@ -61,16 +59,14 @@ def charged(pairs, y, psi, v, u):
     return psi[v, u] + sum((w * (np.arange(psi.shape[2]) != y[b, a]) for w, b, a in pairs), np.zeros(psi.shape[2]))
 
 
-@wrong(
-    QUESTION, "A class pays for each neighbour that has another label: which class should eight like neighbours favour?"
-)
+@wrong("A class pays for each neighbour that has another label: which class should eight like neighbours favour?")
 def charged_for_agreeing(y, psi, weights, v, u):
     """Every class pays for the neighbours that have it."""
     own, owned = pairs_of(weights, v, u)
     return 2 * psi[v, u] + sum(w for w, _, _ in own + owned) - charged(own + owned, y, psi, v, u)
 
 
-@wrong(QUESTION, "The pair with the left neighbour belongs to that neighbour: at which pixel does its weight stand?")
+@wrong("The pair with the left neighbour belongs to that neighbour: at which pixel does its weight stand?")
 def own_weights(y, psi, weights, v, u):
     """The weights stored at the pixel, also for the pairs that its neighbours own."""
     H, W = y.shape
@@ -79,13 +75,13 @@ def own_weights(y, psi, weights, v, u):
     return charged(pairs_of(weights, v, u)[0] + back, y, psi, v, u)
 
 
-@wrong(QUESTION, "In the energy each pair counts once, but a pixel in the middle belongs to eight pairs.")
+@wrong("In the energy each pair counts once, but a pixel in the middle belongs to eight pairs.")
 def ahead_only(y, psi, weights, v, u):
     """Only the pairs that the energy's loop visits at this pixel."""
     return charged(pairs_of(weights, v, u)[0], y, psi, v, u)
 
 
-@wrong(QUESTION, "Neighbours touch at corners, too: how many pairs has a pixel in the middle?")
+@wrong("Neighbours touch at corners, too: how many pairs has a pixel in the middle?")
 def four_neighbours(y, psi, weights, v, u):
     """The diagonals forgotten."""
     straight = np.concatenate([weights[:2], np.zeros_like(weights[2:])])
@@ -93,20 +89,20 @@ def four_neighbours(y, psi, weights, v, u):
     return charged(own + owned, y, psi, v, u)
 
 
-@wrong(QUESTION, "Which label do you compare with the neighbours': the class c, or y[v, u] for all classes?")
+@wrong("Which label do you compare with the neighbours': the class c, or y[v, u] for all classes?")
 def label_of_now(y, psi, weights, v, u):
     """Every class pays for the disagreements of the label that the pixel has."""
     own, owned = pairs_of(weights, v, u)
     return psi[v, u] + sum(w for w, b, a in own + owned if y[b, a] != y[v, u])
 
 
-@wrong(QUESTION, "Each class is compared with the neighbours' labels: is yours compared with y[v, u], the pixel's own?")
+@wrong("Each class is compared with the neighbours' labels: is yours compared with y[v, u], the pixel's own?")
 def compared_with_itself(y, psi, weights, v, u):
     own, owned = pairs_of(weights, v, u)
     return psi[v, u] + sum(w for w, _, _ in own + owned) * (np.arange(psi.shape[2]) != y[v, u])
 
 
-@wrong(QUESTION, "Seen from the neighbour above to the right you lie below to the LEFT: which kind of pair is that?")
+@wrong("Seen from the neighbour above to the right you lie below to the LEFT: which kind of pair is that?")
 def upper_diagonals_exchanged(y, psi, weights, v, u):
     """weights[2] taken for the neighbour's own side, not for yours."""
     own = pairs_of(weights, v, u)[0]
@@ -114,7 +110,7 @@ def upper_diagonals_exchanged(y, psi, weights, v, u):
     return charged(own + owned, y, psi, v, u)
 
 
-@wrong(QUESTION, "At the border there is no neighbour: which pixel does a row or column that you clip lead to?")
+@wrong("At the border there is no neighbour: which pixel does a row or column that you clip lead to?")
 def clipped_at_the_border(y, psi, weights, v, u):
     (H, W), both = y.shape, []
     for w, (down, right) in zip(weights, PAIRS, strict=True):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def row_labels(psi, w):
@@ -34,7 +34,6 @@ def _row(rng):
 
 
 QUESTION = Question(
-    name="02_crf.row_labels",
     reference=row_labels,
     inputs=_row,
     by_hand=(
@@ -46,14 +45,13 @@ QUESTION = Question(
     ),
     random_cases=10,
     points=3,
-    properties=(
-        Property(
-            "the labels cost no more than each pixel's own cheapest class does",
-            lambda given, labels: bool(cost(*given, labels) <= cost(*given, given[0].argmin(axis=1)) + 1e-9),
-        ),
-    ),
-    forbidden=("labkit",),
 )
+
+
+@holds("the labels cost no more than each pixel's own cheapest class does")
+def no_dearer_than_pixel_by_pixel(psi, w, labels):
+    return cost(psi, w, labels) <= cost(psi, w, psi.argmin(axis=1)) + 1e-9
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -83,22 +81,21 @@ def traced(came, last):
     return np.array(labels[::-1])
 
 
-@wrong(QUESTION, "That is each pixel's own choice: does changing the class cost w in yours, and keeping it nothing?")
+@wrong("That is each pixel's own choice: does changing the class cost w in yours, and keeping it nothing?")
 def pixel_by_pixel(psi, w):
     """The weights forgotten, or paid by all classes alike."""
     return psi.argmin(axis=1)
 
 
 @wrong(
-    QUESTION,
-    "The cheapest class so far need not lie on the cheapest way: walk back, and let a pixel keep its class for free.",
+    "The cheapest class so far need not lie on the cheapest way: walk back, and let a pixel keep its class for free."
 )
 def never_walked_back(psi, w):
     """The minimum at each pixel of the forward walk."""
     return walk(psi, w).argmin(axis=1)
 
 
-@wrong(QUESTION, "Choosing pixel by pixel from the left cannot know what comes: keep a cost for every class.")
+@wrong("Choosing pixel by pixel from the left cannot know what comes: keep a cost for every class.")
 def greedy(psi, w):
     """From the left, each pixel the class that is cheapest given the label before it."""
     labels = [psi[0].argmin()]
@@ -107,18 +104,18 @@ def greedy(psi, w):
     return np.array(labels)
 
 
-@wrong(QUESTION, "Going from pixel u - 1 to pixel u, the pair stands at w[u - 1].")
+@wrong("Going from pixel u - 1 to pixel u, the pair stands at w[u - 1].")
 def next_pairs_weight(psi, w):
     """The weight of the pair ahead, charged for the pair behind."""
     return row_labels(psi, np.roll(w, -1))
 
 
-@wrong(QUESTION, "Each pair has a weight of its own: is the first pair's weight paid for all pairs in yours?")
+@wrong("Each pair has a weight of its own: is the first pair's weight paid for all pairs in yours?")
 def first_weight_for_all(psi, w):
     return row_labels(psi, np.repeat(w[:1], len(w)))
 
 
-@wrong(QUESTION, "Classes have names, not sizes: from class 0 to class 2 costs w once, as from class 0 to class 1.")
+@wrong("Classes have names, not sizes: from class 0 to class 2 costs w once, as from class 0 to class 1.")
 def class_steps(psi, w):
     """Labels subtracted as if they were numbers."""
     best, came, classes = psi[0], [], np.arange(psi.shape[1])
@@ -129,42 +126,42 @@ def class_steps(psi, w):
     return traced(came, best.argmin())
 
 
-@wrong(QUESTION, "On the way back from pixel u: do you read the row of `came` that belongs to u, or to u - 1?")
+@wrong("On the way back from pixel u: do you read the row of `came` that belongs to u, or to u - 1?")
 def traced_one_pixel_off(psi, w):
     """The way back read one pixel too early."""
     best, came = walk_with_origins(psi, w)
     return traced(came[:-1], best[-1].argmin())
 
 
-@wrong(QUESTION, "A pixel comes from the cheapest class of `best` before psi[u] is added: does yours ask too late?")
+@wrong("A pixel comes from the cheapest class of `best` before psi[u] is added: does yours ask too late?")
 def asked_too_late(psi, w):
     best, came = walk_with_origins(psi, w, late=1)
     return traced(came[1:], best[-1].argmin())
 
 
-@wrong(QUESTION, "The last label is the cheapest by `best`, which holds the whole row, not by the last pixel's psi.")
+@wrong("The last label is the cheapest by `best`, which holds the whole row, not by the last pixel's psi.")
 def last_pixel_on_its_own(psi, w):
     return traced(walk_with_origins(psi, w)[1][1:], psi[-1].argmin())
 
 
-@wrong(QUESTION, "Your way back ends one step too early: what came[1] says of the first pixel is not used.")
+@wrong("Your way back ends one step too early: what came[1] says of the first pixel is not used.")
 def first_pixel_not_reached(psi, w):
     labels = row_labels(psi, w).copy()
     labels[0] *= len(labels) == 1
     return labels
 
 
-@wrong(QUESTION, "The first pixel's own cheapest class need not lie on the best way: its label is traced back as well.")
+@wrong("The first pixel's own cheapest class need not lie on the best way: its label is traced back as well.")
 def first_pixel_on_its_own(psi, w):
     return np.array([psi[0].argmin(), *row_labels(psi, w)[1:]])
 
 
-@wrong(QUESTION, "That is what the best labels cost. Which labels are they?")
+@wrong("That is what the best labels cost. Which labels are they?")
 def least_cost(psi, w):
     return walk(psi, w)[-1].min()
 
 
-@wrong(QUESTION, "Each of your steps changes one pixel, and can end where two pixels would have to change at once.")
+@wrong("Each of your steps changes one pixel, and can end where two pixels would have to change at once.")
 def pixel_after_pixel_again(psi, w):
     """ICM on the row."""
     y = psi.argmin(axis=1)
@@ -175,6 +172,6 @@ def pixel_after_pixel_again(psi, w):
     return y
 
 
-@wrong(QUESTION, "Both walks end at pixel u, and both hold psi[u]: how often is it in their sum?")
+@wrong("Both walks end at pixel u, and both hold psi[u]: how often is it in their sum?")
 def own_cost_twice(psi, w):
     return (walk(psi, w) + walk(psi[::-1], w[::-1])[::-1]).argmin(axis=1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 from labkit.course.topics.t02_crf import model
 
 
@@ -15,7 +15,6 @@ def terminal_capacities(psi):
 
 
 QUESTION = Question(
-    name="02_crf.terminal_capacities",
     reference=terminal_capacities,
     inputs=lambda rng: (model(rng, 3, 5, 2)[0],),
     by_hand=(
@@ -23,15 +22,18 @@ QUESTION = Question(
         (np.array([[[4.0, 1.0], [-1.0, -3.0]]]),),
         (np.array([[[0.5, 0.5]], [[0.0, 2.0]], [[3.0, 1.0]]]),),
     ),
-    properties=(
-        Property("no capacity is negative", lambda given, out: bool(np.min(out[0]) >= 0.0 and np.min(out[1]) >= 0.0)),
-        Property(
-            "one of the two arcs of each pixel has capacity 0",
-            lambda given, out: bool(np.minimum(out[0], out[1]).max() <= 1e-9),
-        ),
-    ),
-    forbidden=("labkit",),
 )
+
+
+@holds("no capacity is negative")
+def none_is_negative(psi, out):
+    return np.min(out[0]) >= 0.0 and np.min(out[1]) >= 0.0
+
+
+@holds("one of the two arcs of each pixel has capacity 0")
+def one_of_two_is_0(psi, out):
+    return np.minimum(out[0], out[1]).max() <= 1e-9
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -41,41 +43,38 @@ def terminals(source, sink, constant):
     return source, sink, float(constant)
 
 
-@wrong(QUESTION, "Try one pixel: on the source's side it has label 0, and which of its two arcs is cut then?")
+@wrong("Try one pixel: on the source's side it has label 0, and which of its two arcs is cut then?")
 def source_and_sink_exchanged(psi):
     """A pixel that wants label 0 is bound to the sink."""
     lowest = psi.min(axis=2)
     return terminals(psi[..., 0] - lowest, psi[..., 1] - lowest, lowest.sum())
 
 
-@wrong(QUESTION, "Subtract the minimum pixel by pixel, so that one of each pixel's two arcs vanishes.")
+@wrong("Subtract the minimum pixel by pixel, so that one of each pixel's two arcs vanishes.")
 def one_minimum_for_all(psi):
     """Right as a cut, but both arcs of a pixel stay."""
     return terminals(psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size)
 
 
-@wrong(QUESTION, "A negative cost needs no clipping: less the pixel's smaller cost, both of its arcs are 0 or more.")
+@wrong("A negative cost needs no clipping: less the pixel's smaller cost, both of its arcs are 0 or more.")
 def negative_costs_clipped(psi):
     clipped = np.maximum(psi, 0.0)
     lowest = clipped.min(axis=2)
     return terminals(clipped[..., 1] - lowest, clipped[..., 0] - lowest, lowest.sum())
 
 
-@wrong(QUESTION, "What goes into the constant leaves both arcs: the one that stays carries the costs' difference.")
+@wrong("What goes into the constant leaves both arcs: the one that stays carries the costs' difference.")
 def whole_costs_kept(psi):
     dearer = np.where(psi > psi.min(axis=2, keepdims=True), psi, 0.0)
     return terminals(dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum())
 
 
-@wrong(
-    QUESTION,
-    "Each pixel has one arc of capacity 0: which label cuts the arc from the source, the dearer one?",
-)
+@wrong("Each pixel has one arc of capacity 0: which label cuts the arc from the source, the dearer one?")
 def difference_in_both_arcs(psi):
     difference = np.abs(psi[..., 1] - psi[..., 0])
     return terminals(difference, difference, psi.min(axis=2).sum())
 
 
-@wrong(QUESTION, "A pixel pays its smaller cost in any case, whatever its sign: did you take it from both arcs?")
+@wrong("A pixel pays its smaller cost in any case, whatever its sign: did you take it from both arcs?")
 def only_negative_costs_taken(psi):
     return terminals(np.maximum(psi[..., 1], 0.0), np.maximum(psi[..., 0], 0.0), np.minimum(psi, 0.0).sum())

@@ -16,7 +16,6 @@ def _probabilities(rng):
 
 
 QUESTION = Question(
-    name="02_crf.unary_from_probabilities",
     reference=unary_from_probabilities,
     inputs=_probabilities,
     by_hand=(
@@ -24,71 +23,70 @@ QUESTION = Question(
         (np.array([[[0.7, 0.3]], [[0.05, 0.95]], [[0.1, 0.9]]]), 0.1),
     ),
     points=1,
-    forbidden=("labkit",),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "The softmax has been applied already: these numbers sum to one at each pixel.")
+@wrong("The softmax has been applied already: these numbers sum to one at each pixel.")
 def softmaxed_again(p, floor):
     """Take the probabilities for logits."""
     e = np.exp(p)
     return -np.log(np.maximum(e / e.sum(axis=-1, keepdims=True), floor))
 
 
-@wrong(QUESTION, "Only probabilities below the floor are to change: look at a pixel where one class has probability 1.")
+@wrong("Only probabilities below the floor are to change: look at a pixel where one class has probability 1.")
 def the_floor_added(p, floor):
     return -np.log(p + floor)
 
 
-@wrong(QUESTION, "What does a class of probability 0 cost, and can neighbours ever overrule that?")
+@wrong("What does a class of probability 0 cost, and can neighbours ever overrule that?")
 def no_floor(p, floor):
     return -np.log(np.maximum(p, 1e-300))
 
 
-@wrong(QUESTION, "Only small probabilities are lifted: what must a class of probability 1 cost, and what does yours?")
+@wrong("Only small probabilities are lifted: what must a class of probability 1 cost, and what does yours?")
 def clipped_at_both_ends(p, floor):
     return -np.log(np.clip(p, floor, 1.0 - floor))
 
 
-@wrong(QUESTION, "Must yours sum to 1 after the floor? What is not below it stays as it is, and 1 still costs 0.")
+@wrong("Must yours sum to 1 after the floor? What is not below it stays as it is, and 1 still costs 0.")
 def made_to_sum_to_1_again(p, floor):
     lifted = np.maximum(p, floor)
     return -np.log(lifted / lifted.sum(axis=-1, keepdims=True))
 
 
-@wrong(QUESTION, "Not 0 alone counts as the floor: every probability below the floor does.")
+@wrong("Not 0 alone counts as the floor: every probability below the floor does.")
 def zeros_lifted(p, floor):
     return -np.log(np.where(p == 0.0, floor, p))
 
 
-@wrong(QUESTION, "The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
+@wrong("The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
 def costs_lifted(p, floor):
     return np.maximum(-np.log(p), floor)
 
 
-@wrong(QUESTION, "A class costs -log p: where does the factor before your logarithm come from?")
+@wrong("A class costs -log p: where does the factor before your logarithm come from?")
 def entropies(p, floor):
     return -np.maximum(p, floor) * np.log(np.maximum(p, floor))
 
 
-@wrong(QUESTION, "Does the cheapest class of a pixel have to cost 0? -log p is asked for as it is.")
+@wrong("Does the cheapest class of a pixel have to cost 0? -log p is asked for as it is.")
 def cheapest_made_free(p, floor):
     psi = -np.log(np.maximum(p, floor))
     return psi - psi.min(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "np.log undoes np.exp: to which base is your logarithm?")
+@wrong("np.log undoes np.exp: to which base is your logarithm?")
 def logarithm_to_base_10(p, floor):
     return -np.log10(np.maximum(p, floor))
 
 
-@wrong(QUESTION, "np.log undoes np.exp: to which base is your logarithm?")
+@wrong("np.log undoes np.exp: to which base is your logarithm?")
 def logarithm_to_base_2(p, floor):
     return -np.log2(np.maximum(p, floor))
 
 
-@wrong(QUESTION, "The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
+@wrong("The floor is a probability, not a cost: lift what is too small before you take the logarithm.")
 def costs_lifted_and_infinite_ones_replaced(p, floor):
     return np.where(p > 0.0, costs_lifted(np.where(p > 0.0, p, 1.0), floor), -np.log(floor))

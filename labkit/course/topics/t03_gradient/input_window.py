@@ -23,7 +23,6 @@ def draw_layers(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 QUESTION = Question(
-    name="03_gradient.input_window",
     reference=input_window,
     inputs=draw_layers,
     by_hand=(
@@ -41,59 +40,57 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "You stand at the output: which layer do you pass first on the way back to the image?")
+@wrong("You stand at the output: which layer do you pass first on the way back to the image?")
 def from_the_image_on(kernels, strides, paddings, u):
     """The layers in the order in which the image passes them."""
     return input_window(kernels[::-1], strides[::-1], paddings[::-1], u)
 
 
-@wrong(QUESTION, "A layer with padding starts to read outside the image: by how much does that move its window?")
+@wrong("A layer with padding starts to read outside the image: by how much does that move its window?")
 def without_padding(kernels, strides, paddings, u):
     """Padding forgotten."""
     return input_window(kernels, strides, np.zeros_like(paddings), u)
 
 
-@wrong(QUESTION, "Output u of a layer with stride s starts to read at s u: what does a stride do to a position?")
+@wrong("Output u of a layer with stride s starts to read at s u: what does a stride do to a position?")
 def without_strides(kernels, strides, paddings, u):
     """Strides forgotten."""
     return input_window(kernels, np.ones_like(strides), paddings, u)
 
 
-@wrong(QUESTION, "A kernel of width 3 that starts at pixel 4 reads 4, 5 and 6: which is the last?")
+@wrong("A kernel of width 3 that starts at pixel 4 reads 4, 5 and 6: which is the last?")
 def one_too_far(kernels, strides, paddings, u):
     """The window ends behind its last pixel."""
     return input_window(np.asarray(kernels) + 1, strides, paddings, u)
 
 
-@wrong(
-    QUESTION, "Padding adds pixels in front of the first one: is the window of output 0 moved to the left or the right?"
-)
+@wrong("Padding adds pixels in front of the first one: is the window of output 0 moved to the left or the right?")
 def padding_added(kernels, strides, paddings, u):
     """Padding moves the window to the wrong side."""
     return input_window(kernels, strides, -np.asarray(paddings), u)
 
 
-@wrong(QUESTION, "s u - p: the padding is counted in pixels of the layer's input, so the stride does not multiply it.")
+@wrong("s u - p: the padding is counted in pixels of the layer's input, so the stride does not multiply it.")
 def padding_before_the_stride(kernels, strides, paddings, u):
     """s (u - p) in the place of s u - p."""
     return input_window(kernels, strides, strides * paddings, u)
 
 
-@wrong(QUESTION, "Each layer makes the window wider: walk the last pixel back on its own.")
+@wrong("Each layer makes the window wider: walk the last pixel back on its own.")
 def window_of_the_first_layer(kernels, strides, paddings, u):
     """Only the first pixel is walked back; the first layer's width is added."""
     first = input_window(kernels, strides, paddings, u)[0]
     return first, first + int(kernels[0]) - 1
 
 
-@wrong(QUESTION, "A window may begin outside the image, at a negative pixel. Leave it so.")
+@wrong("A window may begin outside the image, at a negative pixel. Leave it so.")
 def kept_inside_the_image(kernels, strides, paddings, u):
     """No pixel before 0."""
     first, last = input_window(kernels, strides, paddings, u)
     return max(first, 0), last
 
 
-@wrong(QUESTION, "That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+@wrong("That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
 def centred(kernels, strides, paddings, u):
     """A window of the right width around the output's place in the image."""
     first, last = input_window(kernels, strides, paddings, u)
@@ -101,7 +98,7 @@ def centred(kernels, strides, paddings, u):
     return middle - (last - first + 1) // 2, middle + (last - first + 1) // 2
 
 
-@wrong(QUESTION, "You go on from an input pixel to the outputs that read it. Which input pixels does output u read?")
+@wrong("You go on from an input pixel to the outputs that read it. Which input pixels does output u read?")
 def outputs_of_a_pixel(kernels, strides, paddings, u):
     first = last = int(u)
     for kernel, stride, padding in np.transpose([kernels, strides, paddings]).tolist():
@@ -109,7 +106,7 @@ def outputs_of_a_pixel(kernels, strides, paddings, u):
     return first, last
 
 
-@wrong(QUESTION, "A layer may have more or less padding than half its kernel: which argument says how much?")
+@wrong("A layer may have more or less padding than half its kernel: which argument says how much?")
 def padded_by_half_a_kernel(kernels, strides, paddings, u):
     first = last = int(u)
     for kernel, stride in np.transpose([kernels, strides])[::-1].tolist():
@@ -117,20 +114,20 @@ def padded_by_half_a_kernel(kernels, strides, paddings, u):
     return first, last
 
 
-@wrong(QUESTION, "Is your second number the place of the last pixel, or how many there are?")
+@wrong("Is your second number the place of the last pixel, or how many there are?")
 def first_and_width(kernels, strides, paddings, u):
     first, last = input_window(kernels, strides, paddings, u)
     return first, last - first + 1
 
 
-@wrong(QUESTION, "That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+@wrong("That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
 def centred_on_its_first_half(kernels, strides, paddings, u):
     first, last = input_window(kernels, strides, paddings, u)
     begin = u * int(np.prod(strides)) - (last - first + 1) // 2
     return begin, begin + last - first
 
 
-@wrong(QUESTION, "A layer's padding counts pixels of its own input: how many of the image's is one of those?")
+@wrong("A layer's padding counts pixels of its own input: how many of the image's is one of those?")
 def paddings_counted_in_image_pixels(kernels, strides, paddings, u):
     first, last = input_window(kernels, strides, np.zeros_like(paddings), u)
     return first - int(np.sum(paddings)), last - int(np.sum(paddings))

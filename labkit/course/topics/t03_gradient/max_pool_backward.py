@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def max_pool_backward(x, g):
@@ -28,7 +28,6 @@ def draw(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 QUESTION = Question(
-    name="03_gradient.max_pool_backward",
     reference=max_pool_backward,
     inputs=draw,
     by_hand=(
@@ -39,14 +38,14 @@ QUESTION = Question(
     ),
     random_cases=6,
     points=3,
-    properties=(
-        Property(
-            "nothing is lost: the gradient has the same sum before and after",
-            lambda given, out: bool(np.isclose(out.sum(), given[1].sum(), atol=1e-6)),
-        ),
-    ),
     forbidden=("scipy", "torch"),
 )
+
+
+@holds("nothing is lost: the gradient has the same sum before and after")
+def sum_is_kept(x, g, out):
+    return np.isclose(out.sum(), g.sum(), atol=1e-6)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -63,52 +62,52 @@ def unblocked(b):
     return b.reshape(h, w, 2, 2).swapaxes(1, 2).reshape(2 * h, 2 * w)
 
 
-@wrong(QUESTION, "Three of the four pixels of a block did not reach the output: can moving them change the loss?")
+@wrong("Three of the four pixels of a block did not reach the output: can moving them change the loss?")
 def to_all_four(x, g):
     """The whole gradient to each pixel of the block."""
     return g.repeat(2, axis=0).repeat(2, axis=1)
 
 
-@wrong(QUESTION, "That is the way back through a mean. Which pixel of a block does its maximum depend on?")
+@wrong("That is the way back through a mean. Which pixel of a block does its maximum depend on?")
 def shared_among_four(x, g):
     """A quarter to each pixel."""
     return to_all_four(x, g) / 4.0
 
 
-@wrong(QUESTION, "The output of a pooling is x itself at one place: what is its derivative there?")
+@wrong("The output of a pooling is x itself at one place: what is its derivative there?")
 def times_the_maximum(x, g):
     """The gradient multiplied by the value that went through."""
     b = blocks(x)
     return unblocked((b == b.max(axis=2, keepdims=True)) * (g * b.max(axis=2))[..., None])
 
 
-@wrong(QUESTION, "A negative pixel can be the largest of its block: it passes the gradient, too.")
+@wrong("A negative pixel can be the largest of its block: it passes the gradient, too.")
 def clipped_like_a_relu(x, g):
     """Negative pixels get nothing, as behind a ReLU."""
     b = blocks(x)
     return unblocked((b == b.max(axis=2, keepdims=True)) * (b > 0) * g[..., None])
 
 
-@wrong(QUESTION, "All four pixels of a block may be negative: with which value does your search for the largest begin?")
+@wrong("All four pixels of a block may be negative: with which value does your search for the largest begin?")
 def searched_from_zero(x, g):
     """The search begins at 0: no pixel of a negative block is larger, and the first one stays."""
     b = np.maximum(blocks(x), 0.0)
     return unblocked(np.eye(4)[b.argmax(axis=2)] * g[..., None])
 
 
-@wrong(QUESTION, "Compare a pixel with the other three of its block, not with the whole row of blocks or image.")
+@wrong("Compare a pixel with the other three of its block, not with the whole row of blocks or image.")
 def largest_of_the_image(x, g):
     """Only the image's largest pixel passes anything."""
     return (x == x.max()) * to_all_four(x, g)
 
 
-@wrong(QUESTION, "np.tile repeats the whole image. np.repeat repeats each entry, so that it fills its own block.")
+@wrong("np.tile repeats the whole image. np.repeat repeats each entry, so that it fills its own block.")
 def tiled(x, g):
     """Maxima and gradients put beside pixels of other blocks."""
     return (x == np.tile(blocks(x).max(axis=2), (2, 2))) * np.tile(g, (2, 2))
 
 
-@wrong(QUESTION, "Blocks do not overlap: block (i, j) begins at row 2 i and column 2 j.")
+@wrong("Blocks do not overlap: block (i, j) begins at row 2 i and column 2 j.")
 def overlapping_blocks(x, g):
     """Blocks of stride 1."""
     out = np.zeros_like(x)
@@ -118,13 +117,13 @@ def overlapping_blocks(x, g):
     return out
 
 
-@wrong(QUESTION, "The places are right, but g is tiled: np.repeat, not np.tile, gives each block its own gradient.")
+@wrong("The places are right, but g is tiled: np.repeat, not np.tile, gives each block its own gradient.")
 def gradients_tiled(x, g):
     """Maxima beside their own blocks, gradients beside others."""
     return (x == to_all_four(x, blocks(x).max(axis=2))) * np.tile(g, (2, 2))
 
 
-@wrong(QUESTION, "That is the place of the largest pixel inside its block: where in the image does block (i, j) begin?")
+@wrong("That is the place of the largest pixel inside its block: where in the image does block (i, j) begin?")
 def placed_without_the_block(x, g):
     """Everything in the image's first four pixels."""
     out = np.zeros_like(x)
@@ -133,31 +132,31 @@ def placed_without_the_block(x, g):
     return out
 
 
-@wrong(QUESTION, "The largest value of one block may stand in another that has a larger one: compare within the block.")
+@wrong("The largest value of one block may stand in another that has a larger one: compare within the block.")
 def among_all_maxima(x, g):
     """A pixel that equals the maximum of any block passes the gradient of its own."""
     return np.isin(x, blocks(x).max(axis=2)) * to_all_four(x, g)
 
 
-@wrong(QUESTION, "reshape cuts four pixels of one row out of the image: how do the rows of a block come together?")
+@wrong("reshape cuts four pixels of one row out of the image: how do the rows of a block come together?")
 def blocks_of_one_row(x, g):
     """Blocks of 1 x 4."""
     b = x.reshape(*g.shape, 4)
     return ((b == b.max(axis=2, keepdims=True)) * g[..., None]).reshape(x.shape)
 
 
-@wrong(QUESTION, "np.isclose takes any two numbers below 1e-8 for equal: which comparison has no tolerance?")
+@wrong("np.isclose takes any two numbers below 1e-8 for equal: which comparison has no tolerance?")
 def nearly_the_largest(x, g):
     return np.isclose(x, to_all_four(x, blocks(x).max(axis=2))) * to_all_four(x, g)
 
 
-@wrong(QUESTION, "Of -4 and 1 the pooling keeps 1: do you compare values, or how far they are from 0?")
+@wrong("Of -4 and 1 the pooling keeps 1: do you compare values, or how far they are from 0?")
 def largest_by_size(x, g):
     b = np.abs(blocks(x))
     return unblocked((b == b.max(axis=2, keepdims=True)) * g[..., None])
 
 
-@wrong(QUESTION, "Blocks do not overlap: in how many of your windows does a pixel lie?")
+@wrong("Blocks do not overlap: in how many of your windows does a pixel lie?")
 def all_windows_of_stride_1(x, g):
     out = np.zeros_like(x)
     for i, j in np.ndindex(x.shape[0] - 1, x.shape[1] - 1):
@@ -166,6 +165,6 @@ def all_windows_of_stride_1(x, g):
     return out
 
 
-@wrong(QUESTION, "argmax counts a block row by row: of its number 1, what is the row, and what is the column?")
+@wrong("argmax counts a block row by row: of its number 1, what is the row, and what is the column?")
 def rows_and_columns_of_the_block_exchanged(x, g):
     return unblocked(np.eye(4)[[0, 2, 1, 3]][blocks(x).argmax(axis=2)] * g[..., None])

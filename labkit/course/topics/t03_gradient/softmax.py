@@ -13,7 +13,6 @@ def softmax(z):
 
 
 QUESTION = Question(
-    name="03_gradient.softmax",
     reference=softmax,
     inputs=lambda rng: (random_logits(rng),),
     by_hand=((TOY,), (SURE,)),
@@ -25,76 +24,73 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Each pixel has probabilities of its own: sum over one axis.")
+@wrong("Each pixel has probabilities of its own: sum over one axis.")
 def softmax_over_everything(z):
     e = np.exp(z - z.max())
     return e / e.sum()
 
 
-@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
 def softmax_that_overflows(z):
     return np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
 
 
-@wrong(
-    QUESTION,
-    "You take off the largest logit of the whole image. What is left of a pixel whose logits are all much smaller?",
-)
+@wrong("You take off the largest logit of the whole image. What is left of a pixel whose logits are all much smaller?")
 def softmax_of_global_maximum(z):
     e = np.exp(z - z.max())
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Clipping changes the answer, a shift does not: softmax sees differences.")
+@wrong("Clipping changes the answer, a shift does not: softmax sees differences.")
 def softmax_clipped(z):
     e = np.exp(np.clip(z, -50.0, 50.0))
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Classes exclude each other: do your probabilities sum to one?")
+@wrong("Classes exclude each other: do your probabilities sum to one?")
 def sigmoid_of_each(z):
     return 1.0 / (1.0 + np.exp(-z))
 
 
-@wrong(QUESTION, "Logits may be negative, probabilities may not.")
+@wrong("Logits may be negative, probabilities may not.")
 def logits_divided_by_their_sum(z):
     return z / z.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Which numbers must sum to one: those of one pixel.")
+@wrong("Which numbers must sum to one: those of one pixel.")
 def wrong_axis(z):
     return softmax_over_pixels(z)
 
 
-@wrong(QUESTION, "Which number, taken off, makes the largest exponent 0? With a smaller one np.exp still overflows.")
+@wrong("Which number, taken off, makes the largest exponent 0? With a smaller one np.exp still overflows.")
 def smallest_logit_taken_off(z):
     e = np.exp(z - z.min(axis=-1, keepdims=True))
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Dividing by the largest logit changes the differences of logits; taking it off does not.")
+@wrong("Dividing by the largest logit changes the differences of logits; taking it off does not.")
 def divided_by_the_largest(z):
     e = np.exp(z / z.max(axis=-1, keepdims=True))
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Clipping changes the answer, a shift does not: softmax sees differences.")
+@wrong("Clipping changes the answer, a shift does not: softmax sees differences.")
 def large_logits_clipped(z):
     e = np.exp(np.minimum(z, 700.0))
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "You take the largest logit off above the line: what is taken off in the sum below it?")
+@wrong("You take the largest logit off above the line: what is taken off in the sum below it?")
 def sum_of_unshifted_logits(z):
     return np.exp(z - z.max(axis=-1, keepdims=True)) / np.exp(z).sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Those are logarithms of probabilities, all negative: what undoes a logarithm?")
+@wrong("Those are logarithms of probabilities, all negative: what undoes a logarithm?")
 def log_softmax(z):
     return z - np.logaddexp.reduce(z, axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "Dividing by the largest logit changes the differences of logits; taking it off does not.")
+@wrong("Dividing by the largest logit changes the differences of logits; taking it off does not.")
 def divided_by_the_largest_size(z):
     largest = np.abs(z).max(axis=-1, keepdims=True)
     return softmax(z / np.where(largest == 0.0, 1.0, largest))

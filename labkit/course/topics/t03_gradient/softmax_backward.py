@@ -16,7 +16,6 @@ def draw(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 QUESTION = Question(
-    name="03_gradient.softmax_backward",
     reference=softmax_backward,
     inputs=draw,
     by_hand=(
@@ -31,66 +30,66 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Each p depends on every logit: besides dp[c]/dz[c] there are the terms with k other than c.")
+@wrong("Each p depends on every logit: besides dp[c]/dz[c] there are the terms with k other than c.")
 def diagonal_only(p, g):
     """Only the case k = c of the derivative."""
     return p * (1.0 - p) * g
 
 
-@wrong(QUESTION, "dp[k]/dz[c] is p[k] (1 - p[c]) only for k = c. What is it for the other k, and with which sign?")
+@wrong("dp[k]/dz[c] is p[k] (1 - p[c]) only for k = c. What is it for the other k, and with which sign?")
 def other_terms_added(p, g):
     """The sign of the terms with k other than c is wrong."""
     return p * (1.0 - p) * g + p * ((p * g).sum(axis=-1, keepdims=True) - p * g)
 
 
-@wrong(QUESTION, "The sum that is subtracted belongs to one pixel: over which axis do the classes lie?")
+@wrong("The sum that is subtracted belongs to one pixel: over which axis do the classes lie?")
 def summed_over_everything(p, g):
     """One sum for all pixels."""
     return p * (g - (p * g).sum())
 
 
-@wrong(QUESTION, "The derivative of a softmax by a logit has a factor p[c] in front: what happens to a class of p = 0?")
+@wrong("The derivative of a softmax by a logit has a factor p[c] in front: what happens to a class of p = 0?")
 def without_the_factor(p, g):
     """The outer p forgotten."""
     return g - (p * g).sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "The mean that is subtracted is weighted: classes count by their probability.")
+@wrong("The mean that is subtracted is weighted: classes count by their probability.")
 def plain_mean(p, g):
     """An unweighted mean of the gradients."""
     return p * (g - g.mean(axis=-1, keepdims=True))
 
 
-@wrong(QUESTION, "For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: where is the factor p[k]?")
+@wrong("For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: where is the factor p[k]?")
 def others_unweighted(p, g):
     """The terms with k other than c lack p[k]."""
     return p * (1.0 - p) * g - p * (g.sum(axis=-1, keepdims=True) - g)
 
 
-@wrong(QUESTION, "For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: yours has p[c] twice and no p[k].")
+@wrong("For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: yours has p[c] twice and no p[k].")
 def others_squared(p, g):
     """The terms with k other than c have p[c] in the place of p[k]."""
     return p * (1.0 - p) * g - p**2 * (g.sum(axis=-1, keepdims=True) - g)
 
 
-@wrong(QUESTION, "p has been through the softmax already: do not put it through another one.")
+@wrong("p has been through the softmax already: do not put it through another one.")
 def softmax_of_p(p, g):
     """p taken for logits."""
     p = np.exp(p) / np.exp(p).sum(axis=-1, keepdims=True)
     return p * (g - (p * g).sum(axis=-1, keepdims=True))
 
 
-@wrong(QUESTION, "The sum that is subtracted is one of p g, not of g: classes count by their probability.")
+@wrong("The sum that is subtracted is one of p g, not of g: classes count by their probability.")
 def plain_sum(p, g):
     """An unweighted sum of the gradients."""
     return p * (g - g.sum(axis=-1, keepdims=True))
 
 
-@wrong(QUESTION, "p g is one part of it. Raise all of g by 1: the loss's slopes must stay, and do yours?")
+@wrong("p g is one part of it. Raise all of g by 1: the loss's slopes must stay, and do yours?")
 def without_the_mean(p, g):
     return p * g
 
 
-@wrong(QUESTION, "p - Y is softmax and cross-entropy in one. Here any loss may follow, and g is its gradient by p.")
+@wrong("p - Y is softmax and cross-entropy in one. Here any loss may follow, and g is its gradient by p.")
 def shortcut_of_the_cross_entropy(p, g):
     return p - g

@@ -26,7 +26,6 @@ def _label_pair(rng):
 
 
 QUESTION = Question(
-    name="04_iou.confusion_matrix",
     reference=confusion_matrix,
     inputs=_label_pair,
     by_hand=(
@@ -53,48 +52,48 @@ def pair_count(rows, columns, num_classes):
     return np.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, num_classes)
 
 
-@wrong(QUESTION, "Row 0 is too full: what became of the pixels whose true label is `ignore`?")
+@wrong("Row 0 is too full: what became of the pixels whose true label is `ignore`?")
 def ignored_as_class_0(y_true, y_pred, num_classes, ignore):
     rows = np.where(y_true == ignore, 0, y_true).astype(int)
     return pair_count(rows.ravel(), y_pred.ravel().astype(int), num_classes)
 
 
-@wrong(QUESTION, "Whether a pixel counts is up to the truth alone; one that is predicted as `ignore` still counts.")
+@wrong("Whether a pixel counts is up to the truth alone; one that is predicted as `ignore` still counts.")
 def prediction_ignored_too(y_true, y_pred, num_classes, ignore):
     rows, columns = counted_pairs(y_true, y_pred, ignore)
     return pair_count(rows[columns != ignore], columns[columns != ignore], num_classes)
 
 
-@wrong(QUESTION, "`ignore` need not be 255: where it is the number of a class, that class's true pixels do not count.")
+@wrong("`ignore` need not be 255: where it is the number of a class, that class's true pixels do not count.")
 def only_what_is_no_class_ignored(y_true, y_pred, num_classes, ignore):
     return pair_count(*counted_pairs(y_true, y_pred, 255), num_classes)
 
 
-@wrong(QUESTION, "n holds whole numbers of pixels: nothing is divided yet.")
+@wrong("n holds whole numbers of pixels: nothing is divided yet.")
 def shares_of_rows(y_true, y_pred, num_classes, ignore):
     n = pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)
     return n / np.maximum(n.sum(axis=1, keepdims=True), 1)
 
 
-@wrong(QUESTION, "With 20 classes the numbers go wrong: what is 19 * 20 + 19 in uint8, which ends at 255?")
+@wrong("With 20 classes the numbers go wrong: what is 19 * 20 + 19 in uint8, which ends at 255?")
 def overflowing_bytes(y_true, y_pred, num_classes, ignore):
     counted = y_true != ignore
     pair = y_true[counted] * np.uint8(num_classes) + y_pred[counted]
     return np.bincount(pair, minlength=num_classes**2)[: num_classes**2].reshape(num_classes, num_classes)
 
 
-@wrong(QUESTION, "No cell is above 1: an index that occurs twice is written once, as in the lesson. What adds them up?")
+@wrong("No cell is above 1: an index that occurs twice is written once, as in the lesson. What adds them up?")
 def written_once(y_true, y_pred, num_classes, ignore):
     return np.minimum(pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes), 1)
 
 
-@wrong(QUESTION, "np.bincount ends at the largest number that occurs: how long does its result have to be?")
+@wrong("np.bincount ends at the largest number that occurs: how long does its result have to be?")
 def as_long_as_the_largest_pair(y_true, y_pred, num_classes, ignore):
     """ValueError, where the last pair of classes does not occur."""
     rows, columns = counted_pairs(y_true, y_pred, ignore)
     return np.bincount(rows * num_classes + columns).reshape(num_classes, num_classes)
 
 
-@wrong(QUESTION, "np.histogram2d spreads its bins from the least label to the largest: where does class 1 begin?")
+@wrong("np.histogram2d spreads its bins from the least label to the largest: where does class 1 begin?")
 def bins_between_the_extremes(y_true, y_pred, num_classes, ignore):
     return np.histogram2d(*counted_pairs(y_true, y_pred, ignore), bins=num_classes)[0].astype(int)

@@ -33,7 +33,6 @@ def _counts_of_frames(rng):
 
 
 QUESTION = Question(
-    name="04_iou.mean_iou",
     reference=mean_iou,
     inputs=_counts_of_frames,
     by_hand=(
@@ -49,88 +48,83 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
+@wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
 def mean_of_frames_means(n_frames):
     return np.mean([np.nanmean(iou_of(n)) for n in n_frames if n.sum()])
 
 
-@wrong(
-    QUESTION, "Should a frame with three pixels of a class weigh as much as one with three thousand? Add counts first."
-)
+@wrong("Should a frame with three pixels of a class weigh as much as one with three thousand? Add counts first.")
 def mean_of_frames_by_class(n_frames):
     scores = np.array([iou_of(n) for n in n_frames])
     seen = ~np.isnan(scores).all(axis=0)
     return np.nanmean(scores[:, seen], axis=0).mean()
 
 
-@wrong(
-    QUESTION,
-    "Each class of each frame has a vote in your mean, however few pixels it has. Add counts first, divide once.",
-)
+@wrong("Each class of each frame has a vote in your mean, however few pixels it has. Add counts first, divide once.")
 def mean_of_all_scores(n_frames):
     return np.nanmean([iou_of(n) for n in n_frames])
 
 
-@wrong(QUESTION, "Your background wins: each class has one vote here, however many pixels it has.")
+@wrong("Your background wins: each class has one vote here, however many pixels it has.")
 def sum_over_sum(n_frames):
     correct, predicted, true = parts(n_frames.sum(axis=0))
     return correct.sum() / (predicted + true - correct).sum()
 
 
-@wrong(QUESTION, "A class that is predicted but never true is a mistake: its IoU is 0, and it counts.")
+@wrong("A class that is predicted but never true is a mistake: its IoU is 0, and it counts.")
 def truth_only(n_frames):
     n = n_frames.sum(axis=0)
     return iou_of(n)[n.sum(axis=1) > 0].mean()
 
 
-@wrong(QUESTION, "A class whose IoU is 0 occurs all the same: it counts. Which number says whether a class occurs?")
+@wrong("A class whose IoU is 0 occurs all the same: it counts. Which number says whether a class occurs?")
 def found_only(n_frames):
     scores = iou_of(n_frames.sum(axis=0))
     return scores[scores > 0.0].mean()
 
 
-@wrong(QUESTION, "That is the share of pixels that are right; where are the unions?")
+@wrong("That is the share of pixels that are right; where are the unions?")
 def accuracy(n_frames):
     n = n_frames.sum(axis=0)
     return np.trace(n) / n.sum()
 
 
-@wrong(QUESTION, "The mean IoU gives each class the same weight, not the weight of its pixels.")
+@wrong("The mean IoU gives each class the same weight, not the weight of its pixels.")
 def weighted_by_frequency(n_frames):
     n = n_frames.sum(axis=0)
     return np.nansum(iou_of(n) * n.sum(axis=1)) / n.sum()
 
 
-@wrong(QUESTION, "A class that no frame holds or predicts lifts your mean: over how many classes do you average?")
+@wrong("A class that no frame holds or predicts lifts your mean: over how many classes do you average?")
 def absent_is_1(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=1.0).mean()
 
 
-@wrong(QUESTION, "A class that occurs nowhere adds nothing to your sum: does it count in what you divide by?")
+@wrong("A class that occurs nowhere adds nothing to your sum: does it count in what you divide by?")
 def absent_is_0(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=0.0).mean()
 
 
-@wrong(QUESTION, "What is the mean of some numbers if one of them is NaN?")
+@wrong("What is the mean of some numbers if one of them is NaN?")
 def nan_in_the_mean(n_frames):
     return iou_of(n_frames.sum(axis=0)).mean()
 
 
-@wrong(QUESTION, "Background is a class like the others: over which classes do you average?")
+@wrong("Background is a class like the others: over which classes do you average?")
 def without_background(n_frames):
     return np.nanmean(iou_of(n_frames.sum(axis=0))[1:])
 
 
-@wrong(QUESTION, "16 bits hold numbers up to 32,767: how many pixels of a class have all frames together?")
+@wrong("16 bits hold numbers up to 32,767: how many pixels of a class have all frames together?")
 def added_in_16_bits(n_frames):
     return np.nanmean(iou_of(n_frames.sum(axis=0, dtype=np.int16)))
 
 
-@wrong(QUESTION, "Means of counts need not be whole: what does the cast to integers do to a class of few pixels?")
+@wrong("Means of counts need not be whole: what does the cast to integers do to a class of few pixels?")
 def means_cut_to_whole_numbers(n_frames):
     return np.nanmean(iou_of(n_frames.mean(axis=0).astype(int)))
 
 
-@wrong(QUESTION, "A weight does not make one mean of two quotients: add the frames' counts, and divide once.")
+@wrong("A weight does not make one mean of two quotients: add the frames' counts, and divide once.")
 def mean_of_frames_by_their_pixels(n_frames):
     return np.average([np.nanmean(iou_of(n)) for n in n_frames], weights=n_frames.sum(axis=(1, 2)))

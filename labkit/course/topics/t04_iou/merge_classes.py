@@ -19,7 +19,6 @@ def _counts_and_groups(rng):
 
 
 QUESTION = Question(
-    name="04_iou.merge_classes",
     reference=merge_classes,
     inputs=_counts_and_groups,
     by_hand=(
@@ -34,50 +33,50 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Some pixels are lost: an index that occurs twice is written once. What adds them up?")
+@wrong("Some pixels are lost: an index that occurs twice is written once. What adds them up?")
 def written_once(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     merged[group[:, None], group] += n
     return merged
 
 
-@wrong(QUESTION, "Two classes have become one: where do the pixels go that were confused between them?")
+@wrong("Two classes have become one: where do the pixels go that were confused between them?")
 def mistakes_within_a_group_dropped(n, group):
     mistake = (group[:, None] == group) & ~np.eye(len(n), dtype=bool)
     return merge_classes(np.where(mistake, 0, n), group)
 
 
-@wrong(QUESTION, "The rows are merged and the columns are not: a prediction has a group, too.")
+@wrong("The rows are merged and the columns are not: a prediction has a group, too.")
 def rows_alone(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     np.add.at(merged, group, n)
     return merged
 
 
-@wrong(QUESTION, "Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
+@wrong("Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
 def old_columns(n, group):
     return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
 
 
-@wrong(QUESTION, "Your matrix still has C rows: an index array chooses rows, and does not add those of one group.")
+@wrong("Your matrix still has C rows: an index array chooses rows, and does not add those of one group.")
 def rows_chosen(n, group):
     return n[np.ix_(group, group)]
 
 
-@wrong(QUESTION, "Only the diagonal of n comes into yours: where do the mistakes between two groups go?")
+@wrong("Only the diagonal of n comes into yours: where do the mistakes between two groups go?")
 def diagonal_alone(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     np.add.at(merged, (group, group), np.diagonal(n))
     return merged
 
 
-@wrong(QUESTION, "The result has a row for each group, yours one for each old class: how many groups are there?")
+@wrong("The result has a row for each group, yours one for each old class: how many groups are there?")
 def as_large_as_before(n, group):
     empty = len(n) - (group.max() + 1)
     return np.pad(merge_classes(n, group), (0, empty))
 
 
-@wrong(QUESTION, "A cell adds up rows and columns: how many columns has the other group, and how many do you take?")
+@wrong("A cell adds up rows and columns: how many columns has the other group, and how many do you take?")
 def first_column_of_other_groups(n, group):
     first = [np.flatnonzero(group == g)[0] for g in range(group.max() + 1)]
     own = group[:, None] == group

@@ -29,7 +29,6 @@ def _labels(rng):
 
 
 QUESTION = Question(
-    name="04_iou.trimap_band",
     reference=trimap_band,
     inputs=_labels,
     by_hand=(
@@ -61,65 +60,65 @@ def banded(y, width, steps, differs=np.not_equal):
     return np.any([differs(n, y) & (n != 255) for n in near], axis=0)
 
 
-@wrong(QUESTION, "An image of one class has no edge: beyond its border there is no class, not class 0.")
+@wrong("An image of one class has no edge: beyond its border there is no class, not class 0.")
 def border_is_an_edge(y, width):
     return trimap_band(np.pad(y, width), width)[width:-width, width:-width]
 
 
-@wrong(QUESTION, "255 is no class: two pixels are not on an edge because nobody judged the pixel between them.")
+@wrong("255 is no class: two pixels are not on an edge because nobody judged the pixel between them.")
 def unjudged_is_a_class(y, width):
     return trimap_band(np.where(y == 255, 9, y), width) & (y != 255)
 
 
-@wrong(QUESTION, "A step down and a step to the right at once: is that pixel within one row and one column?")
+@wrong("A step down and a step to the right at once: is that pixel within one row and one column?")
 def cross_window(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v == 0 or u == 0]) & (y != 255)
 
 
-@wrong(QUESTION, "The window is a square: is the pixel `width` rows down and `width` columns to the right in yours?")
+@wrong("The window is a square: is the pixel `width` rows down and `width` columns to the right in yours?")
 def diamond_window(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if abs(v) + abs(u) <= width]) & (y != 255)
 
 
-@wrong(QUESTION, "Your window reaches further up and left than down and right: which number does range leave out?")
+@wrong("Your window reaches further up and left than down and right: which number does range leave out?")
 def window_without_its_end(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v < width and u < width]) & (y != 255)
 
 
-@wrong(QUESTION, "Your window reaches only down and right: pixels above and to the left are neighbours, too.")
+@wrong("Your window reaches only down and right: pixels above and to the left are neighbours, too.")
 def down_and_right_alone(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v >= 0 and u >= 0]) & (y != 255)
 
 
-@wrong(QUESTION, "Your band is one pixel too wide: the pixels beside an edge are its first step, not its start.")
+@wrong("Your band is one pixel too wide: the pixels beside an edge are its first step, not its start.")
 def grown_from_the_pixels_beside_the_edge(y, width):
     beside = np.where(trimap_band(y, 1), 1, 255)
     return banded(beside, width, square(width), lambda near, _: near == 1) & (y != 255)
 
 
-@wrong(QUESTION, "Pixels of the opposite border come in, as by np.roll: beyond its border an image has no pixels.")
+@wrong("Pixels of the opposite border come in, as by np.roll: beyond its border an image has no pixels.")
 def rolled_round(y, width):
     near = [np.roll(y, step, axis=(0, 1)) for step in square(width)]
     return (y != 255) & np.any([(n != y) & (n != 255) for n in near], axis=0)
 
 
-@wrong(QUESTION, "An edge has two sides: the pixels of the lower class belong to the band, too.")
+@wrong("An edge has two sides: the pixels of the lower class belong to the band, too.")
 def one_side(y, width):
     return banded(y, width, square(width), np.less) & (y != 255)
 
 
-@wrong(QUESTION, "An edge has two sides: must the number nearby be larger than the pixel's own, or just another?")
+@wrong("An edge has two sides: must the number nearby be larger than the pixel's own, or just another?")
 def other_side(y, width):
     return banded(y, width, square(width), np.greater) & (y != 255)
 
 
-@wrong(QUESTION, "A window of one class is in your band if 255 or your frame is in it, too: which labels are classes?")
+@wrong("A window of one class is in your band if 255 or your frame is in it, too: which labels are classes?")
 def unjudged_and_frame_are_a_class(y, width):
     framed = np.pad(np.where(y == 255, 9, y), width, constant_values=9)
     return trimap_band(framed, width)[width:-width, width:-width] & (y != 255)
 
 
-@wrong(QUESTION, "Near the border v - width is negative, and a slice counts such a start from the end of the axis.")
+@wrong("Near the border v - width is negative, and a slice counts such a start from the end of the axis.")
 def slices_from_negative_places(y, width):
     out = np.zeros(y.shape, bool)
     for v, u in np.argwhere(y != 255):
@@ -128,7 +127,7 @@ def slices_from_negative_places(y, width):
     return out
 
 
-@wrong(QUESTION, "255 is no class: which two questions does that add to `another label is near`?")
+@wrong("255 is no class: which two questions does that add to `another label is near`?")
 def unjudged_like_any_class(y, width):
     framed = np.pad(y, width, mode="edge")
     H, W = y.shape
@@ -136,7 +135,7 @@ def unjudged_like_any_class(y, width):
     return np.any([n != y for n in near], axis=0)
 
 
-@wrong(QUESTION, "With 255 between them, two classes can be near and not touch: from where does your band grow?")
+@wrong("With 255 between them, two classes can be near and not touch: from where does your band grow?")
 def grown_from_where_classes_touch(y, width):
     touching = np.where(trimap_band(y, 1), 1, 255)
     return banded(touching, max(width - 1, 1), square(width - 1), lambda near, _: near == 1) & (y != 255)

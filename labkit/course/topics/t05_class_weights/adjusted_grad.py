@@ -27,7 +27,6 @@ def _pixels(rng):
 
 
 QUESTION = Question(
-    name="05_class_weights.adjusted_grad",
     reference=adjusted_grad,
     inputs=_pixels,
     by_hand=(
@@ -49,42 +48,42 @@ def parts(z, y):
     return p, (y[..., None] == np.arange(z.shape[-1])).astype(float), (y != 255)[..., None]
 
 
-@wrong(QUESTION, "A share multiplies a probability. What does it do to a logit?")
+@wrong("A share multiplies a probability. What does it do to a logit?")
 def shares_added(z, y, shares, tau):
     p, Y, counted = parts(z + tau * shares, y)
     return (p - Y) * counted
 
 
-@wrong(QUESTION, "Rare classes get a logit that is lowered while training: they must earn more. Yours is raised.")
+@wrong("Rare classes get a logit that is lowered while training: they must earn more. Yours is raised.")
 def raised(z, y, shares, tau):
     return adjusted_grad(z, y, shares, -tau)
 
 
-@wrong(QUESTION, "All logits of a pixel move, each by the share of its class: yours moves only the true one.")
+@wrong("All logits of a pixel move, each by the share of its class: yours moves only the true one.")
 def true_logit_alone(z, y, shares, tau):
     p, Y, counted = parts(z + tau * np.log(shares) * parts(z, y)[1], y)
     return (p - Y) * counted
 
 
-@wrong(QUESTION, "You multiply the probabilities by powers of the shares: what do they sum to then?")
+@wrong("You multiply the probabilities by powers of the shares: what do they sum to then?")
 def not_normalised_again(z, y, shares, tau):
     p, Y, counted = parts(z, y)
     return (p * shares**tau - Y) * counted
 
 
-@wrong(QUESTION, "The labels are not adjusted: only the logits move.")
+@wrong("The labels are not adjusted: only the logits move.")
 def one_hot_adjusted(z, y, shares, tau):
     p, Y, counted = parts(z + tau * np.log(shares), y)
     return (p - Y * shares) * counted
 
 
-@wrong(QUESTION, "You divide the gradient, as weights would: the shares move the logits, before the softmax.")
+@wrong("You divide the gradient, as weights would: the shares move the logits, before the softmax.")
 def shares_as_weights(z, y, shares, tau):
     p, Y, counted = parts(z, y)
     return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
 
 
-@wrong(QUESTION, "Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
+@wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
 def one_maximum_for_all(z, y, shares, tau):
     a = z + tau * np.log(shares)
     e = np.exp(a - a.max())
@@ -92,24 +91,24 @@ def one_maximum_for_all(z, y, shares, tau):
     return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
 
 
-@wrong(QUESTION, "tau multiplies the logarithm: log(tau * shares) adds the same to all classes, and so nothing.")
+@wrong("tau multiplies the logarithm: log(tau * shares) adds the same to all classes, and so nothing.")
 def tau_inside_the_logarithm(z, y, shares, tau):
     p, Y, counted = parts(z + np.log(tau * shares), y)
     return (p - Y) * counted
 
 
-@wrong(QUESTION, "A share stands in front of your gradient, as a weight would: here it only moves the logits.")
+@wrong("A share stands in front of your gradient, as a weight would: here it only moves the logits.")
 def times_the_share(z, y, shares, tau):
     return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]
 
 
-@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
 def that_overflows(z, y, shares, tau):
     a = z + tau * np.log(shares)
     p = np.exp(a) / np.exp(a).sum(axis=-1, keepdims=True)
     return np.where(y[..., None] == 255, 0.0, p - parts(a, y)[1])
 
 
-@wrong(QUESTION, "What is the derivative of z + constant by z? The shares do not depend on z.")
+@wrong("What is the derivative of z + constant by z? The shares do not depend on z.")
 def with_a_factor_of_the_shares(z, y, shares, tau):
     return adjusted_grad(z, y, shares, tau) * (1.0 + tau * np.log(shares))

@@ -24,7 +24,6 @@ def _network(rng):
 
 
 QUESTION = Question(
-    name="05_class_weights.change_prior",
     reference=change_prior,
     inputs=_network,
     by_hand=(
@@ -41,43 +40,39 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "A factor of a probability is a summand of its logarithm: which?")
+@wrong("A factor of a probability is a summand of its logarithm: which?")
 def ratios_added(z, w, shares, new_shares):
     return z + new_shares / (w * shares)
 
 
-@wrong(QUESTION, "Probabilities are multiplied by the ratio; what does that do to logits?")
+@wrong("Probabilities are multiplied by the ratio; what does that do to logits?")
 def ratios_multiplied(z, w, shares, new_shares):
     return z * new_shares / (w * shares)
 
 
-@wrong(QUESTION, "Logits go in, and logits come out.")
+@wrong("Logits go in, and logits come out.")
 def probabilities(z, w, shares, new_shares):
     q = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True)) * new_shares / (w * shares)
     return q / q.sum(axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "A factor of a probability is a summand of its logarithm: which?")
+@wrong("A factor of a probability is a summand of its logarithm: which?")
 def shares_added_and_subtracted(z, w, shares, new_shares):
     return z - w - shares + new_shares
 
 
-@wrong(QUESTION, "Which probability belongs to the logits 0 and -800, and which logarithm has it? Can you do without?")
+@wrong("Which probability belongs to the logits 0 and -800, and which logarithm has it? Can you do without?")
 def by_probabilities(z, w, shares, new_shares):
     p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
     return np.log(p * new_shares / (w * shares))
 
 
-@wrong(QUESTION, "What is np.exp(1000)? Your answer needs no exponential: what does a factor do to a logarithm?")
+@wrong("What is np.exp(1000)? Your answer needs no exponential: what does a factor do to a logarithm?")
 def by_exponentials(z, w, shares, new_shares):
     p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
     return np.log(p * new_shares / (w * shares))
 
 
-@wrong(
-    QUESTION,
-    "Logits may lie as low as they like: how low can log(p + epsilon) be, and do you need p?",
-    epsilon=EPSILONS,
-)
+@wrong("Logits may lie as low as they like: how low can log(p + epsilon) be, and do you need p?", epsilon=EPSILONS)
 def by_probabilities_and(z, w, shares, new_shares, epsilon):
     return np.log(probabilities(z, w, shares, new_shares) + epsilon)

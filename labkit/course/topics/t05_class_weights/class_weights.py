@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def class_weights(counts, power):
@@ -22,7 +22,6 @@ def draw_counts(rng):
 
 
 QUESTION = Question(
-    name="05_class_weights.class_weights",
     reference=class_weights,
     inputs=draw_counts,
     by_hand=(
@@ -31,19 +30,19 @@ QUESTION = Question(
         (np.array([1, 7, 0]), 0.5),
         (np.array([3, 40]), 0.0),
     ),
-    properties=(
-        Property(
-            "the mean weight over all pixels is 1",
-            lambda arguments, w: bool(np.isclose(arguments[0] @ w, arguments[0].sum(), rtol=1e-3)),
-        ),
-    ),
     forbidden=("sklearn",),
 )
+
+
+@holds("the mean weight over all pixels is 1")
+def mean_is_1(counts, power, w):
+    return np.isclose(counts @ w, counts.sum(), rtol=1e-3)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "What is the mean weight over the pixels? It should be 1.")
+@wrong("What is the mean weight over the pixels? It should be 1.")
 def weights_not_scaled(counts, power):
     present = counts > 0
     w = np.ones(len(counts))
@@ -51,21 +50,21 @@ def weights_not_scaled(counts, power):
     return w
 
 
-@wrong(QUESTION, "Not the weights are to sum to one: their mean over pixels is 1.")
+@wrong("Not the weights are to sum to one: their mean over pixels is 1.")
 def weights_summing_to_one(counts, power):
     w = weights_not_scaled(counts, power)
     w[counts > 0] /= w[counts > 0].sum()
     return w
 
 
-@wrong(QUESTION, "A frequent class has more pixels: take the mean over pixels, not over classes.")
+@wrong("A frequent class has more pixels: take the mean over pixels, not over classes.")
 def weights_of_mean_one_over_classes(counts, power):
     w = weights_not_scaled(counts, power)
     w[counts > 0] /= w[counts > 0].mean()
     return w
 
 
-@wrong(QUESTION, "A class without pixels gets 1 and has no part in the mean; you count it as one pixel.")
+@wrong("A class without pixels gets 1 and has no part in the mean; you count it as one pixel.")
 def absent_class_as_one_pixel(counts, power):
     n = np.maximum(counts, 1)
     return n**-power * n.sum() / (n @ n**-power)

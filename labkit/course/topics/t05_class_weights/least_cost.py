@@ -20,7 +20,6 @@ def _probabilities_and_costs(rng):
 
 
 QUESTION = Question(
-    name="05_class_weights.least_cost",
     reference=least_cost,
     inputs=_probabilities_and_costs,
     by_hand=(
@@ -33,51 +32,51 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "That is the most likely class. Saying it may be the dearest mistake: where does `cost` come in?")
+@wrong("That is the most likely class. Saying it may be the dearest mistake: where does `cost` come in?")
 def most_likely(p, cost):
     return p.argmax(axis=-1)
 
 
-@wrong(QUESTION, "You gave each true class one price; here the price depends on what is said instead, too.")
+@wrong("You gave each true class one price; here the price depends on what is said instead, too.")
 def one_weight_per_class(p, cost):
     return (p * cost.sum(axis=1)).argmax(axis=-1)
 
 
-@wrong(QUESTION, "With which probability do you pay cost[i, j]: with p[i], or with 1 - p[i]?")
+@wrong("With which probability do you pay cost[i, j]: with p[i], or with 1 - p[i]?")
 def saved_where_it_is_not_so(p, cost):
     return ((1.0 - p) @ cost).argmax(axis=-1)
 
 
-@wrong(QUESTION, "You decide for the class that costs most.")
+@wrong("You decide for the class that costs most.")
 def dearest(p, cost):
     return (p @ cost).argmax(axis=-1)
 
 
-@wrong(QUESTION, "To be right may cost something, too: the diagonal of cost need not be 0.")
+@wrong("To be right may cost something, too: the diagonal of cost need not be 0.")
 def right_for_nothing(p, cost):
     return (p @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)
 
 
-@wrong(QUESTION, "You take the most probable class for the truth: what do the other classes, less probable, cost?")
+@wrong("You take the most probable class for the truth: what do the other classes, less probable, cost?")
 def cheapest_for_the_most_likely(p, cost):
     return cost[p.argmax(axis=-1)].argmin(axis=-1)
 
 
-@wrong(QUESTION, "An expected cost is a sum over the true classes. You take the largest of its terms.")
+@wrong("An expected cost is a sum over the true classes. You take the largest of its terms.")
 def least_of_the_worst(p, cost):
     return (p[..., None] * cost).max(axis=-2).argmin(axis=-1)
 
 
-@wrong(QUESTION, "For one j, p[i] cost[i, j] is added up over i: over which index does your sum run?")
+@wrong("For one j, p[i] cost[i, j] is added up over i: over which index does your sum run?")
 def summed_over_what_is_said(p, cost):
     return (p[..., None] * cost).sum(axis=-1).argmin(axis=-1)
 
 
-@wrong(QUESTION, "p[i] multiplies cost[i, j], the row of the true class: does it multiply a column in yours?")
+@wrong("p[i] multiplies cost[i, j], the row of the true class: does it multiply a column in yours?")
 def rows_and_columns_exchanged(p, cost):
     return (p @ cost.T).argmin(axis=-1)
 
 
-@wrong(QUESTION, "That is what the best decision costs. Which class is it?")
+@wrong("That is what the best decision costs. Which class is it?")
 def the_least_price(p, cost):
     return (p @ cost).min(axis=-1)

@@ -18,7 +18,6 @@ def two_means(z, y, w):
 
 
 QUESTION = Question(
-    name="05_class_weights.two_means",
     reference=two_means,
     inputs=draw_pixels,
     by_hand=(
@@ -42,37 +41,37 @@ def means(loss, weight):
     return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
 
 
-@wrong(QUESTION, "A pixel that adds no loss is not one of those that you divide by.")
+@wrong("A pixel that adds no loss is not one of those that you divide by.")
 def means_over_all_pixels(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float((loss * weight).sum() / y.size), float((loss * weight).sum() / weight.sum())
 
 
-@wrong(QUESTION, "The sum of weights runs over the pixels: a class with a thousand pixels counts a thousand times.")
+@wrong("The sum of weights runs over the pixels: a class with a thousand pixels counts a thousand times.")
 def means_over_weights_of_classes(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float((loss * weight).mean()), float((loss * weight).sum() / w.sum())
 
 
-@wrong(QUESTION, "Each pixel's loss is multiplied by its weight before the sum.")
+@wrong("Each pixel's loss is multiplied by its weight before the sum.")
 def means_not_weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(loss.mean()), float(loss.sum() / weight.sum())
 
 
-@wrong(QUESTION, "The first mean is one of weighted losses, too: the two differ only in what they are divided by.")
+@wrong("The first mean is one of weighted losses, too: the two differ only in what they are divided by.")
 def first_mean_not_weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(loss.mean()), float((loss * weight).sum() / weight.sum())
 
 
-@wrong(QUESTION, "A weight multiplies the loss of a pixel, by its true class: the logits keep their values.")
+@wrong("A weight multiplies the loss of a pixel, by its true class: the logits keep their values.")
 def logits_weighted(z, y, w):
     loss, weight = losses_and_weights(z * w, y, w)
     return float(loss.mean()), float(loss.sum() / weight.sum())
 
 
-@wrong(QUESTION, "Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has log 0.")
+@wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has log 0.")
 def one_maximum_for_all(z, y, w):
     z, y = z[y != 255], y[y != 255]
     z = z - z.max()
@@ -80,7 +79,7 @@ def one_maximum_for_all(z, y, w):
     return means(loss, weight)
 
 
-@wrong(QUESTION, "What is np.exp(1000)? What may you take off every logit of a pixel?")
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
 def means_that_overflow(z, y, w):
     p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
     counted = y != 255
@@ -88,7 +87,7 @@ def means_that_overflow(z, y, w):
     return means(loss, weight)
 
 
-@wrong(QUESTION, "The probabilities of one pixel add up to 1: along which axis of z do its classes stand?")
+@wrong("The probabilities of one pixel add up to 1: along which axis of z do its classes stand?")
 def normalised_along_the_first_axis(z, y, w):
     log_p = z - np.logaddexp.reduce(z, axis=0, keepdims=True)
     counted = y != 255
@@ -97,9 +96,7 @@ def normalised_along_the_first_axis(z, y, w):
 
 
 @wrong(
-    QUESTION,
-    "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?",
-    epsilon=EPSILONS,
+    "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?", epsilon=EPSILONS
 )
 def means_with(z, y, w, epsilon):
     loss, weight = losses_and_weights(z, y, w)

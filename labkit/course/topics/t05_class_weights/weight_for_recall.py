@@ -29,7 +29,6 @@ def _pixels(rng):
 
 
 QUESTION = Question(
-    name="05_class_weights.weight_for_recall",
     reference=weight_for_recall,
     inputs=_pixels,
     by_hand=(
@@ -47,62 +46,58 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
+@wrong("Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
 def of_all_pixels(p1, y, recall):
     return weight_for_recall(p1, np.ones_like(y), recall)
 
 
-@wrong(QUESTION, "Pixels are found from the surest to the least sure; yours starts with the least sure one.")
+@wrong("Pixels are found from the surest to the least sure; yours starts with the least sure one.")
 def from_below(p1, y, recall):
     return 1.0 / weight_for_recall(1.0 - p1, y, recall)
 
 
-@wrong(QUESTION, "At least the share: 0.4 of three pixels are 1.2, and one found pixel is too few.")
+@wrong("At least the share: 0.4 of three pixels are 1.2, and one found pixel is too few.")
 def one_too_few(p1, y, recall):
     found_first = np.sort(p1[y])[::-1]
     last = found_first[max(int(recall * len(found_first)), 1) - 1]
     return float((1.0 - last) / last)
 
 
-@wrong(QUESTION, "You have the probability of the last pixel that must be found. Which w lifts w p1 to 1 - p1 there?")
+@wrong("You have the probability of the last pixel that must be found. Which w lifts w p1 to 1 - p1 there?")
 def the_threshold(p1, y, recall):
     return 1.0 / (1.0 + weight_for_recall(p1, y, recall))
 
 
-@wrong(QUESTION, "Class 1 is called where w p1 reaches 1 - p1: what must w p1 reach in yours?")
+@wrong("Class 1 is called where w p1 reaches 1 - p1: what must w p1 reach in yours?")
 def against_one(p1, y, recall):
     return 1.0 + weight_for_recall(p1, y, recall)
 
 
-@wrong(QUESTION, "A quantile may lie between two pixels; what decides is the last pixel that must be found.")
+@wrong("A quantile may lie between two pixels; what decides is the last pixel that must be found.")
 def at_a_quantile(p1, y, recall):
     last = np.quantile(p1[y], 1.0 - recall)
     return float((1.0 - last) / last)
 
 
-@wrong(QUESTION, "You find one pixel more than you promised: sorted from the surest, the k-th has the index k - 1.")
+@wrong("You find one pixel more than you promised: sorted from the surest, the k-th has the index k - 1.")
 def one_too_many(p1, y, recall):
     found_first = np.sort(p1[y])[::-1]
     last = found_first[min(int(np.ceil(recall * len(found_first))), len(found_first) - 1)]
     return float((1.0 - last) / last)
 
 
-@wrong(QUESTION, "A weight may be below 1: the surest pixels alone may keep the promise.")
+@wrong("A weight may be below 1: the surest pixels alone may keep the promise.")
 def at_least_one(p1, y, recall):
     return max(weight_for_recall(p1, y, recall), 1.0)
 
 
-@wrong(
-    QUESTION,
-    "In floats (1 - p) / p * p may be a hair less than 1 - p: leave the limit a hair of room, or sort the pixels.",
-)
+@wrong("In floats (1 - p) / p * p may be a hair less than 1 - p: leave the limit a hair of room, or sort the pixels.")
 def tried_without_room(p1, y, recall):
     odds = np.unique((1.0 - p1) / p1)
     return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)
 
 
 @wrong(
-    QUESTION,
     "For a pixel of p1 = 0.000001 the weight is 999,999: where does your search end?",
     limit=(10.0, 100.0, 1000.0, 10_000.0),
 )
@@ -110,13 +105,13 @@ def searched_up_to_a(p1, y, recall, limit):
     return min(weight_for_recall(p1, y, recall), limit)
 
 
-@wrong(QUESTION, "Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
+@wrong("Recall is a share of the pixels that truly are of class 1: which of p1 do you sort?")
 def as_many_of_all_pixels(p1, y, recall):
     last = np.sort(p1)[::-1][int(np.ceil(recall * y.sum())) - 1]
     return float((1.0 - last) / last)
 
 
-@wrong(QUESTION, "You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
+@wrong("You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
 def weight_for_precision(p1, y, recall):
     odds = np.unique((1.0 - p1) / p1)
     return float(next(w for w in odds if np.mean(y[w * p1 >= 1.0 - p1]) >= recall))

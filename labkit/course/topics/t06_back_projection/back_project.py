@@ -24,7 +24,6 @@ def _depth_image(rng):
 
 
 QUESTION = Question(
-    name="06_back_projection.back_project",
     reference=back_project,
     inputs=_depth_image,
     by_hand=(
@@ -50,85 +49,81 @@ def holes(depth):
     return np.where(depth > 0.0, depth, np.nan)[..., None]
 
 
-@wrong(
-    QUESTION, "Your cloud is mirrored and sheared: u counts columns, v counts rows, and the array is indexed [v, u]."
-)
+@wrong("Your cloud is mirrored and sheared: u counts columns, v counts rows, and the array is indexed [v, u].")
 def u_is_the_row(depth, K):
     u, v = np.mgrid[: depth.shape[0], : depth.shape[1]]
     q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
     return holes(depth) * q
 
 
-@wrong(
-    QUESTION, "A wall seen head-on has one depth, and it must come out flat: is z the depth, or the length of the ray?"
-)
+@wrong("A wall seen head-on has one depth, and it must come out flat: is z the depth, or the length of the ray?")
 def length_of_the_ray(depth, K):
     q = rays(depth.shape, K)
     return holes(depth) * q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
-@wrong(QUESTION, "You are off by half a pixel: in this kit the first pixel's centre is at u = v = 0.")
+@wrong("You are off by half a pixel: in this kit the first pixel's centre is at u = v = 0.")
 def centres_at_halves(depth, K):
     return holes(depth) * rays(depth.shape, K, 0.5)
 
 
-@wrong(QUESTION, "You are off by a pixel: the first one has u = v = 0, not 1.")
+@wrong("You are off by a pixel: the first one has u = v = 0, not 1.")
 def counted_from_one(depth, K):
     return holes(depth) * rays(depth.shape, K, 1.0)
 
 
-@wrong(QUESTION, "u and x go with fx and cx, the first row of K; v and y go with fy and cy.")
+@wrong("u and x go with fx and cx, the first row of K; v and y go with fy and cy.")
 def focal_lengths_exchanged(depth, K):
     return back_project(depth, K_of(K[1, 1], K[0, 0], K[0, 2], K[1, 2]))
 
 
-@wrong(QUESTION, "x is right and y is not: which entry of K belongs to the rows?")
+@wrong("x is right and y is not: which entry of K belongs to the rows?")
 def one_focal_length(depth, K):
     return back_project(depth, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]))
 
 
-@wrong(QUESTION, "Your cloud lies behind the camera: here x points right, y down and z forward.")
+@wrong("Your cloud lies behind the camera: here x points right, y down and z forward.")
 def opengl_axes(depth, K):
     return back_project(depth, K) * (1.0, -1.0, -1.0)
 
 
-@wrong(QUESTION, "The numbers are right and stand in the wrong places: reshape does not move an axis.")
+@wrong("The numbers are right and stand in the wrong places: reshape does not move an axis.")
 def reshaped(depth, K):
     return np.moveaxis(back_project(depth, K), -1, 0).reshape(*depth.shape, 3)
 
 
-@wrong(QUESTION, "A hole has no point: its z is NaN as well, not 0.")
+@wrong("A hole has no point: its z is NaN as well, not 0.")
 def holes_at_depth_zero(depth, K):
     P = back_project(depth, K)
     P[..., 2] = depth
     return P
 
 
-@wrong(QUESTION, "The optical axis meets the image at (cx, cy), where x and y are 0: from where do you count u and v?")
+@wrong("The optical axis meets the image at (cx, cy), where x and y are 0: from where do you count u and v?")
 def counted_from_the_first_pixel(depth, K):
     return back_project(depth, K_of(K[0, 0], K[1, 1], 0.0, 0.0))
 
 
-@wrong(QUESTION, "The principal point is what K says, cx and cy; it need not be the middle of the image.")
+@wrong("The principal point is what K says, cx and cy; it need not be the middle of the image.")
 def middle_of_the_image(depth, K):
     H, W = depth.shape
     return back_project(depth, K_of(K[0, 0], K[1, 1], (W - 1) / 2, (H - 1) / 2))
 
 
-@wrong(QUESTION, "A hole has no point: its x and y are NaN as well, not 0.")
+@wrong("A hole has no point: its x and y are NaN as well, not 0.")
 def holes_without_z_alone(depth, K):
     P = np.nan_to_num(back_project(depth, K))
     P[..., 2:] = holes(depth)
     return P
 
 
-@wrong(QUESTION, "np.meshgrid with indexing='ij' stands on its side, and reshape does not turn it: which axis is u?")
+@wrong("np.meshgrid with indexing='ij' stands on its side, and reshape does not turn it: which axis is u?")
 def grid_on_its_side(depth, K):
     u, v = (grid.reshape(depth.shape) for grid in np.meshgrid(*map(np.arange, depth.shape[::-1]), indexing="ij"))
     q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
     return holes(depth) * q
 
 
-@wrong(QUESTION, "An image of points is asked for, one at each pixel's place: what stands where there is no reading?")
+@wrong("An image of points is asked for, one at each pixel's place: what stands where there is no reading?")
 def list_of_points(depth, K):
     return (holes(depth) * rays(depth.shape, K))[depth > 0.0]

@@ -14,7 +14,6 @@ def cropped_intrinsics(K, left, top, scale):
 
 
 QUESTION = Question(
-    name="06_back_projection.cropped_intrinsics",
     reference=cropped_intrinsics,
     inputs=lambda rng: (
         camera(rng, 120, 160),
@@ -38,55 +37,53 @@ def with_centre(K, scale, cx, cy):
     return np.array([[scale * K[0, 0], 0.0, cx], [0.0, scale * K[1, 1], cy], [0.0, 0.0, 1.0]])
 
 
-@wrong(
-    QUESTION, "Halve a row of two pixels: their centres are at 0 and 1, the new pixel covers both. Where is its centre?"
-)
+@wrong("Halve a row of two pixels: their centres are at 0 and 1, the new pixel covers both. Where is its centre?")
 def centres_forgotten(K, left, top, scale):
     return with_centre(K, scale, scale * (K[0, 2] - left), scale * (K[1, 2] - top))
 
 
-@wrong(QUESTION, "The principal point is in pixels, too: with twice as many it lies twice as far from the corner.")
+@wrong("The principal point is in pixels, too: with twice as many it lies twice as far from the corner.")
 def focal_length_alone_scaled(K, left, top, scale):
     return with_centre(K, scale, K[0, 2] - left, K[1, 2] - top)
 
 
-@wrong(QUESTION, "First cropped, then resized: left and top count pixels of the image before it was resized.")
+@wrong("First cropped, then resized: left and top count pixels of the image before it was resized.")
 def resized_first(K, left, top, scale):
     half = (scale - 1.0) / 2.0
     return with_centre(K, scale, scale * K[0, 2] + half - left, scale * K[1, 2] + half - top)
 
 
-@wrong(QUESTION, "What was at column `left` is at column 0 of the crop: do columns grow or shrink?")
+@wrong("What was at column `left` is at column 0 of the crop: do columns grow or shrink?")
 def added(K, left, top, scale):
     return cropped_intrinsics(K, -left, -top, scale)
 
 
-@wrong(QUESTION, "left and top count old pixels, so take them off first; and corners stay together, not centres.")
+@wrong("left and top count old pixels, so take them off first; and corners stay together, not centres.")
 def resized_first_about_centres(K, left, top, scale):
     return with_centre(K, scale, scale * K[0, 2] - left, scale * K[1, 2] - top)
 
 
-@wrong(QUESTION, "Your half pixel has the wrong sign: the corner is at -1/2, so a centre u lies u + 1/2 behind it.")
+@wrong("Your half pixel has the wrong sign: the corner is at -1/2, so a centre u lies u + 1/2 behind it.")
 def half_pixel_with_the_other_sign(K, left, top, scale):
     half = (1.0 - scale) / 2.0
     return with_centre(K, scale, scale * (K[0, 2] - left) + half, scale * (K[1, 2] - top) + half)
 
 
-@wrong(QUESTION, "A resize multiplies u and v: which rows of K make them, and which entry must stay 1?")
+@wrong("A resize multiplies u and v: which rows of K make them, and which entry must stay 1?")
 def whole_matrix_scaled(K, left, top, scale):
     new = cropped_intrinsics(K, left, top, scale)
     new[2, 2] = scale
     return new
 
 
-@wrong(QUESTION, "With twice as many pixels, how many pixels is the focal length?")
+@wrong("With twice as many pixels, how many pixels is the focal length?")
 def focal_lengths_kept(K, left, top, scale):
     new = cropped_intrinsics(K, left, top, scale)
     new[[0, 1], [0, 1]] = K[0, 0], K[1, 1]
     return new
 
 
-@wrong(QUESTION, "fx and fy may differ: which entry of K is fy?")
+@wrong("fx and fy may differ: which entry of K is fy?")
 def one_focal_length(K, left, top, scale):
     new = cropped_intrinsics(K, left, top, scale)
     new[1, 1] = new[0, 0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 from labkit.course.topics.t06_back_projection import pose
 
 
@@ -32,7 +32,6 @@ def _points_near_a_plane(rng):
 
 
 QUESTION = Question(
-    name="06_back_projection.fit_plane",
     reference=fit_plane,
     inputs=_points_near_a_plane,
     by_hand=(
@@ -43,16 +42,18 @@ QUESTION = Question(
     random_cases=6,
     atol=1e-5,
     points=3,
-    properties=(
-        Property("n has length 1", lambda arguments, plane: bool(np.isclose(np.linalg.norm(plane[0]), 1.0, atol=1e-3))),
-        Property(
-            "the plane goes through the weighted mean m of the points, n . m = d",
-            lambda arguments, plane: np.isclose(
-                plane[0] @ np.average(arguments[0], axis=0, weights=arguments[1] ** -2.0), plane[1], atol=1e-3
-            ),
-        ),
-    ),
 )
+
+
+@holds("n has length 1")
+def n_has_length_1(P, sigma, plane):
+    return np.isclose(np.linalg.norm(plane[0]), 1.0, atol=1e-3)
+
+
+@holds("the plane goes through the weighted mean m of the points, n . m = d")
+def goes_through_the_mean(P, sigma, plane):
+    return np.isclose(plane[0] @ np.average(P, axis=0, weights=sigma**-2.0), plane[1], atol=1e-3)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -70,7 +71,7 @@ def centre_and_axes(P, sigma):
     return centre, np.linalg.eigh((P - centre).T * w @ (P - centre))[1]
 
 
-@wrong(QUESTION, "You measure errors along z. Tilt the plane: the distance of a point is measured along the normal.")
+@wrong("You measure errors along z. Tilt the plane: the distance of a point is measured along the normal.")
 def along_z(P, sigma):
     A = np.column_stack([P[:, :2], np.ones(len(P))]) / sigma[:, None]
     a, b, c = np.linalg.lstsq(A, P[:, 2] / sigma, rcond=None)[0]
@@ -78,63 +79,63 @@ def along_z(P, sigma):
     return np.array([-a, -b, 1.0]) / length, float(c / length)
 
 
-@wrong(QUESTION, "In which direction do points of a plane scatter least, and in which most?")
+@wrong("In which direction do points of a plane scatter least, and in which most?")
 def largest_spread(P, sigma):
     centre, axes = centre_and_axes(P, sigma)
     return up(axes[:, 2], centre)
 
 
-@wrong(QUESTION, "An eigenvector's sign is arbitrary: where n points down, turn n up, and d with it.")
+@wrong("An eigenvector's sign is arbitrary: where n points down, turn n up, and d with it.")
 def not_turned_up(P, sigma):
     centre, axes = centre_and_axes(P, sigma)
     return axes[:, 0], float(axes[:, 0] @ centre)
 
 
-@wrong(QUESTION, "A plane need not contain the origin: from which point are the directions measured?")
+@wrong("A plane need not contain the origin: from which point are the directions measured?")
 def through_the_origin(P, sigma):
     return up(np.linalg.svd(P / sigma[:, None], full_matrices=False)[2][2], np.zeros(3))
 
 
-@wrong(QUESTION, "The point through which the best plane goes is a mean, too: do all points count alike in it?")
+@wrong("The point through which the best plane goes is a mean, too: do all points count alike in it?")
 def centre_without_weights(P, sigma):
     centre = P.mean(axis=0)
     return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][2], centre)
 
 
-@wrong(QUESTION, "A point of twice the sigma counts a quarter: squares of distances are divided by squares.")
+@wrong("A point of twice the sigma counts a quarter: squares of distances are divided by squares.")
 def weights_not_squared(P, sigma):
     return fit_plane(P, np.sqrt(sigma))
 
 
-@wrong(QUESTION, "A point of a larger sigma is less sure, and must count less; yours counts more.")
+@wrong("A point of a larger sigma is less sure, and must count less; yours counts more.")
 def unsure_points_count_more(P, sigma):
     return fit_plane(P, sigma**-0.5)
 
 
-@wrong(QUESTION, "np.linalg.eigh gives the eigenvectors as the columns of its matrix: yours is a row.")
+@wrong("np.linalg.eigh gives the eigenvectors as the columns of its matrix: yours is a row.")
 def row_of_the_eigenvectors(P, sigma):
     centre, axes = centre_and_axes(P, sigma)
     return up(axes[0], centre)
 
 
-@wrong(QUESTION, "d is gone only if you subtract the mean m from the points before you look for n; then d = n . m.")
+@wrong("d is gone only if you subtract the mean m from the points before you look for n; then d = n . m.")
 def not_centred(P, sigma):
     return up(np.linalg.eigh(P.T / sigma**2 @ P)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
 
 
-@wrong(QUESTION, "You divide by sigma squared twice: in A one of the two factors has the weight, not both.")
+@wrong("You divide by sigma squared twice: in A one of the two factors has the weight, not both.")
 def weights_in_both_factors(P, sigma):
     centred = (P - np.average(P, axis=0, weights=sigma**-2.0)) / sigma[:, None] ** 2
     return up(np.linalg.eigh(centred.T @ centred)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
 
 
-@wrong(QUESTION, "Turn n up before you compute n . m = d: yours still has the sign of the other normal.")
+@wrong("Turn n up before you compute n . m = d: yours still has the sign of the other normal.")
 def d_before_the_turn(P, sigma):
     n, d = not_turned_up(P, sigma)
     return up(n, P[0])[0], d
 
 
-@wrong(QUESTION, "In which direction do points of a plane scatter least, and in which most?")
+@wrong("In which direction do points of a plane scatter least, and in which most?")
 def largest_spread_by_its_sign(P, sigma):
     """A level direction, whose z is 0, becomes no direction at all."""
     centre, axes = centre_and_axes(P, sigma)
@@ -142,19 +143,19 @@ def largest_spread_by_its_sign(P, sigma):
     return n, float(n @ centre)
 
 
-@wrong(QUESTION, "np.linalg.svd returns V transposed, so the directions are its rows: yours is a column.")
+@wrong("np.linalg.svd returns V transposed, so the directions are its rows: yours is a column.")
 def column_of_the_transposed_directions(P, sigma):
     centre, _ = centre_and_axes(P, sigma)
     return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][:, 2], centre)
 
 
-@wrong(QUESTION, "np.linalg.eig promises no order: is your first axis always the one of least spread?")
+@wrong("np.linalg.eig promises no order: is your first axis always the one of least spread?")
 def first_axis_of_eig(P, sigma):
     centre, w = np.average(P, axis=0, weights=sigma**-2.0), 1.0 / sigma**2
     return up(np.linalg.eig((P - centre).T * w @ (P - centre))[1][:, 0], centre)
 
 
-@wrong(QUESTION, "The weights are in your mean: are they in the squares that the plane makes least, too?")
+@wrong("The weights are in your mean: are they in the squares that the plane makes least, too?")
 def scatter_without_weights(P, sigma):
     centre = np.average(P, axis=0, weights=sigma**-2.0)
     return up(np.linalg.eigh((P - centre).T @ (P - centre))[1][:, 0], centre)

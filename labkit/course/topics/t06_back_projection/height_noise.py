@@ -26,7 +26,6 @@ _LOOKS_LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0
 
 
 QUESTION = Question(
-    name="06_back_projection.height_noise",
     reference=height_noise,
     inputs=_noisy_pixel,
     by_hand=(
@@ -47,79 +46,79 @@ def shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return T_base_cam[2, :3] @ J * np.array([sigma_pixel, sigma_pixel, sigma_depth])
 
 
-@wrong(QUESTION, "Independent errors rarely point the same way: what adds up is not the standard deviations.")
+@wrong("Independent errors rarely point the same way: what adds up is not the standard deviations.")
 def stds_added(*arguments):
     return np.sum(np.abs(shares(*arguments)))
 
 
-@wrong(QUESTION, "fx and fy are two numbers: which one belongs to v?")
+@wrong("fx and fy are two numbers: which one belongs to v?")
 def one_focal_length(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     same = K.copy()
     same[1, 1] = K[0, 0]
     return height_noise(u, v, d, same, T_base_cam, sigma_pixel, sigma_depth)
 
 
-@wrong(QUESTION, "Two errors of independent signs do not cancel: square before you add.")
+@wrong("Two errors of independent signs do not cancel: square before you add.")
 def signed_stds_added(*arguments):
     return np.abs(np.sum(shares(*arguments)))
 
 
-@wrong(QUESTION, "An error of depth moves the point along its ray, and off the optical axis that is not the z axis.")
+@wrong("An error of depth moves the point along its ray, and off the optical axis that is not the z axis.")
 def ray_straight_ahead(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = straight_ahead(u, v, d, K)
     return np.linalg.norm(T_base_cam[2, :3] @ J * np.array([sigma_pixel, sigma_pixel, sigma_depth]))
 
 
-@wrong(QUESTION, "You have the whole error of the point; only its component along the base frame's z is asked for.")
+@wrong("You have the whole error of the point; only its component along the base frame's z is asked for.")
 def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = np.stack(columns(u, v, d, K), axis=1)
     return np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth))
 
 
-@wrong(QUESTION, "x, y and z of the camera err together: turn the covariance, r3 J S J^T r3, not the three deviations.")
+@wrong("x, y and z of the camera err together: turn the covariance, r3 J S J^T r3, not the three deviations.")
 def deviations_turned(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = np.stack(columns(u, v, d, K), axis=1)
     return abs(T_base_cam[2, :3] @ np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth), axis=1))
 
 
-@wrong(QUESTION, "You count the depth alone, and along the optical axis: u and v err as well, and depth acts along q.")
+@wrong("You count the depth alone, and along the optical axis: u and v err as well, and depth acts along q.")
 def depth_straight_ahead_alone(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return abs(T_base_cam[2, 2]) * sigma_depth
 
 
-@wrong(QUESTION, "The depth alone errs in yours: u and v err as well, and move the point sideways by d / f.")
+@wrong("The depth alone errs in yours: u and v err as well, and move the point sideways by d / f.")
 def depth_alone(*arguments):
     return abs(shares(*arguments)[2])
 
 
-@wrong(QUESTION, "Both pixel coordinates err, u and v: yours has the share of one of them.")
+@wrong("Both pixel coordinates err, u and v: yours has the share of one of them.")
 def errors_of_u_and_d(*arguments):
     return np.linalg.norm(shares(*arguments)[[0, 2]])
 
 
-@wrong(QUESTION, "A covariance holds squares: diag(sigma_p, sigma_p, sigma_d) is not yet the S of the lesson.")
+@wrong("A covariance holds squares: diag(sigma_p, sigma_p, sigma_d) is not yet the S of the lesson.")
 def deviations_taken_for_variances(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return np.linalg.norm(shares(u, v, d, K, T_base_cam, np.sqrt(sigma_pixel), np.sqrt(sigma_depth)))
 
 
-@wrong(QUESTION, "Depth is measured along z: its column of J is q, whose third entry is 1, not a unit vector.")
+@wrong("Depth is measured along z: its column of J is q, whose third entry is 1, not a unit vector.")
 def depth_along_a_unit_ray(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     length = np.linalg.norm(columns(u, v, d, K)[2])
     return np.linalg.norm(shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth / length))
 
 
-@wrong(QUESTION, "By how much does a translation change the difference of two points? Noise is a difference.")
+@wrong("By how much does a translation change the difference of two points? Noise is a difference.")
 def translation_added(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     J = np.vstack([np.stack(columns(u, v, d, K), axis=1), np.ones(3)])
     return np.linalg.norm(T_base_cam[2] @ J * (sigma_pixel, sigma_pixel, sigma_depth))
 
 
-@wrong(QUESTION, "That is the noise along the camera's z axis: which row of T makes heights of camera coordinates?")
+@wrong("That is the noise along the camera's z axis: which row of T makes heights of camera coordinates?")
 def along_the_optical_axis(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     return sigma_depth
 
 
-@wrong(QUESTION, "All three errors at once, in one direction, are one draw: what do independent errors do one by one?")
+@wrong("All three errors at once, in one direction, are one draw: what do independent errors do one by one?")
 def all_three_at_once(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
     def height(u, v, d):
         return d * (T_base_cam[2, :3] @ np.linalg.inv(K) @ (u, v, 1.0))

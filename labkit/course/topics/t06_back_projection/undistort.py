@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 from labkit.course.topics.t06_back_projection import K_SMALL, K_of, camera
 
 
@@ -37,7 +37,6 @@ def _seen_pixels(rng):
 K_LARGE = K_of(200.0, 400.0, 100.0, 0.0)  # the small camera with a hundred times as many pixels
 
 QUESTION = Question(
-    name="06_back_projection.undistort",
     reference=undistort,
     inputs=_seen_pixels,
     by_hand=(
@@ -56,20 +55,19 @@ QUESTION = Question(
     rtol=1e-6,
     atol=1e-3,  # a thousandth of a pixel, as the lab promises
     points=4,
-    properties=(
-        Property(
-            "the principal point stays where it is",
-            lambda arguments, pixels: np.allclose(
-                np.asarray(pixels)[np.all(arguments[0] == arguments[1][:2, 2], axis=1)], arguments[1][:2, 2], atol=1e-3
-            ),
-        ),
-        Property(
-            "put into the lens, your pixels come out as those that were seen",
-            lambda arguments, pixels: np.allclose(distort(pixels, *arguments[1:]), arguments[0], atol=1e-3),
-        ),
-    ),
     forbidden=("cv2", "scipy"),
 )
+
+
+@holds("the principal point stays where it is")
+def principal_point_stays(pixels, K, k, straight):
+    return np.allclose(straight[np.all(pixels == K[:2, 2], axis=1)], K[:2, 2], atol=1e-3)
+
+
+@holds("put into the lens, your pixels come out as those that were seen")
+def distorted_again_they_are_what_was_seen(pixels, K, k, straight):
+    return np.allclose(distort(straight, K, k), pixels, atol=1e-3)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -83,22 +81,19 @@ def divided_again(pixels, K, factor, rounds=100):
     return c + f * ideal
 
 
-@wrong(QUESTION, "You bent the pixels a second time: the lens did it once, and you are to take it back.")
+@wrong("You bent the pixels a second time: the lens did it once, and you are to take it back.")
 def bent_again(pixels, K, k):
     return distort(pixels, K, k)
 
 
 @wrong(
-    QUESTION,
-    "Put your answer into the lens: does the given pixel come out? r is the ideal point's radius, not the seen one's.",
+    "Put your answer into the lens: does the given pixel come out? r is the ideal point's radius, not the seen one's."
 )
 def radius_as_seen(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**4, rounds=1)
 
 
-@wrong(
-    QUESTION, "Each round divides the last guess again, so that the factors pile up. Which numbers are to be divided?"
-)
+@wrong("Each round divides the last guess again, so that the factors pile up. Which numbers are to be divided?")
 def guess_divided_again(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     guess = (pixels - c) / f
@@ -108,12 +103,12 @@ def guess_divided_again(pixels, K, k):
     return c + f * guess
 
 
-@wrong(QUESTION, "r is a radius without a unit, at depth 1: where do you go from pixels to x and y, and back?")
+@wrong("r is a radius without a unit, at depth 1: where do you go from pixels to x and y, and back?")
 def normalised(pixels, K, k):
     return (undistort(pixels, K, k) - K[:2, 2]) / np.diagonal(K)[:2]
 
 
-@wrong(QUESTION, "x is divided by fx and y by fy: by what do you divide each of them before you square it?")
+@wrong("x is divided by fx and y by fy: by what do you divide each of them before you square it?")
 def radius_in_pixels(pixels, K, k):
     c = K[:2, 2]
     seen = ideal = pixels - c
@@ -123,45 +118,43 @@ def radius_in_pixels(pixels, K, k):
     return c + ideal
 
 
-@wrong(QUESTION, "k1 stands beside r squared and k2 beside r to the fourth.")
+@wrong("k1 stands beside r squared and k2 beside r to the fourth.")
 def powers_too_low(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r + k[1] * r**2)
 
 
-@wrong(QUESTION, "Each pixel has its own r: add its x squared and its y squared, not those of all pixels.")
+@wrong("Each pixel has its own r: add its x squared and its y squared, not those of all pixels.")
 def one_radius_for_all(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * (r**2).sum() + k[1] * (r**2).sum() ** 2)
 
 
-@wrong(QUESTION, "Minus signs in the factor undo the lens only roughly: guess r, divide what is seen, and repeat.")
+@wrong("Minus signs in the factor undo the lens only roughly: guess r, divide what is seen, and repeat.")
 def signs_exchanged(pixels, K, k):
     return distort(pixels, K, -k)
 
 
-@wrong(QUESTION, "k2 stands beside r to the fourth: square r squared once more.")
+@wrong("k2 stands beside r to the fourth: square r squared once more.")
 def k2_beside_r_squared(pixels, K, k):
     return undistort(pixels, K, np.array([k[0] + k[1], 0.0]))
 
 
-@wrong(QUESTION, "Rows have a focal length of their own: v = fy y_d + cy, and fy is the middle entry of K.")
+@wrong("Rows have a focal length of their own: v = fy y_d + cy, and fy is the middle entry of K.")
 def one_focal_length(pixels, K, k):
     return undistort(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), k)
 
 
-@wrong(QUESTION, "A series is right for small r alone: put your pixels into the lens, do the given ones come out?")
+@wrong("A series is right for small r alone: put your pixels into the lens, do the given ones come out?")
 def by_a_series(pixels, K, k):
     series = (-k[0], 3.0 * k[0] ** 2 - k[1])
     return distort(pixels, K, series)
 
 
-@wrong(
-    QUESTION, "By how many pixels would one more round change your answer? A thousandth counts.", rounds=(2, 3, 5, 10)
-)
+@wrong("By how many pixels would one more round change your answer? A thousandth counts.", rounds=(2, 3, 5, 10))
 def too_few(pixels, K, k, rounds):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**4, rounds)
 
 
-@wrong(QUESTION, "Newton divides by the slope of what he wants to be 0: what is the derivative of k1 r^3?")
+@wrong("Newton divides by the slope of what he wants to be 0: what is the derivative of k1 r^3?")
 def newton_with_a_wrong_slope(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     x = (pixels - c) / f
@@ -171,6 +164,6 @@ def newton_with_a_wrong_slope(pixels, K, k):
     return c + f * x * np.where(seen > 0.0, r / np.where(seen > 0.0, seen, 1.0), 1.0)
 
 
-@wrong(QUESTION, "k2 stands beside r to the fourth: which power of r does yours have?")
+@wrong("k2 stands beside r to the fourth: which power of r does yours have?")
 def k2_beside_r_cubed(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**3)

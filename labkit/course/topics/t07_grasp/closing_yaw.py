@@ -23,7 +23,6 @@ def _variance(Sigma, yaw):
 
 
 QUESTION = Question(
-    name="07_grasp.closing_yaw",
     reference=closing_yaw,
     inputs=_covariance,
     by_hand=(
@@ -47,73 +46,68 @@ def yaw_of(axis):
     return np.arctan2(axis[1], axis[0])
 
 
-@wrong(QUESTION, "That is the direction in which the cloud is longest. The jaws close across it.")
+@wrong("That is the direction in which the cloud is longest. The jaws close across it.")
 def longest_direction(Sigma):
     return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 1])
 
 
-@wrong(QUESTION, "Check Sigma @ v against w * v for the v that you took: is an eigenvector a row or a column?")
+@wrong("Check Sigma @ v against w * v for the v that you took: is an eigenvector a row or a column?")
 def axes_as_rows(Sigma):
     return yaw_of(np.linalg.eigh(Sigma)[1][0])
 
 
-@wrong(QUESTION, "np.linalg.eig promises no order: sometimes your first axis is the long one. Sort, or take eigh.")
+@wrong("np.linalg.eig promises no order: sometimes your first axis is the long one. Sort, or take eigh.")
 def order_of_eig(Sigma):
     return yaw_of(np.linalg.eig(Sigma[:2, :2])[1][:, 0])
 
 
-@wrong(
-    QUESTION,
-    "A flat thing is narrowest upwards, but the jaws close in the table's plane: which block of Sigma is that?",
-)
+@wrong("A flat thing is narrowest upwards, but the jaws close in the table's plane: which block of Sigma is that?")
 def least_of_three(Sigma):
     return yaw_of(np.linalg.eigh(Sigma)[1][:, 0])
 
 
-@wrong(QUESTION, "For a tall thing the upright axis has the most spread, not the least; look at x and y alone.")
+@wrong("For a tall thing the upright axis has the most spread, not the least; look at x and y alone.")
 def middle_of_three(Sigma):
     return yaw_of(np.linalg.eigh(Sigma)[1][:, 1])
 
 
-@wrong(
-    QUESTION, "For a cloud long in x the answer is 90 degrees, and yours is 0: which argument comes first in arctan2?"
-)
+@wrong("For a cloud long in x the answer is 90 degrees, and yours is 0: which argument comes first in arctan2?")
 def yaw_with_x_and_y_swapped(Sigma):
     x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, 0]
     return np.arctan2(x, y)
 
 
-@wrong(QUESTION, "Turn the object by 10 degrees: your yaw turns by 20. The formula gives twice the angle.")
+@wrong("Turn the object by 10 degrees: your yaw turns by 20. The formula gives twice the angle.")
 def double_angle_not_halved(Sigma):
     return np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1]) + np.pi / 2
 
 
-@wrong(QUESTION, "Your yaw does not see the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.")
+@wrong("Your yaw does not see the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.")
 def variances_as_a_direction(Sigma):
     return np.arctan2(Sigma[1, 1], Sigma[0, 0]) + np.pi / 2
 
 
-@wrong(QUESTION, "Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?")
+@wrong("Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?")
 def smaller_of_the_two_variances(Sigma):
     return 0.0 if Sigma[0, 0] < Sigma[1, 1] else np.pi / 2
 
 
-@wrong(QUESTION, "From above one sees x and y: which rows and columns of Sigma are they?")
+@wrong("From above one sees x and y: which rows and columns of Sigma are they?")
 def seen_from_the_side(Sigma):
     return yaw_of(np.linalg.eigh(Sigma[1:, 1:])[1][:, 0])
 
 
-@wrong(QUESTION, "Is the direction (1, -2) the same as (1, 2)? Only both signs together may change.")
+@wrong("Is the direction (1, -2) the same as (1, 2)? Only both signs together may change.")
 def signs_dropped(Sigma):
     return yaw_of(np.abs(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]))
 
 
-@wrong(QUESTION, "Of -1 / -2 and 1 / 2, arctan sees the same quotient: which function takes both numbers?")
+@wrong("Of -1 / -2 and 1 / 2, arctan sees the same quotient: which function takes both numbers?")
 def arctan_of_the_quotient(Sigma):
     with np.errstate(divide="ignore"):
         return 0.5 * np.arctan(2.0 * Sigma[0, 1] / (Sigma[0, 0] - Sigma[1, 1])) + np.pi / 2
 
 
-@wrong(QUESTION, "Modulo pi / 2 takes closing along x for closing along y: which turn brings an axis back to itself?")
+@wrong("Modulo pi / 2 takes closing along x for closing along y: which turn brings an axis back to itself?")
 def modulo_a_right_angle(Sigma):
     return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) % (np.pi / 2)

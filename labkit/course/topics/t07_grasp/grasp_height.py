@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 from labkit.course.topics.t07_grasp import cloud
 
 
@@ -26,7 +26,6 @@ def _upright(low, high):
 
 
 QUESTION = Question(
-    name="07_grasp.grasp_height",
     reference=grasp_height,
     inputs=_heights,
     by_hand=(
@@ -37,63 +36,63 @@ QUESTION = Question(
     ),
     random_cases=16,
     atol=1e-5,
-    properties=(
-        Property(
-            "the palm stays above the top of the object",
-            lambda arguments, z: z - arguments[3] + arguments[2] >= arguments[0][:, 2].max() - 1e-5,
-        ),
-    ),
 )
+
+
+@holds("the palm stays above the top of the object")
+def palm_is_above(P, table_z, palm, tips, clearance, z):
+    return z - tips + palm >= P[:, 2].max() - 1e-5
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "The centroid knows neither the table nor the palm: how low may the tips go, and what stops them?")
+@wrong("The centroid knows neither the table nor the palm: how low may the tips go, and what stops them?")
 def height_of_centroid(P, table_z, palm, tips, clearance):
     return P[:, 2].mean()
 
 
-@wrong(QUESTION, "A bottle is taller than the fingers are long: what does its top meet?")
+@wrong("A bottle is taller than the fingers are long: what does its top meet?")
 def palm_forgotten(P, table_z, palm, tips, clearance):
     return max(P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong(QUESTION, "Only the upper part was seen, and you reach below it: nobody knows what is there.")
+@wrong("Only the upper part was seen, and you reach below it: nobody knows what is there.")
 def unseen_depth(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, table_z + clearance) + tips
 
 
-@wrong(QUESTION, "All three bounds are heights of the tips, and you add tips to the table's alone.")
+@wrong("All three bounds are heights of the tips, and you add tips to the table's alone.")
 def origin_from_the_table_alone(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance + tips)
 
 
-@wrong(QUESTION, "The object's top is a height in the base frame. You take how tall the object is.")
+@wrong("The object's top is a height in the base frame. You take how tall the object is.")
 def tallness_for_the_top(P, table_z, palm, tips, clearance):
     return max(np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong(QUESTION, "clearance is air between the tips and the table: to which of the three bounds does it belong?")
+@wrong("clearance is air between the tips and the table: to which of the three bounds does it belong?")
 def clearance_below_the_palm_too(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm + clearance, P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong(QUESTION, "A table may stand lower than the robot's base: what lies at height 0?")
+@wrong("A table may stand lower than the robot's base: what lies at height 0?")
 def never_below_the_base(P, table_z, palm, tips, clearance):
     return max(0.0, P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong(QUESTION, "All three bounds are heights of the tips: to which of yours do you add no tips?")
+@wrong("All three bounds are heights of the tips: to which of yours do you add no tips?")
 def origin_without_the_palms_bound(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, P[:, 2].min() + tips, table_z + clearance + tips)
 
 
-@wrong(QUESTION, "P has x and y as well: what is the largest number in all of it?")
+@wrong("P has x and y as well: what is the largest number in all of it?")
 def extremes_of_all_coordinates(P, table_z, palm, tips, clearance):
     return max(P.max() - palm, P.min(), table_z + clearance) + tips
 
 
-@wrong(QUESTION, "A percentile leaves out the highest points: what does the palm meet?")
+@wrong("A percentile leaves out the highest points: what does the palm meet?")
 def percentiles_for_the_ends(P, table_z, palm, tips, clearance):
     low, high = np.percentile(P[:, 2], (2, 98))
     return max(high - palm, low, table_z + clearance) + tips

@@ -38,7 +38,6 @@ _L = np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.5], [1.75, 0.5, 0.5], [5.0, 1.5,
 
 
 QUESTION = Question(
-    name="07_grasp.pad_slice",
     reference=pad_slice,
     inputs=_cloud_and_grasp,
     by_hand=(
@@ -65,105 +64,105 @@ def middle_and_width(y):
     return ((y.min() + y.max()) / 2, np.ptp(y)) if len(y) else (0.0, 0.0)
 
 
-@wrong(QUESTION, "What lies beside the pads touches nothing: which of the points lie between them?")
+@wrong("What lies beside the pads touches nothing: which of the points lie between them?")
 def whole_cloud(P, T_base_grasp, half):
     return middle_and_width(in_grasp(P, T_base_grasp)[1])
 
 
-@wrong(QUESTION, "A median leans to the side that shows more points; the jaws meet the two outermost ones.")
+@wrong("A median leans to the side that shows more points; the jaws meet the two outermost ones.")
 def median_for_the_middle(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     y = y[np.abs(x) <= half]
     return (np.median(y), np.ptp(y)) if len(y) else (0.0, 0.0)
 
 
-@wrong(QUESTION, "A mean leans to the side that shows more points; the jaws meet the two outermost ones.")
+@wrong("A mean leans to the side that shows more points; the jaws meet the two outermost ones.")
 def mean_for_the_middle(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     y = y[np.abs(x) <= half]
     return (y.mean(), np.ptp(y)) if len(y) else (0.0, 0.0)
 
 
-@wrong(QUESTION, "The jaws close along y of the grasp frame, and the pads are broad along x.")
+@wrong("The jaws close along y of the grasp frame, and the pads are broad along x.")
 def x_for_y(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(x[np.abs(y) <= half])
 
 
-@wrong(QUESTION, "Cut the points in the grasp frame: does a pad know where the base's axes point?")
+@wrong("Cut the points in the grasp frame: does a pad know where the base's axes point?")
 def cut_in_the_base_frame(P, T_base_grasp, half):
     x, y, _ = (P - T_base_grasp[:3, 3]).T
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong(QUESTION, "A pad reaches half of its breadth to either side of the middle.")
+@wrong("A pad reaches half of its breadth to either side of the middle.")
 def one_side_of_the_pad(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[(x >= 0.0) & (x <= half)])
 
 
-@wrong(QUESTION, "A single point between the pads is a slice, too: its middle is that point, and only its width is 0.")
+@wrong("A single point between the pads is a slice, too: its middle is that point, and only its width is 0.")
 def one_point_is_nothing(P, T_base_grasp, half):
     middle, width = pad_slice(P, T_base_grasp, half)
     return (middle if width > 0.0 else 0.0), width
 
 
-@wrong(QUESTION, "Half of the width is a length, not a place: what is the mean of the outermost two?")
+@wrong("Half of the width is a length, not a place: what is the mean of the outermost two?")
 def half_of_the_width(P, T_base_grasp, half):
     width = pad_slice(P, T_base_grasp, half)[1]
     return width / 2, width
 
 
-@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+@wrong("The position is a point of the base frame: take it off before you turn, not after.")
 def position_taken_off_after_the_turn(P, T_base_grasp, half):
     x, y, _ = (P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong(QUESTION, "Beside the pads your y becomes 0: may a point that is not in the slice be one of the outermost?")
+@wrong("Beside the pads your y becomes 0: may a point that is not in the slice be one of the outermost?")
 def zero_beside_the_pads(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y * (np.abs(x) <= half))
 
 
-@wrong(QUESTION, "Your middle is a y of the base frame. In which frame do the jaws close along y?")
+@wrong("Your middle is a y of the base frame. In which frame do the jaws close along y?")
 def middle_in_the_base_frame(P, T_base_grasp, half):
     between = np.abs(in_grasp(P, T_base_grasp)[0]) <= half
     return middle_and_width(P[between, 1])[0], pad_slice(P, T_base_grasp, half)[1]
 
 
-@wrong(QUESTION, "Twice the largest |y|: is the thing as wide on one side of the middle of the jaws as on the other?")
+@wrong("Twice the largest |y|: is the thing as wide on one side of the middle of the jaws as on the other?")
 def twice_the_larger_side(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     y = y[np.abs(x) <= half]
     return middle_and_width(y)[0], 2.0 * np.abs(y).max(initial=0.0)
 
 
-@wrong(QUESTION, "The pads are broad along x: which coordinate says whether a point lies between them?")
+@wrong("The pads are broad along x: which coordinate says whether a point lies between them?")
 def cut_along_y(P, T_base_grasp, half):
     _, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[np.abs(y) <= half])
 
 
-@wrong(QUESTION, "The points are in the base frame: which transform takes base coordinates to the grasp frame?")
+@wrong("The points are in the base frame: which transform takes base coordinates to the grasp frame?")
 def transform_not_inverted(P, T_base_grasp, half):
     x, y, _ = (P @ T_base_grasp[:3, :3].T + T_base_grasp[:3, 3]).T
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong(QUESTION, "You turn the points: where is the origin of the grasp frame, and where is it for you?")
+@wrong("You turn the points: where is the origin of the grasp frame, and where is it for you?")
 def position_not_taken_off(P, T_base_grasp, half):
     x, y, _ = (P @ T_base_grasp[:3, :3]).T
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong(QUESTION, "A point at the very edge of a pad is touched, too: is x < half true of it?")
+@wrong("A point at the very edge of a pad is touched, too: is x < half true of it?")
 def edges_left_out(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[np.abs(x) < half])
 
 
-@wrong(QUESTION, "x has two signs: what does x <= half say of a point far away on the negative side?")
+@wrong("x has two signs: what does x <= half say of a point far away on the negative side?")
 def one_edge_alone(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[x <= half])

@@ -38,7 +38,6 @@ _OUT = [[2.25, 1.0, 0.5], [3.0, 1.0, 0.5], [2.625, 1.5, 0.5], [2.625, 1.0, 0.125
 
 
 QUESTION = Question(
-    name="07_grasp.points_in_fingers",
     reference=points_in_fingers,
     inputs=_scene_round_a_grasp,
     by_hand=(
@@ -63,108 +62,102 @@ def moved(P, T):
     return (P @ T[:3, :3].T + T[:3, 3]).T
 
 
-@wrong(QUESTION, "The points are in the base frame: which transform takes base coordinates to the grasp frame?")
+@wrong("The points are in the base frame: which transform takes base coordinates to the grasp frame?")
 def transform_not_inverted(P, T_base_grasp, *boxes):
     return in_boxes(*moved(P, T_base_grasp), *boxes)
 
 
-@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+@wrong("The position is a point of the base frame: take it off before you turn, not after.")
 def position_taken_off_after_the_turn(P, T_base_grasp, *boxes):
     return in_boxes(*(P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T, *boxes)
 
 
-@wrong(QUESTION, "What lies lower than the tips is in nobody's way. The frame's z points down.")
+@wrong("What lies lower than the tips is in nobody's way. The frame's z points down.")
 def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
 
 
-@wrong(QUESTION, "z of the grasp frame points down: the tips are at z = tips, and what is above them has smaller z.")
+@wrong("z of the grasp frame points down: the tips are at z = tips, and what is above them has smaller z.")
 def z_taken_for_upwards(P, T_base_grasp, *boxes):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, -z, *boxes)
 
 
-@wrong(QUESTION, "You count what is under the tips: the grasp frame's z points down, so above is smaller z.")
+@wrong("You count what is under the tips: the grasp frame's z points down, so above is smaller z.")
 def below_the_tips_alone(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, -z, width, half, thickness, -tips)
 
 
-@wrong(QUESTION, "There are two fingers, at y and at -y.")
+@wrong("There are two fingers, at y and at -y.")
 def one_finger(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, np.maximum(y, 0.0), z, width, half, thickness, tips)
 
 
-@wrong(QUESTION, "What stands between the pads is what you want to hold: it is not in the way.")
+@wrong("What stands between the pads is what you want to hold: it is not in the way.")
 def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     inside = (np.abs(x) <= half) & (np.abs(y) <= width / 2 + thickness) & (z <= tips)
     return int(inside.sum())
 
 
-@wrong(QUESTION, "The fingers reach up from the tips without end: a point with z far below 0 is in their way, too.")
+@wrong("The fingers reach up from the tips without end: a point with z far below 0 is in their way, too.")
 def near_the_tips_alone(P, T_base_grasp, *boxes):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, np.abs(z), *boxes)
 
 
-@wrong(QUESTION, "The borders belong to the boxes: what lies on one counts, with <= and >=.")
+@wrong("The borders belong to the boxes: what lies on one counts, with <= and >=.")
 def borders_left_out(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     out = np.abs(y) - width / 2
     return int(((np.abs(x) < half) & (out > 0.0) & (out < thickness) & (z < tips)).sum())
 
 
-@wrong(QUESTION, "The hand may lean: what is above the tips is so along z of the grasp frame, not of the base.")
+@wrong("The hand may lean: what is above the tips is so along z of the grasp frame, not of the base.")
 def heights_of_the_base_frame(P, T_base_grasp, width, half, thickness, tips):
     x, y, _ = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, T_base_grasp[2, 3] - P[:, 2], width, half, thickness, tips)
 
 
-@wrong(QUESTION, "A finger begins at its pad and reaches outwards; yours has the pad in its middle.")
+@wrong("A finger begins at its pad and reaches outwards; yours has the pad in its middle.")
 def fingers_astride_their_pads(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width - thickness, half, thickness, tips)
 
 
-@wrong(QUESTION, "A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
+@wrong("A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
 def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, np.inf, tips)
 
 
-@wrong(QUESTION, "That is a share of the points: how many are they?")
+@wrong("That is a share of the points: how many are they?")
 def share_of_the_points(P, *others):
     return points_in_fingers(P, *others) / len(P) if len(P) else np.nan
 
 
-@wrong(QUESTION, "You return the points themselves: how many are they?")
+@wrong("You return the points themselves: how many are they?")
 def the_points(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     out = np.abs(y) - width / 2
     return P[(np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)]
 
 
-@wrong(QUESTION, "thickness counts from the pad outwards: from where does |y| count?")
+@wrong("thickness counts from the pad outwards: from where does |y| count?")
 def thickness_from_the_middle(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness - width / 2, tips)
 
 
-@wrong(QUESTION, "The borders belong to the boxes: what lies on one counts, with <= and >=.")
+@wrong("The borders belong to the boxes: what lies on one counts, with <= and >=.")
 def pads_and_outer_sides_left_out(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     out = np.abs(y) - width / 2
     return int(((np.abs(x) <= half) & (out > 0.0) & (out < thickness) & (z <= tips)).sum())
 
 
-for _first in (1.0, -1.0):
-
-    def or_after_and(P, T_base_grasp, width, half, thickness, tips, first=_first):
-        x, y, z = moved(P, np.linalg.inv(T_base_grasp))
-        out, near = first * y - width / 2, (np.abs(x) <= half) & (z <= tips)
-        other = -first * y - width / 2
-        return int((((out >= 0.0) & (out <= thickness)) | ((other >= 0.0) & (other <= thickness) & near)).sum())
-
-    or_after_and.__name__ += "_left" if _first > 0 else "_right"
-    wrong(QUESTION, "Python reads & before |, as it reads * before +: which finger do x and z cut in yours?")(
-        or_after_and
-    )
+@wrong("Python reads & before |, as it reads * before +: which finger do x and z cut in yours?", first=(1.0, -1.0))
+def or_after_and(P, T_base_grasp, width, half, thickness, tips, first):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out, near = first * y - width / 2, (np.abs(x) <= half) & (z <= tips)
+    other = -first * y - width / 2
+    return int((((out >= 0.0) & (out <= thickness)) | ((other >= 0.0) & (other <= thickness) & near)).sum())

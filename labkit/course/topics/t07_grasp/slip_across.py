@@ -20,7 +20,6 @@ def _grasp_and_middle(rng):
 
 
 QUESTION = Question(
-    name="07_grasp.slip_across",
     reference=slip_across,
     inputs=_grasp_and_middle,
     by_hand=(
@@ -36,64 +35,64 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Turn the hand by 90 degrees: which of the two errors do the jaws undo then? Which frame knows?")
+@wrong("Turn the hand by 90 degrees: which of the two errors do the jaws undo then? Which frame knows?")
 def in_the_base_frame(T_base_grasp, middle):
     off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
     return off[1], off[0]
 
 
-@wrong(QUESTION, "Height is no slip: what is left is along the pads, the x axis of the grasp frame.")
+@wrong("Height is no slip: what is left is along the pads, the x axis of the grasp frame.")
 def height_counted_too(T_base_grasp, middle):
     off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
     return np.abs(off[1]), np.hypot(off[0], off[2])
 
 
-@wrong(QUESTION, "You turned by R where R transposed is needed: from the base's axes to the hand's.")
+@wrong("You turned by R where R transposed is needed: from the base's axes to the hand's.")
 def turned_the_wrong_way(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3] @ (middle - T_base_grasp[:3, 3]))
     return off[1], off[0]
 
 
-@wrong(QUESTION, "The hand may lean: the error and its axes have three components each, and you drop the third.")
+@wrong("The hand may lean: the error and its axes have three components each, and you drop the third.")
 def seen_from_above(T_base_grasp, middle):
     off = 1000.0 * np.abs((middle - T_base_grasp[:3, 3])[:2] @ T_base_grasp[:2, :2])
     return off[1], off[0]
 
 
-@wrong(QUESTION, "The hand may lean: its pads need not lie in the table's plane. What is left is along the pads.")
+@wrong("The hand may lean: its pads need not lie in the table's plane. What is left is along the pads.")
 def left_in_the_tables_plane(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3]) * (1.0, 1.0, 0.0)
     pushed = np.abs(off @ T_base_grasp[:3, 1])
     return pushed, np.sqrt(np.maximum(off @ off - pushed**2, 0.0))
 
 
-@wrong(QUESTION, "The base's x is where the jaws close in the example only: which column of T says so for any hand?")
+@wrong("The base's x is where the jaws close in the example only: which column of T says so for any hand?")
 def in_the_base_frame_of_the_example(T_base_grasp, middle):
     off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
     return off[0], off[1]
 
 
-@wrong(QUESTION, "The position is a point of the base frame: take it off before you turn, not after.")
+@wrong("The position is a point of the base frame: take it off before you turn, not after.")
 def position_taken_off_after_the_turn(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ middle - T_base_grasp[:3, 3])
     return off[1], off[0]
 
 
-@wrong(QUESTION, "Distances at right angles add as squares: the whole less the pushed part is not the slip.")
+@wrong("Distances at right angles add as squares: the whole less the pushed part is not the slip.")
 def lengths_subtracted(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3])
     pushed = np.abs(off @ T_base_grasp[:3, 1])
     return pushed, np.linalg.norm(off[:2]) - pushed
 
 
-@wrong(QUESTION, "The hand may lean: your slip is what is left over in the base's x and y, not along the hand's pads.")
+@wrong("The hand may lean: your slip is what is left over in the base's x and y, not along the hand's pads.")
 def left_of_the_way_seen_from_above(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3])
     pushed = np.abs(off @ T_base_grasp[:3, 1])
     return pushed, np.sqrt(np.maximum(off[0] ** 2 + off[1] ** 2 - pushed**2, 0.0))
 
 
-@wrong(QUESTION, "A slip is a distance: what do yours say if the middle lies on the other side of the hand?")
+@wrong("A slip is a distance: what do yours say if the middle lies on the other side of the hand?")
 def with_signs(T_base_grasp, middle):
     off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
     return off[1], off[0]

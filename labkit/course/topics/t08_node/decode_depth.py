@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def decode_depth(data, height, width, step, is_bigendian):
@@ -27,7 +27,6 @@ def _depth_message(rng, padding=None, is_bigendian=None):
 
 
 QUESTION = Question(
-    name="08_node.decode_depth",
     reference=decode_depth,
     inputs=_depth_message,
     by_hand=(
@@ -40,14 +39,14 @@ QUESTION = Question(
     random_cases=6,
     rtol=1e-5,
     points=3,
-    properties=(
-        Property(
-            "no distance is 0, and none is more than 65.535 m",
-            lambda arguments, depth: bool(np.all(np.isnan(depth) | ((depth > 0.0) & (depth < 65.536)))),
-        ),
-    ),
     forbidden=("cv_bridge",),
 )
+
+
+@holds("no distance is 0, and none is more than 65.535 m")
+def in_range(data, height, width, step, is_bigendian, depth):
+    return np.all(np.isnan(depth) | ((depth > 0.0) & (depth < 65.536)))
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -62,48 +61,48 @@ def metres(numbers):
     return np.where(numbers > 0, numbers * 0.001, np.nan)
 
 
-@wrong(QUESTION, "From the second row on the image slides sideways: at which byte does row r begin?")
+@wrong("From the second row on the image slides sideways: at which byte does row r begin?")
 def padding_as_pixels(data, height, width, step, is_bigendian):
     pixels = data[: 2 * height * width]
     return metres(units(pixels, height, width, 2 * width, ">" if is_bigendian else "<"))
 
 
-@wrong(QUESTION, "A row takes step bytes, and its pixels 2 width of them: what do you do with the rest?")
+@wrong("A row takes step bytes, and its pixels 2 width of them: what do you do with the rest?")
 def padding_as_pixels_of_all_bytes(data, height, width, step, is_bigendian):
     numbers = np.frombuffer(bytes(data), ">u2" if is_bigendian else "<u2")  # raises if their count is odd
     return metres(numbers[: height * width].reshape(height, width))
 
 
-@wrong(QUESTION, "65535 has become -1: the numbers have no sign. Which type is that?")
+@wrong("65535 has become -1: the numbers have no sign. Which type is that?")
 def signed_distances(data, height, width, step, is_bigendian):
     numbers = units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16)
     return np.where(numbers == 0, np.nan, numbers / 1000)
 
 
-@wrong(QUESTION, "What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")
+@wrong("What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")
 def signed_numbers(data, height, width, step, is_bigendian):
     return metres(units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16))
 
 
-@wrong(QUESTION, "Nothing is further than 25.5 cm: a pixel has two bytes. Did arithmetic in uint8 overflow?")
+@wrong("Nothing is further than 25.5 cm: a pixel has two bytes. Did arithmetic in uint8 overflow?")
 def low_byte_only(data, height, width, step, is_bigendian):
     numbers = units(data, height, width, step, ">" if is_bigendian else "<")
     return metres(numbers % 256)
 
 
-@wrong(QUESTION, "The two bytes of a pixel stand side by side in the row, not half a row apart.")
+@wrong("The two bytes of a pixel stand side by side in the row, not half a row apart.")
 def halves_of_a_row(data, height, width, step, is_bigendian):
     rows = data.reshape(height, step)[:, : 2 * width].reshape(height, 2, width)
     return decode_depth(rows.transpose(0, 2, 1).ravel(), height, width, 2 * width, is_bigendian)
 
 
-@wrong(QUESTION, "The padding stands at a row's end: where do the row's pixels begin?")
+@wrong("The padding stands at a row's end: where do the row's pixels begin?")
 def padding_in_front(data, height, width, step, is_bigendian):
     rows = data.reshape(height, step)[:, step - 2 * width :]
     return decode_depth(rows.ravel(), height, width, 2 * width, is_bigendian)
 
 
-@wrong(QUESTION, "65535 is a distance here, 65.535 m: which number alone says that nothing was seen?")
+@wrong("65535 is a distance here, 65.535 m: which number alone says that nothing was seen?")
 def largest_for_a_hole(data, height, width, step, is_bigendian):
     depth = decode_depth(data, height, width, step, is_bigendian)
     return np.where(depth > 65.534, np.nan, depth)

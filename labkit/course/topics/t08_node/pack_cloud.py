@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def pack_cloud(P):
@@ -23,7 +23,6 @@ def _holed_cloud(rng):
 
 
 QUESTION = Question(
-    name="08_node.pack_cloud",
     reference=pack_cloud,
     inputs=_holed_cloud,
     by_hand=(
@@ -32,13 +31,13 @@ QUESTION = Question(
         (np.array([[np.nan, 0.0, 0.0], [0.6, -0.4, 0.2]]),),
         (np.array([[0.1, 0.2, np.inf], [0.4, -0.2, 0.3], [0.0, 0.0, 0.0]]),),
     ),
-    properties=(
-        Property(
-            "as many points as have three finite coordinates",
-            lambda arguments, data: np.size(data) == 16 * np.count_nonzero(np.isfinite(arguments[0]).all(axis=1)),
-        ),
-    ),
 )
+
+
+@holds("as many points as have three finite coordinates")
+def as_many_points(P, data):
+    return np.size(data) == 16 * np.count_nonzero(np.isfinite(P).all(axis=1))
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -53,69 +52,69 @@ def packed(P, kind="<f4", padding=4):
     return np.hstack([rows, np.zeros((len(P), padding), np.uint8)])
 
 
-@wrong(QUESTION, "is_dense promises that no point is NaN: who promised that here?")
+@wrong("is_dense promises that no point is NaN: who promised that here?")
 def holes_kept(P):
     return packed(P).ravel()
 
 
-@wrong(QUESTION, "A pixel without depth has become a point in the robot's foot.")
+@wrong("A pixel without depth has become a point in the robot's foot.")
 def holes_as_origin(P):
     return packed(np.where(np.isfinite(P).all(axis=1, keepdims=True), P, 0.0)).ravel()
 
 
-@wrong(QUESTION, "A point of yours takes 32 bytes: float32 has 4 bytes per number. How many has float64?")
+@wrong("A point of yours takes 32 bytes: float32 has 4 bytes per number. How many has float64?")
 def double_precision(P):
     return packed(finite(P), "<f8", padding=8).ravel()
 
 
-@wrong(QUESTION, "The message says is_bigendian = 0: which byte comes first?")
+@wrong("The message says is_bigendian = 0: which byte comes first?")
 def big_endian(P):
     return packed(finite(P), ">f4").ravel()
 
 
-@wrong(QUESTION, "point_step is 16 and three numbers take 12: what fills the rest?")
+@wrong("point_step is 16 and three numbers take 12: what fills the rest?")
 def no_padding(P):
     return packed(finite(P), padding=0).ravel()
 
 
-@wrong(QUESTION, "The bytes of one point stand together: x, y, z, then the next point.")
+@wrong("The bytes of one point stand together: x, y, z, then the next point.")
 def axis_after_axis(P):
     cloud = finite(P)
     numbers = np.column_stack([cloud, np.zeros(len(cloud))])
     return np.frombuffer(numbers.T.astype("<f4").tobytes(), np.uint8)
 
 
-@wrong(QUESTION, "The bytes of one point stand together: x, y, z, then the next point.")
+@wrong("The bytes of one point stand together: x, y, z, then the next point.")
 def axis_after_axis_and_zeros_with_signs(P):
     x, y, z = finite(P).T
     return np.frombuffer(np.array([x, y, z, 0.0 * x], "<f4").tobytes(), np.uint8)
 
 
-@wrong(QUESTION, "Each point has its own four bytes of 0: what stands at bytes 12 to 15 of yours?")
+@wrong("Each point has its own four bytes of 0: what stands at bytes 12 to 15 of yours?")
 def padding_after_the_last_point(P):
     return np.append(packed(finite(P), padding=0), np.zeros(4 * len(finite(P)), np.uint8))
 
 
-@wrong(QUESTION, "The field x has offset 0: a point begins with its x.")
+@wrong("The field x has offset 0: a point begins with its x.")
 def padding_first(P):
     return np.roll(packed(finite(P)), 4, axis=1).ravel()
 
 
-@wrong(QUESTION, "P is in metres, and so is the message: what do you multiply by?")
+@wrong("P is in metres, and so is the message: what do you multiply by?")
 def millimetres(P):
     return packed(1000.0 * finite(P)).ravel()
 
 
-@wrong(QUESTION, "Three coordinates must be finite: how many of them do you ask?")
+@wrong("Three coordinates must be finite: how many of them do you ask?")
 def only_z_asked(P):
     return packed(P[np.isfinite(P[:, 2])]).ravel()
 
 
-@wrong(QUESTION, "Infinite is not NaN, and it is not finite either: what else may a hole hold?")
+@wrong("Infinite is not NaN, and it is not finite either: what else may a hole hold?")
 def infinite_ones_kept(P):
     return packed(P[~np.isnan(P).any(axis=1)]).ravel()
 
 
-@wrong(QUESTION, "(0, 0, 0) is a point of the base frame like others: what says that a point is a hole?")
+@wrong("(0, 0, 0) is a point of the base frame like others: what says that a point is a hole?")
 def origin_for_a_hole(P):
     return packed(finite(P)[(finite(P) != 0.0).any(axis=1)]).ravel()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def pair_stamps(a, b, slop):
@@ -42,7 +42,6 @@ _NOW = 1_700_000_000_000_000_000
 
 
 QUESTION = Question(
-    name="08_node.pair_stamps",
     reference=pair_stamps,
     inputs=_streams,
     by_hand=(
@@ -58,14 +57,18 @@ QUESTION = Question(
     ),
     random_cases=8,
     points=3,
-    properties=(
-        Property("one answer for each stamp of a", lambda arguments, j: np.shape(j) == np.shape(arguments[0])),
-        Property(
-            "each answer is -1, or the number of a stamp of b (from 0), not a stamp",
-            lambda arguments, j: all(-1 <= k < len(arguments[1]) for k in j),
-        ),
-    ),
 )
+
+
+@holds("one answer for each stamp of a")
+def one_for_each(a, b, slop, j):
+    return np.shape(j) == np.shape(a)
+
+
+@holds("each answer is -1, or the number of a stamp of b (from 0), not a stamp")
+def numbers_of_b(a, b, slop, j):
+    return all(-1 <= k < len(b) for k in j)
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -80,7 +83,7 @@ def pairs(a, b, slop, distance):
     return np.where(mutual & (apart.min(axis=1) <= slop), best, -1)
 
 
-@wrong(QUESTION, "Two images share one partner: is the nearest of b also nearer to this stamp than to any other?")
+@wrong("Two images share one partner: is the nearest of b also nearer to this stamp than to any other?")
 def one_partner_for_two(a, b, slop):
     if len(b) == 0:
         return np.full(len(a), -1)
@@ -88,10 +91,7 @@ def one_partner_for_two(a, b, slop):
     return np.where(apart.min(axis=1) <= slop, apart.argmin(axis=1), -1)
 
 
-@wrong(
-    QUESTION,
-    "The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?",
-)
+@wrong("The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?")
 def first_come_first_served(a, b, slop):
     j, free = np.full(len(a), -1), np.ones(len(b), bool)
     for i in range(len(a)):
@@ -102,40 +102,40 @@ def first_come_first_served(a, b, slop):
     return j
 
 
-@wrong(QUESTION, "A frame whose partner was lost must stay alone: what is slop for?")
+@wrong("A frame whose partner was lost must stay alone: what is slop for?")
 def no_bound(a, b, slop):
     return pairs(a, b, np.iinfo(np.int64).max, lambda x, y: np.abs(x - y))
 
 
-@wrong(QUESTION, "Depth may be stamped a little later than colour as well as a little earlier.")
+@wrong("Depth may be stamped a little later than colour as well as a little earlier.")
 def never_later(a, b, slop):
     far = np.iinfo(np.int64).max
     return pairs(a, b, slop, lambda x, y: np.where(y <= x, x - y, far))
 
 
-@wrong(QUESTION, "Depth may be stamped a little earlier than colour as well as a little later.")
+@wrong("Depth may be stamped a little earlier than colour as well as a little later.")
 def never_earlier(a, b, slop):
     far = np.iinfo(np.int64).max
     return pairs(a, b, slop, lambda x, y: np.where(y >= x, y - x, far))
 
 
-@wrong(QUESTION, "Where all stamps of b are too far, argmin is still a number, 0: what is asked for there?")
+@wrong("Where all stamps of b are too far, argmin is still a number, 0: what is asked for there?")
 def far_ones_left_in_argmin(a, b, slop):
     far = np.iinfo(np.int64).max
     return pairs(a, b, far, lambda x, y: np.where(np.abs(x - y) <= slop, np.abs(x - y), far))
 
 
-@wrong(QUESTION, "The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
+@wrong("The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
 def signed_difference(a, b, slop):
     return pairs(a, b, slop, lambda x, y: x - y)
 
 
-@wrong(QUESTION, "Several stamps may lie within slop; take the nearest of them, not the first.")
+@wrong("Several stamps may lie within slop; take the nearest of them, not the first.")
 def first_within(a, b, slop):
     return pairs(a, b, 0, lambda x, y: np.where(np.abs(x - y) <= slop, 0, 1))
 
 
-@wrong(QUESTION, "One lost message shifts all pairs after it: compare stamps, not positions.")
+@wrong("One lost message shifts all pairs after it: compare stamps, not positions.")
 def in_order_of_arrival(a, b, slop):
     j = np.arange(len(a))
     there = j < len(b)
@@ -144,7 +144,7 @@ def in_order_of_arrival(a, b, slop):
     return np.where(near, j, -1)
 
 
-@wrong(QUESTION, "Nanoseconds since 1970 have 19 digits; float32 keeps 7. Subtract before you round anything.")
+@wrong("Nanoseconds since 1970 have 19 digits; float32 keeps 7. Subtract before you round anything.")
 def stamps_in_float32(a, b, slop):
     a, b = (np.asarray(stamps, np.float32) for stamps in (a, b))
     return pairs(a, b, slop, lambda x, y: np.abs(x - y))
@@ -153,22 +153,22 @@ def stamps_in_float32(a, b, slop):
 TOO_FEW_DIGITS = "A stamp has 19 digits, and a float keeps 16 of them. What can be subtracted before it is converted?"
 
 
-@wrong(QUESTION, TOO_FEW_DIGITS)
+@wrong(TOO_FEW_DIGITS)
 def stamps_in_float64(a, b, slop):
     return pairs(a.astype(float), b.astype(float), slop, lambda x, y: np.abs(x - y))
 
 
-@wrong(QUESTION, TOO_FEW_DIGITS)
+@wrong(TOO_FEW_DIGITS)
 def stamps_in_seconds(a, b, slop):
     return pairs(a / 1e9, b / 1e9, slop / 1e9, lambda x, y: np.abs(x - y))
 
 
-@wrong(QUESTION, "32 bits end at 2,147,483,647: how large is a stamp?")
+@wrong("32 bits end at 2,147,483,647: how large is a stamp?")
 def stamps_in_32_bits(a, b, slop):
     return pairs(a.astype(np.int32), b.astype(np.int32), slop, lambda x, y: np.abs(x - y))
 
 
-@wrong(QUESTION, "A stamp whose nearest one belongs to another stays alone: does yours get the next best?")
+@wrong("A stamp whose nearest one belongs to another stays alone: does yours get the next best?")
 def next_best(a, b, slop):
     """The nearest pair of all first, then the nearest of what is left."""
     j, free = np.full(len(a), -1), np.ones(len(b), bool)
@@ -178,7 +178,7 @@ def next_best(a, b, slop):
     return j
 
 
-@wrong(QUESTION, "0 is the number of b's first stamp: what does Python take it for after `if` or `and`?")
+@wrong("0 is the number of b's first stamp: what does Python take it for after `if` or `and`?")
 def first_one_taken_for_none(a, b, slop):
     j = pair_stamps(a, b, slop)
     return np.where(j == 0, -1, j)

@@ -60,7 +60,6 @@ _HARDLY = np.array([turned((0, 0, 1), 0.006 * k) for k in range(4)])
 
 
 QUESTION = Question(
-    name="08_node.pose_at",
     reference=pose_at,
     inputs=_stream,
     by_hand=(
@@ -131,12 +130,12 @@ def arc(a, b, first, second, divided=True):
 STRAIGHT = "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?"
 
 
-@wrong(QUESTION, STRAIGHT)
+@wrong(STRAIGHT)
 def turn_by_the_chord(*given):
     return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * nearer(a, b)))
 
 
-@wrong(QUESTION, STRAIGHT)
+@wrong(STRAIGHT)
 def each_number_of_the_turn_on_its_own(*given):
     return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * b))
 
@@ -144,12 +143,12 @@ def each_number_of_the_turn_on_its_own(*given):
 LONG = "A small turn has become a large one the other way round: which of b and -b is nearer to a?"
 
 
-@wrong(QUESTION, LONG)
+@wrong(LONG)
 def the_long_way_round(*given):
     return with_turn(*given, slerp)
 
 
-@wrong(QUESTION, LONG, side=("left", "right"))
+@wrong(LONG, side=("left", "right"))
 def the_long_way_by_the_arc(*given, side):
     def turn(a, b, share):
         return arc(a, b, lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o))
@@ -157,7 +156,7 @@ def the_long_way_by_the_arc(*given, side):
     return with_turn(*given, turn, side)
 
 
-@wrong(QUESTION, "The camera moved between the two poses: where was it when the image was taken?")
+@wrong("The camera moved between the two poses: where was it when the image was taken?")
 def the_last_one_before(stamps, positions, quaternions, t):
     i = max(int(np.searchsorted(stamps, t, side="right")) - 1, 0)
     return outside(stamps, t) or (positions[i], quaternions[i])
@@ -166,17 +165,17 @@ def the_last_one_before(stamps, positions, quaternions, t):
 OUTSIDE = "Nobody knows where the camera is after the last pose: what should a node say then?"
 
 
-@wrong(QUESTION, OUTSIDE)
+@wrong(OUTSIDE)
 def held_at_the_ends(stamps, positions, quaternions, t):
     return pose_at(stamps, positions, quaternions, min(max(t, stamps[0]), stamps[-1]))
 
 
-@wrong(QUESTION, OUTSIDE)
+@wrong(OUTSIDE)
 def gone_on_beyond_the_ends(*given):
     return between(*given, lambda a, b, share: slerp(a, nearer(a, b), share))
 
 
-@wrong(QUESTION, "At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
+@wrong("At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
 def share_of_the_whole_recording(stamps, positions, quaternions, t):
     i, share = neighbours(stamps, t)[0], (t - stamps[0]) / (stamps[-1] - stamps[0])
     a, b = quaternions[i], quaternions[i + 1]
@@ -184,19 +183,18 @@ def share_of_the_whole_recording(stamps, positions, quaternions, t):
     return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
 
 
-@wrong(QUESTION, "A stamp has 19 digits and a float64 keeps 16: what do you do to stamps before you subtract?")
+@wrong("A stamp has 19 digits and a float64 keeps 16: what do you do to stamps before you subtract?")
 def stamps_in_seconds(stamps, positions, quaternions, t):
     with np.errstate(invalid="ignore"):
         return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
 
 
-@wrong(QUESTION, "The places are right and the turns are not in between: which turn is it at this time?")
+@wrong("The places are right and the turns are not in between: which turn is it at this time?")
 def turn_of_the_one_before(*given):
     return with_turn(*given, lambda a, b, share: b if share >= 1 else a)
 
 
 @wrong(
-    QUESTION,
     "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?",
     side=("left", "right"),  # at a stamp it goes on from the pose before, or from that one
 )
@@ -206,7 +204,7 @@ def shares_exchanged(stamps, positions, quaternions, t, side):
     return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
 
 
-@wrong(QUESTION, "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
+@wrong("The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
 def only_the_angle_made_shorter(*given):
     def turn(a, b, share):
         angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
@@ -215,19 +213,19 @@ def only_the_angle_made_shorter(*given):
     return with_turn(*given, turn)
 
 
-@wrong(QUESTION, "There are poses between the first and the last: which two stand round t?")
+@wrong("There are poses between the first and the last: which two stand round t?")
 def from_the_first_to_the_last(stamps, positions, quaternions, t):
     return pose_at(stamps[[0, -1]], positions[[0, -1]], quaternions[[0, -1]], t)
 
 
-@wrong(QUESTION, "Two turns are equal, yours is NaN: by 0 / 0, or as arccos of a dot b, which rounding lifts above 1?")
+@wrong("Two turns are equal, yours is NaN: by 0 / 0, or as arccos of a dot b, which rounding lifts above 1?")
 def nan_between_equal_turns(stamps, positions, quaternions, t):
     i, _ = neighbours(stamps, t)
     p, q = pose_at(stamps, positions, quaternions, t)
     return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)
 
 
-@wrong(QUESTION, "Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?")
+@wrong("Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?")
 def angle_of_the_turn(*given):
     def factor(share, omega):
         return np.sin(2 * share * omega) / 2 / np.cos(omega)
@@ -236,9 +234,7 @@ def angle_of_the_turn(*given):
 
 
 @wrong(
-    QUESTION,
-    "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?",
-    side=("left", "right"),
+    "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?", side=("left", "right")
 )
 def not_divided_by_the_sine(*given, side):
     def turn(a, b, share):
@@ -248,7 +244,6 @@ def not_divided_by_the_sine(*given, side):
 
 
 @wrong(
-    QUESTION,
     "The places are right. At s = 0 the turn must be a: which of a and b has the factor 0 in yours?",
     side=("left", "right"),
 )
@@ -259,7 +254,7 @@ def shares_of_the_turn_exchanged(*given, side):
     return with_turn(*given, turn, side)
 
 
-@wrong(QUESTION, "The nearer one of b and -b is near to a: does the sign of b's own w know where a is?")
+@wrong("The nearer one of b and -b is near to a: does the sign of b's own w know where a is?")
 def sign_of_w(*given):
     def turn(a, b, share):
         b = b if b[3] >= 0 else -b

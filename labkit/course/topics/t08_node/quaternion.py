@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 
 
 def quaternion(R):
@@ -50,7 +50,6 @@ def _rotation(rng):
 
 
 QUESTION = Question(
-    name="08_node.quaternion",
     reference=quaternion,
     inputs=_rotation,
     by_hand=(
@@ -67,17 +66,20 @@ QUESTION = Question(
     random_cases=40,
     atol=1e-5,
     points=3,
-    properties=(
-        Property("a rotation's quaternion has length 1", lambda arguments, q: abs(np.linalg.norm(q) - 1.0) < 1e-3),
-    ),
     canonical=_one_of_two,
     forbidden=("scipy",),
 )
 
+
+@holds("a rotation's quaternion has length 1")
+def length_is_1(R, q):
+    return abs(np.linalg.norm(q) - 1.0) < 1e-3
+
+
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "Where the trace is -1, w is 0, and you divide by it. A hand that points down is half a turn.")
+@wrong("Where the trace is -1, w is 0, and you divide by it. A hand that points down is half a turn.")
 def from_trace(R, least=-np.inf):
     """The formula that divides by w: fine only for turns well below half a turn. least: what 4 w^2 is at least."""
     w = 0.5 * np.sqrt(max(1.0 + np.trace(R), least))
@@ -98,17 +100,14 @@ def row_of(R, which):
     return row / np.linalg.norm(row)
 
 
-@wrong(
-    QUESTION,
-    "Half a turn about y or z has w = 0 and x = 0, too: your row is zeros then. Which square is the largest?",
-)
+@wrong("Half a turn about y or z has w = 0 and x = 0, too: your row is zeros then. Which square is the largest?")
 def x_where_w_is_small(R):
     q = quaternion(R)
     row = q * q[3 if np.trace(R) > 0.0 else 0]
     return row / np.linalg.norm(row)
 
 
-@wrong(QUESTION, "The axis and the angle say it, too, but what is the length?")
+@wrong("The axis and the angle say it, too, but what is the length?")
 def rotation_vector(R):
     q = quaternion(R)
     q = -q if q[3] < 0.0 else q
@@ -117,60 +116,57 @@ def rotation_vector(R):
     return np.array([*axis, angle])
 
 
-@wrong(QUESTION, "Half a turn should have w = 0: is it the angle or its half that goes into sine and cosine?")
+@wrong("Half a turn should have w = 0: is it the angle or its half that goes into sine and cosine?")
 def whole_angle(R):
     x, y, z, angle = rotation_vector(R)
     return np.array([*(np.sin(angle) * np.array([x, y, z])), np.cos(angle)])
 
 
-@wrong(QUESTION, "No turn has x = y = z = 0, and your row is zeros then: is w one of the four that you choose from?")
+@wrong("No turn has x = y = z = 0, and your row is zeros then: is w one of the four that you choose from?")
 def largest_of_x_y_z(R):
     q = quaternion(R)
     row = q * q[np.diagonal(R).argmax()]
     return row / np.linalg.norm(row)
 
 
-@wrong(
-    QUESTION,
-    "After half a turn w and R - R.T are 0, and all four of yours are about 0: which square is the largest then?",
-)
+@wrong("After half a turn w and R - R.T are 0, and all four of yours are about 0: which square is the largest then?")
 def floor_under_w(R):
     return from_trace(R, least=1e-12)
 
 
-@wrong(QUESTION, "Half a turn is not no turn, although R - R.T is 0 for both: what does R + R.T say of the axis?")
+@wrong("Half a turn is not no turn, although R - R.T is 0 for both: what does R + R.T say of the axis?")
 def axis_of_half_turns_lost(R):
     still = np.allclose(R, R.T)
     return np.array([0.0, 0.0, 0.0, 1.0]) if still else quaternion(R)
 
 
-@wrong(QUESTION, "Each entry of your row is q times one number. Which number makes its length 1?")
+@wrong("Each entry of your row is q times one number. Which number makes its length 1?")
 def row_not_of_length_1(R):
     return products(R)[np.diagonal(products(R)).argmax()]
 
 
-@wrong(QUESTION, "Your row holds x x, x y, x z and x w: what is left of it for a turn round z, where x is 0?")
+@wrong("Your row holds x x, x y, x z and x w: what is left of it for a turn round z, where x is 0?")
 def always_the_row_of_x(R):
     return row_of(R, 0)
 
 
-@wrong(QUESTION, "Your row holds x w, y w, z w and w w: what is left of it after half a turn, where w is 0?")
+@wrong("Your row holds x w, y w, z w and w w: what is left of it after half a turn, where w is 0?")
 def always_the_row_of_w(R):
     return row_of(R, 3)
 
 
-@wrong(QUESTION, "All of your row has one factor, the component of the smallest square: how small can that be?")
+@wrong("All of your row has one factor, the component of the smallest square: how small can that be?")
 def row_of_the_smallest(R):
     return row_of(R, np.diagonal(products(R)).argmin())
 
 
-@wrong(QUESTION, "After half a turn R - R.T is 0, and has no signs: which entries say whether x and y have one sign?")
+@wrong("After half a turn R - R.T is 0, and has no signs: which entries say whether x and y have one sign?")
 def signs_of_the_differences(R):
     q = np.sqrt(np.maximum(np.diagonal(products(R)), 0.0)) / 2.0
     return np.copysign(q, np.append([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]], 1.0))
 
 
-@wrong(QUESTION, "An eigenvector's sign is arbitrary: which entries of R tell a turn round n from one round -n?")
+@wrong("An eigenvector's sign is arbitrary: which entries of R tell a turn round n from one round -n?")
 def axis_of_any_sign(R):
     values, vectors = np.linalg.eig(R)
     n = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
@@ -178,14 +174,10 @@ def axis_of_any_sign(R):
     return np.append(n * np.sin(angle / 2.0), np.cos(angle / 2.0))
 
 
-for _least in (1e-12, 1e-14, 1e-16):
-
-    def unit_with_a_floor_under_w(R, least=_least):
-        q = from_trace(R, least)
-        return q / np.linalg.norm(q)
-
-    unit_with_a_floor_under_w.__name__ += f"_{_least:.0e}"
-    wrong(
-        QUESTION,
-        "After half a turn 1 + trace is 0, and your smallest number stands for it: is w the largest of the four then?",
-    )(unit_with_a_floor_under_w)
+@wrong(
+    "After half a turn 1 + trace is 0, and your smallest number stands for it: is w the largest of the four then?",
+    least=(1e-12, 1e-14, 1e-16),
+)
+def unit_with_a_floor_under_w(R, least):
+    q = from_trace(R, least)
+    return q / np.linalg.norm(q)

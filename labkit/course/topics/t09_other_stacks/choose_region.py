@@ -37,7 +37,6 @@ _TILTED = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 QUESTION = Question(
-    name="09_other_stacks.choose_region",
     reference=choose_region,
     inputs=_features,
     by_hand=(
@@ -74,44 +73,43 @@ def chosen(distance, allowed):
     return 1 + int(np.where(allowed, distance, np.inf).argmin()) if np.any(allowed) else 0
 
 
-@wrong(QUESTION, "Your distance does not know that two features go together: what stands off the diagonal?")
+@wrong("Your distance does not know that two features go together: what stands off the diagonal?")
 def chosen_by_spread(features, mean, covariance, allowed):
     return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
 
 
-@wrong(QUESTION, "A piece at the image's edge may not be chosen.")
+@wrong("A piece at the image's edge may not be chosen.")
 def chosen_although_forbidden(features, mean, covariance, allowed):
     return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0
 
 
-@wrong(QUESTION, "After features[allowed] the rows have new numbers: which ones does the image of pieces know?")
+@wrong("After features[allowed] the rows have new numbers: which ones does the image of pieces know?")
 def chosen_among_the_allowed(features, mean, covariance, allowed):
     return 1 + int(distances(features[allowed], mean, covariance).argmin()) if allowed.any() else 0
 
 
-@wrong(QUESTION, "If no piece is allowed, the answer is 0: what is argmin of all inf?")
+@wrong("If no piece is allowed, the answer is 0: what is argmin of all inf?")
 def chosen_always(features, mean, covariance, allowed):
     return 1 + int(np.where(allowed, distances(features, mean, covariance), np.inf).argmin())
 
 
-@wrong(QUESTION, "The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
+@wrong("The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
 def inverse_twice(features, mean, covariance, allowed):
     squared = (((features - mean) @ np.linalg.inv(covariance)) ** 2).sum(axis=1)
     return np.where(allowed, squared, np.inf).argmin() + 1 if allowed.any() else 0
 
 
-@wrong(QUESTION, "If no piece is allowed, the answer is 0, which is no piece's number.")
+@wrong("If no piece is allowed, the answer is 0, which is no piece's number.")
 def none_is_minus_one(features, mean, covariance, allowed):
     return choose_region(features, mean, covariance, allowed) or -1
 
 
-@wrong(QUESTION, "The diagonal holds variances, squares already, and two features go together: what is off it?")
+@wrong("The diagonal holds variances, squares already, and two features go together: what is off it?")
 def divided_by_variances(features, mean, covariance, allowed):
     return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)
 
 
 @wrong(
-    QUESTION,
     "You add to the diagonal. What does that do to a variance of 0.0001? It is invertible as it is.",
     more=(1e-2, 1e-3, 1e-4, 1e-6),
 )
@@ -119,47 +117,47 @@ def variances_made_larger(features, mean, covariance, allowed, more):
     return choose_region(features, mean, covariance + more * np.eye(3), allowed)
 
 
-@wrong(QUESTION, "1 / covariance divides entry by entry: is its matrix product with covariance the identity?")
+@wrong("1 / covariance divides entry by entry: is its matrix product with covariance the identity?")
 def inverse_entry_by_entry(features, mean, covariance, allowed):
     off = features - mean
     squared = np.einsum("ni,ij,nj->n", off, 1.0 / (covariance + 1e-12), off)
     return int(np.where(allowed, squared, np.inf).argmin()) + 1 if allowed.any() else 0
 
 
-@wrong(QUESTION, "off @ inverse @ off.T is n x n: which of its entries is piece i's own distance?")
+@wrong("off @ inverse @ off.T is n x n: which of its entries is piece i's own distance?")
 def first_row_of_all_products(features, mean, covariance, allowed):
     off = features - mean
     return chosen((off @ np.linalg.inv(covariance) @ off.T)[0], allowed)
 
 
-@wrong(QUESTION, "The density is largest where the distance is least: is argmin its best piece?")
+@wrong("The density is largest where the distance is least: is argmin its best piece?")
 def least_density(features, mean, covariance, allowed):
     off = features - mean
     return chosen(np.exp(-0.5 * np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)), allowed)
 
 
-@wrong(QUESTION, "An allowed piece may be farther away than what you give the others: which number is never less?")
+@wrong("An allowed piece may be farther away than what you give the others: which number is never less?")
 def others_at_1000(features, mean, covariance, allowed):
     off = features - mean
     squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)
     return int(np.where(allowed, squared, 1000.0).argmin()) + 1 if allowed.any() else 0
 
 
-@wrong(QUESTION, "A spread of 0.1 should count for more than one of 10: do you multiply by the covariance, or divide?")
+@wrong("A spread of 0.1 should count for more than one of 10: do you multiply by the covariance, or divide?")
 def covariance_without_its_inverse(features, mean, covariance, allowed):
     return chosen(((features - mean) @ covariance * (features - mean)).sum(axis=1), allowed)
 
 
-@wrong(QUESTION, "What is the covariance for? Area and hue have units of their own, and your distance adds them up.")
+@wrong("What is the covariance for? Area and hue have units of their own, and your distance adds them up.")
 def euclidean(features, mean, covariance, allowed):
     return chosen(((features - mean) ** 2).sum(axis=1), allowed)
 
 
-@wrong(QUESTION, "A forbidden piece has distance 0 in yours, and wins: which distance never wins?")
+@wrong("A forbidden piece has distance 0 in yours, and wins: which distance never wins?")
 def forbidden_ones_at_the_mean(features, mean, covariance, allowed):
     return 1 + int((distances(features, mean, covariance) * allowed).argmin()) if allowed.any() else 0
 
 
-@wrong(QUESTION, "Yours is the allowed piece farthest from the mean: do you want argmax?")
+@wrong("Yours is the allowed piece farthest from the mean: do you want argmax?")
 def farthest(features, mean, covariance, allowed):
     return chosen(-distances(features, mean, covariance), allowed)

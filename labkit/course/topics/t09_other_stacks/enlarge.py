@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.question import Property, Question, wrong
+from labkit.course.checker.question import Question, holds, wrong
 from labkit.course.topics.t01_labels.resize_labels import copied, labels_and_sizes
 
 
@@ -20,7 +20,6 @@ def _labels_and_size(rng):
 
 
 QUESTION = Question(
-    name="09_other_stacks.enlarge",
     reference=enlarge,
     inputs=_labels_and_size,
     by_hand=(
@@ -33,31 +32,29 @@ QUESTION = Question(
         (np.array([[300, 2]]), (4, 1)),  # labels need not be bytes
     ),
     random_cases=6,
-    properties=(
-        Property(
-            "no class appears that was not there",
-            lambda arguments, out: bool(np.isin(out, arguments[0]).all()),
-        ),
-    ),
     forbidden=("cv2", "PIL"),
 )
+
+
+@holds("no class appears that was not there")
+def no_class_is_new(labels, size, out):
+    return np.isin(out, labels).all()
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong(QUESTION, "OpenCV's size is (width, height), a shape is not.")
+@wrong("OpenCV's size is (width, height), a shape is not.")
 def resize_swapped(labels, size):
     return enlarge(labels, size[::-1])
 
 
-@wrong(
-    QUESTION, "From 4 pixels to 2: the first new one covers old 0 and 1, and where is its centre? Not at its corner."
-)
+@wrong("From 4 pixels to 2: the first new one covers old 0 and 1, and where is its centre? Not at its corner.")
 def resize_by_corners(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: i * old // n)
 
 
-@wrong(QUESTION, "np.unique before and after: is the mean of class 0 and 2 a class 1?")
+@wrong("np.unique before and after: is the mean of class 0 and 2 a class 1?")
 def resize_bilinear(labels, size):
     W, H = size
     h, w = labels.shape
@@ -66,28 +63,28 @@ def resize_bilinear(labels, size):
     return np.stack([np.interp(rows, np.arange(h), column) for column in np.transpose(wide)], axis=1).round()
 
 
-@wrong(QUESTION, "From 2 to 4 pixels, each old one should appear twice: which ones do yours show?")
+@wrong("From 2 to 4 pixels, each old one should appear twice: which ones do yours show?")
 def resize_rounded(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.minimum(np.round(i * old / n), old - 1))
 
 
-@wrong(QUESTION, "You stretch between the outermost centres: does every old pixel get the same share of new ones?")
+@wrong("You stretch between the outermost centres: does every old pixel get the same share of new ones?")
 def resize_corner_to_corner(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.linspace(0, old - 1, n).round())
 
 
-@wrong(QUESTION, "24.5 * (2 / 49) is not 1 in floating point: which whole numbers give the same quotient?")
+@wrong("24.5 * (2 / 49) is not 1 in floating point: which whole numbers give the same quotient?")
 def resize_by_floats(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) * (old / n))
 
 
-@wrong(QUESTION, "np.resize repeats the data in reading order: look at it.")
+@wrong("np.resize repeats the data in reading order: look at it.")
 def resize_tiled(labels, size):
     W, H = size
     return np.resize(labels, (H, W))
 
 
-@wrong(QUESTION, "The blob may have other proportions than the image: a factor for each side.")
+@wrong("The blob may have other proportions than the image: a factor for each side.")
 def resize_one_factor(labels, size):
     W, H = size
     h, w = labels.shape
@@ -96,36 +93,34 @@ def resize_one_factor(labels, size):
     return labels[rows[:, None], np.minimum(np.arange(W) // factor, w - 1)]
 
 
-@wrong(
-    QUESTION, "A centre exactly between two old pixels belongs to the second; np.round and np.rint take the even one."
-)
+@wrong("A centre exactly between two old pixels belongs to the second; np.round and np.rint take the even one.")
 def resize_half_to_even(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n - 0.5))
 
 
-@wrong(QUESTION, "A centre at 0.7 lies in old pixel 0, which reaches from 0 to 1: which way do you round?")
+@wrong("A centre at 0.7 lies in old pixel 0, which reaches from 0 to 1: which way do you round?")
 def resize_rounded_centres(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.rint((i + 0.5) * old / n).clip(0, old - 1))
 
 
-@wrong(QUESTION, "7.5 / 11 * 22 is not 15 in floating point: which whole numbers give the same quotient?")
+@wrong("7.5 / 11 * 22 is not 15 in floating point: which whole numbers give the same quotient?")
 def resize_by_shares(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) / n * old)
 
 
-@wrong(QUESTION, "np.repeat takes whole numbers of times: how do 2 rows become 5?")
+@wrong("np.repeat takes whole numbers of times: how do 2 rows become 5?")
 def resize_by_whole_factors(labels, size):
     W, H = size
     return labels.repeat(H // labels.shape[0], axis=0).repeat(W // labels.shape[1], axis=1)
 
 
-@wrong(QUESTION, "Rows have a factor of their own, h / H: yours go by that of the columns.")
+@wrong("Rows have a factor of their own, h / H: yours go by that of the columns.")
 def resize_rows_as_columns(labels, size):
     (W, H), (h, w) = size, labels.shape
     rows, columns = ((2 * np.arange(n) + 1) * w // (2 * W) for n in (H, W))
     return labels[np.minimum(rows, h - 1)[:, None], columns]
 
 
-@wrong(QUESTION, "From 2 rows to 4, a new row takes half an old one: which of h and H multiplies, and which divides?")
+@wrong("From 2 rows to 4, a new row takes half an old one: which of h and H multiplies, and which divides?")
 def resize_by_the_factor_upside_down(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.minimum((2 * i + 1) * n // (2 * old), old - 1))

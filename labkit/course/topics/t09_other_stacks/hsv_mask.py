@@ -34,7 +34,6 @@ def _pixels(*pixels):
 
 
 QUESTION = Question(
-    name="09_other_stacks.hsv_mask",
     reference=hsv_mask,
     inputs=_colours_and_bounds,
     by_hand=(
@@ -73,12 +72,12 @@ def between(hsv, lower, upper):
     return (hsv >= np.asarray(lower)) & (hsv <= np.asarray(upper))
 
 
-@wrong(QUESTION, "Try red, from 170 to 10: can any hue be above the one and below the other?")
+@wrong("Try red, from 170 to 10: can any hue be above the one and below the other?")
 def mask_without_going_round(hsv, lower, upper):
     return between(hsv, lower, upper).all(axis=-1)
 
 
-@wrong(QUESTION, "A pixel is inside only if all three channels are.")
+@wrong("A pixel is inside only if all three channels are.")
 def mask_of_any_channel(hsv, lower, upper):
     inside = between(hsv, lower, upper)
     if lower[0] > upper[0]:
@@ -86,85 +85,85 @@ def mask_of_any_channel(hsv, lower, upper):
     return inside.any(axis=-1)
 
 
-@wrong(QUESTION, "A pixel that equals a bound is inside, as in OpenCV.")
+@wrong("A pixel that equals a bound is inside, as in OpenCV.")
 def mask_without_bounds(hsv, lower, upper):
     h, rest = hsv[..., 0], (hsv[..., 1:] > lower[1:]) & (hsv[..., 1:] < upper[1:])
     hue = (h > lower[0]) & (h < upper[0]) if lower[0] <= upper[0] else (h > lower[0]) | (h < upper[0])
     return hue & rest.all(axis=-1)
 
 
-@wrong(QUESTION, "Sorting the hues turns red into everything but red: which way round does the circle go?")
+@wrong("Sorting the hues turns red into everything but red: which way round does the circle go?")
 def mask_with_swapped_bounds(hsv, lower, upper):
     h, (low, high) = hsv[..., 0], sorted((lower[0], upper[0]))
     return (h >= low) & (h <= high) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
-@wrong(QUESTION, "Grey pixels have a hue too, any one: what excludes them?")
+@wrong("Grey pixels have a hue too, any one: what excludes them?")
 def mask_of_hue(hsv, lower, upper):
     h = hsv[..., 0]
     return (h >= lower[0]) & (h <= upper[0]) if lower[0] <= upper[0] else (h >= lower[0]) | (h <= upper[0])
 
 
-@wrong(QUESTION, "OpenCV's hue goes to 179: the bounds are in the same unit.")
+@wrong("OpenCV's hue goes to 179: the bounds are in the same unit.")
 def mask_in_degrees(hsv, lower, upper):
     doubled = hsv.astype(int) * (2, 1, 1)
     return hsv_mask(doubled, lower, upper)
 
 
-@wrong(QUESTION, "The bounds and the hues are bytes: 10 - 170 wraps round at 256, not at 180.")
+@wrong("The bounds and the hues are bytes: 10 - 170 wraps round at 256, not at 180.")
 def hue_by_a_remainder_of_bytes(hsv, lower, upper):
     hue = (hsv[..., 0] - lower[0]) % 180 <= (upper[0] - lower[0]) % 180
     return hue & ((hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])).all(axis=-1)
 
 
-@wrong(QUESTION, "From 5 to 20 nearly every hue is in yours: when is it `or`?")
+@wrong("From 5 to 20 nearly every hue is in yours: when is it `or`?")
 def mask_always_round(hsv, lower, upper):
     h = hsv[..., 0]
     return ((h >= lower[0]) | (h <= upper[0])) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
-@wrong(QUESTION, "Only the hue goes round: a saturation from 200 to 100 holds nothing.")
+@wrong("Only the hue goes round: a saturation from 200 to 100 holds nothing.")
 def all_three_go_round(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
     return np.where(lower > upper, above | below, above & below).all(axis=-1)
 
 
-@wrong(QUESTION, "When the hue goes round, saturation and value do not: `or` is for the hue alone.")
+@wrong("When the hue goes round, saturation and value do not: `or` is for the hue alone.")
 def all_three_go_with_the_hue(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
     return (above | below if lower[0] > upper[0] else above & below).all(axis=-1)
 
 
-@wrong(QUESTION, "Saturation and value have an upper bound, too.")
+@wrong("Saturation and value have an upper bound, too.")
 def mask_without_upper_bounds(hsv, lower, upper):
     return hsv_mask(hsv, lower, np.array([upper[0], 255, 255]))
 
 
-@wrong(QUESTION, "Sorting the hues turns red into everything but red: which way round does the circle go?")
+@wrong("Sorting the hues turns red into everything but red: which way round does the circle go?")
 def all_three_bounds_sorted(hsv, lower, upper):
     return between(hsv, np.minimum(lower, upper), np.maximum(lower, upper)).all(axis=-1)
 
 
-@wrong(QUESTION, "If both bounds are one hue, only that hue is inside: do you ask `>` or `>=`?")
+@wrong("If both bounds are one hue, only that hue is inside: do you ask `>` or `>=`?")
 def one_hue_goes_round(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     above, below = h >= lower[0], h <= upper[0]
     return (above | below if lower[0] >= upper[0] else above & below) & rest
 
 
-@wrong(QUESTION, "Python reads & before |, as it reads * before +: which hues does your & belong to?")
+@wrong("Python reads & before |, as it reads * before +: which hues does your & belong to?")
 def or_after_and(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     above, below = h >= lower[0], h <= upper[0]
     return above | below & rest if lower[0] > upper[0] else above & below & rest
 
 
-@wrong(QUESTION, "There are three channels: which of them has no bounds in yours?")
+@wrong("There are three channels: which of them has no bounds in yours?")
 def value_forgotten(hsv, lower, upper):
     return hsv_mask(hsv, np.array([*lower[:2], 0]), np.array([*upper[:2], 255]))
 
 
-@wrong(QUESTION, "A mask has a truth value per pixel, (H, W): along which axis do hue, saturation and value stand?")
+@wrong("A mask has a truth value per pixel, (H, W): along which axis do hue, saturation and value stand?")
 def all_along_the_rows(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
     inside = above & below
@@ -173,7 +172,7 @@ def all_along_the_rows(hsv, lower, upper):
     return inside.all(axis=0)
 
 
-@wrong(QUESTION, "A hue that equals a bound is inside: what does your `not` make of `>=` and `<=` there?")
+@wrong("A hue that equals a bound is inside: what does your `not` make of `>=` and `<=` there?")
 def not_between_the_bounds(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     above, below = h >= lower[0], h <= upper[0]

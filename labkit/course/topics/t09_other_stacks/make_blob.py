@@ -23,7 +23,6 @@ _SIX = np.array([[[0, 0, 255], [255, 0, 0]], [[10, 20, 30], [40, 50, 60]], [[1, 
 
 
 QUESTION = Question(
-    name="09_other_stacks.make_blob",
     reference=make_blob,
     inputs=_image,
     by_hand=(
@@ -56,84 +55,80 @@ def planes(bgr):
     return bgr.transpose(2, 0, 1)[None]
 
 
-@wrong(QUESTION, "Put in one pure red pixel: which plane lights up?")
+@wrong("Put in one pure red pixel: which plane lights up?")
 def blob_still_bgr(bgr, multiple):
     return scaled(planes(padded(bgr, multiple)))
 
 
-@wrong(
-    QUESTION, "The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?"
-)
+@wrong("The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?")
 def blob_reshaped(bgr, multiple):
     image = padded(bgr, multiple)[..., ::-1]
     return scaled(image.reshape(1, 3, *image.shape[:2]))
 
 
-@wrong(QUESTION, "Which axis did you turn round, the channels' or the columns'?")
+@wrong("Which axis did you turn round, the channels' or the columns'?")
 def blob_mirrored(bgr, multiple):
     return scaled(planes(padded(bgr[:, ::-1], multiple)))
 
 
-@wrong(QUESTION, "Black must become 0 here; not every network wants -1.")
+@wrong("Black must become 0 here; not every network wants -1.")
 def blob_from_minus_one(bgr, multiple):
     return 2 * scaled(planes(padded(bgr[..., ::-1], multiple))) - 1
 
 
-@wrong(QUESTION, "White must become exactly 1: what is white's byte?")
+@wrong("White must become exactly 1: what is white's byte?")
 def blob_of_256(bgr, multiple):
     return (planes(padded(bgr[..., ::-1], multiple)) / 256.0).astype(np.float32)
 
 
-@wrong(QUESTION, "A side that is a multiple already needs no room: what do you add to 8 for a multiple of 4?")
+@wrong("A side that is a multiple already needs no room: what do you add to 8 for a multiple of 4?")
 def room_for_one_more(bgr, multiple):
     room = [(0, multiple - n % multiple) for n in bgr.shape[:2]]
     return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
 
 
-@wrong(QUESTION, "The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+@wrong("The room goes below and at the right, so that pixel (0, 0) stays where it is.")
 def room_all_round(bgr, multiple):
     room = [(-n % multiple // 2, -n % multiple - -n % multiple // 2) for n in bgr.shape[:2]]
     return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
 
 
-@wrong(QUESTION, "The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+@wrong("The room goes below and at the right, so that pixel (0, 0) stays where it is.")
 def room_above_and_left(bgr, multiple):
     room = [(-n % multiple, 0) for n in bgr.shape[:2]]
     return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
 
 
-@wrong(QUESTION, "What is left over was cut off: the network should see all of the image.")
+@wrong("What is left over was cut off: the network should see all of the image.")
 def cut_to_a_multiple(bgr, multiple):
     H, W = (n // multiple * multiple for n in bgr.shape[:2])
     return scaled(planes(bgr[:H, :W, ::-1]))
 
 
-@wrong(QUESTION, "The room is to be 0, not the last pixel once more.")
+@wrong("The room is to be 0, not the last pixel once more.")
 def room_like_the_edge(bgr, multiple):
     return scaled(planes(padded(bgr, multiple, "edge")[..., ::-1]))
 
 
-@wrong(QUESTION, "Rows and columns may need different numbers of zeros: compute each by itself.")
+@wrong("Rows and columns may need different numbers of zeros: compute each by itself.")
 def one_margin_for_both(bgr, multiple):
     margin = max(-bgr.shape[0] % multiple, -bgr.shape[1] % multiple)
     rgb = np.pad(bgr[..., ::-1], ((0, margin), (0, margin), (0, 0)))
     return (rgb.transpose(2, 0, 1)[None] / 255).astype(np.float32)
 
 
-@wrong(QUESTION, "For a multiple of 4, 6 rows lack 2, and 6 % 4 is 2 as well. What do 5 rows lack?")
+@wrong("For a multiple of 4, 6 rows lack 2, and 6 % 4 is 2 as well. What do 5 rows lack?")
 def room_of_the_remainder(bgr, multiple):
     room = [(0, n % multiple) for n in bgr.shape[:2]]
     return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
 
 
-@wrong(QUESTION, "White is byte 255 in every image: what becomes of a dark image in yours?")
+@wrong("White is byte 255 in every image: what becomes of a dark image in yours?")
 def divided_by_the_largest(bgr, multiple):
     return (planes(padded(bgr[..., ::-1], multiple)) / max(1, bgr.max())).astype(np.float32)
 
 
-@wrong(
-    QUESTION, "The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?"
-)
+@wrong("The shape is right and the pixels are not: reshape keeps the order in memory, which axis should move?")
 def image_reshaped_before_it_is_padded(bgr, multiple):
     H, W, _ = bgr.shape
     blob = make_blob(bgr, multiple)
@@ -141,6 +136,6 @@ def image_reshaped_before_it_is_padded(bgr, multiple):
     return blob
 
 
-@wrong(QUESTION, "bgr[::-1] turns the first axis round: is that the channels'?")
+@wrong("bgr[::-1] turns the first axis round: is that the channels'?")
 def blob_upside_down(bgr, multiple):
     return scaled(planes(padded(bgr[::-1], multiple)))

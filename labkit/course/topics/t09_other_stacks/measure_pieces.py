@@ -30,7 +30,6 @@ def _pieces(rng):
 
 
 QUESTION = Question(
-    name="09_other_stacks.measure_pieces",
     reference=measure_pieces,
     inputs=_pieces,
     by_hand=(
@@ -60,27 +59,27 @@ def measured(pieces, area=len, centroid=lambda vu: vu.mean(axis=0)[::-1], box=No
     )
 
 
-@wrong(QUESTION, "The last column and row of a box still belong to the piece here.")
+@wrong("The last column and row of a box still belong to the piece here.")
 def measured_with_open_boxes(pieces):
     return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(vu.max(axis=0)[::-1] + 1)))
 
 
-@wrong(QUESTION, "0 is no piece: which piece is your first row of?")
+@wrong("0 is no piece: which piece is your first row of?")
 def measured_with_the_background(pieces):
     return measured(pieces, first=0)
 
 
-@wrong(QUESTION, "The middle of an L-shaped piece is not that of its box.")
+@wrong("The middle of an L-shaped piece is not that of its box.")
 def measured_by_boxes(pieces):
     return measured(pieces, centroid=lambda vu: (vu.min(axis=0) + vu.max(axis=0))[::-1] / 2)
 
 
-@wrong(QUESTION, "Count the piece's own pixels: a box holds others too.")
+@wrong("Count the piece's own pixels: a box holds others too.")
 def measured_box_areas(pieces):
     return measured(pieces, area=lambda vu: np.prod(np.ptp(vu, axis=0) + 1))
 
 
-@wrong(QUESTION, "The box is (u0, v0, u1, v1): first and last, not first and how many.")
+@wrong("The box is (u0, v0, u1, v1): first and last, not first and how many.")
 def measured_widths(pieces):
     return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(np.ptp(vu, axis=0)[::-1] + 1)))
 
@@ -89,27 +88,27 @@ def rearranged(pieces, order):
     return tuple(output[order] for output in measure_pieces(pieces))
 
 
-@wrong(QUESTION, "Row i belongs to piece i + 1: in which order are yours?")
+@wrong("Row i belongs to piece i + 1: in which order are yours?")
 def measured_by_size(pieces):
     return rearranged(pieces, np.argsort(-measure_pieces(pieces)[0], kind="stable"))
 
 
-@wrong(QUESTION, "You leave out the smallest number of the image: is it always 0?")
+@wrong("You leave out the smallest number of the image: is it always 0?")
 def measured_without_the_smallest_number(pieces):
     return rearranged(pieces, np.arange(pieces.max())[int(pieces.min() > 0) :])
 
 
-@wrong(QUESTION, "A centroid is a mean: what did you take?")
+@wrong("A centroid is a mean: what did you take?")
 def measured_by_medians(pieces):
     return measured(pieces, centroid=lambda vu: np.median(vu, axis=0)[::-1])
 
 
-@wrong(QUESTION, "np.nonzero goes row by row: is the pixel that it finds first also the leftmost?")
+@wrong("np.nonzero goes row by row: is the pixel that it finds first also the leftmost?")
 def measured_from_first_to_last(pieces):
     return measured(pieces, box=lambda vu: (*vu[0, ::-1], *vu[-1, ::-1]))
 
 
-@wrong(QUESTION, "A centroid is the mean over the pixels of the piece: how many are they? You divide by W and H.")
+@wrong("A centroid is the mean over the pixels of the piece: how many are they? You divide by W and H.")
 def measured_by_the_sides_of_the_image(pieces):
     H, W = pieces.shape
     return measured(pieces, centroid=lambda vu: vu.sum(axis=0)[::-1] / (W, H))
