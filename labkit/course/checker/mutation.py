@@ -13,6 +13,7 @@ import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 from labkit.course.checker.finding import Span
 
@@ -66,6 +67,9 @@ OPERATORS = {
     ast.LShift: (ast.RShift,),
     ast.RShift: (ast.LShift,),
 }
+# Options in a text of which a student may have taken the wrong one.
+STRINGS = ("<f4 >f4 <f8 f4", "<u2 >u2", "<i4 >i4 <f4", "C F", "ij xy", "left right", "little big", "< > =")
+STRINGS += ("edge constant reflect symmetric wrap",)
 COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 # What may be missing around an expression `_`: the kind of the mistake, how many nodes it adds, and the texts.
 AROUND = (
@@ -124,12 +128,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a node is replaced. key: the same for those that do the same to other nodes; cost: nodes that change."""
+    """How a node is replaced, by what `make` gives. key: the same for other nodes; cost: nodes that change."""
 
     kind: str
     key: str
     cost: float
-    make: Callable
+    make: Callable[[], ast.AST]
     mark: tuple[ast.AST | Span, ...] = ()  # what is shown, if not the whole node
 
 
@@ -147,8 +151,8 @@ class Mutation:
     def applied(self) -> Iterator[None]:
         """The tree is changed inside of the block."""
         before = [place.node for place in self.places]
-        for place, make, node in zip(self.places, self.makes, before, strict=True):
-            place.put(make(node))
+        for place, make in zip(self.places, self.makes, strict=True):
+            place.put(make())
         try:
             yield
         finally:
@@ -300,7 +304,7 @@ def exchanged_names(function: ast.stmt, scope: Scope, places: Sequence[Place]) -
         for a, b in itertools.combinations(dict.fromkeys(place.node.id for place in named), 2):
             both = [place for place in named if place.node.id in (a, b)]
             other = {a: b, b: a}
-            makes = tuple((lambda n, to=other[place.node.id]: name(n, to)) for place in both)
+            makes = tuple(template(other[place.node.id], place.node) for place in both)
             spans = tuple(span_of(place.node) for place in both)
             if len(both) <= LONGEST_GROUP:
                 yield Mutation("names exchanged", 2.0, tuple(both), makes, spans)
@@ -312,8 +316,8 @@ def exchanged_parts(places: Sequence[Place]) -> Iterator[Mutation]:
     for a, b in itertools.combinations(short, 2):
         apart = span_of(a.node).last_line < b.node.lineno or a.node.end_col_offset <= b.node.col_offset
         if apart and type(a.node) is type(b.node) and ast.dump(a.node) != ast.dump(b.node):
-            makes = (lambda n, other=b.node: other, lambda n, other=a.node: other)
-            yield Mutation("order", 2.0, (a, b), makes, (span_of(a.node), span_of(b.node)))
+            spans = span_of(a.node), span_of(b.node)
+            yield Mutation("order", 2.0, (a, b), (the(b.node), the(a.node)), spans)
 
 
 def simple_statements(function: ast.stmt) -> list[ast.stmt]:
@@ -341,9 +345,8 @@ def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
     if isinstance(node, ast.Name) and node.id not in scope.names:  # np, range, float ...
         return
     if is_condition(node, parent):
-        yield Recipe(
-            "not", "~", 1, template("~_" if not isinstance(parent, ast.If | ast.IfExp | ast.While) else "not _")
-        )
+        turned = "not _" if isinstance(parent, ast.If | ast.IfExp | ast.While) else "~_"
+        yield Recipe("not", "~", 1, template(turned, node))
         return
     called = getattr(getattr(parent, "func", None), "attr", "")
     if called.startswith("is"):  # whatever keeps NaN and infinity would be right there by accident
@@ -352,7 +355,7 @@ def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
     yield from missing_terms(node, scope)
     if not isinstance(node, ast.Name):
         for other in scope.names:
-            yield Recipe("name", other, 2, lambda n, other=other: name(n, other))
+            yield Recipe("name", other, 2, template(other, node))
 
 
 def is_condition(node: ast.expr, parent: ast.AST) -> bool:
@@ -365,52 +368,74 @@ def is_condition(node: ast.expr, parent: ast.AST) -> bool:
     return named or isinstance(node, ast.Compare | ast.BoolOp) or isinstance(getattr(node, "op", None), masks)
 
 
-def like(old: ast.AST, new: ast.AST) -> ast.AST:
-    """A new node with places in the text, those of the old one where it has none."""
-    for part in ast.walk(new):
-        if isinstance(part, ast.expr | ast.keyword) and not hasattr(part, "lineno"):
-            ast.copy_location(part, old)
+# What a recipe makes: a node as it is, one with other fields, or a text around it.
+
+
+def the(node) -> Callable:
+    """Give a node, or a list of statements, as it is."""
+    return lambda: node
+
+
+def changed(node: ast.AST, **fields) -> ast.AST:
+    """A copy of a node with other fields, at its place in the text."""
+    return ast.fix_missing_locations(ast.copy_location(type(node)(**dict(ast.iter_fields(node)) | fields), node))
+
+
+def template(text: str, node: ast.AST) -> Callable:
+    """Make an expression of a text, with a node in the place of `_`."""
+    return partial(filled, parsed(text), node)
+
+
+parsed = cache(lambda text: ast.parse(text, mode="eval").body)
+
+
+def filled(part, node: ast.AST):
+    """Copy a part of a template; what is new has the node's place in the text."""
+    if isinstance(part, list):
+        return [filled(each, node) for each in part]
+    if not isinstance(part, ast.AST):
+        return part
+    if isinstance(part, ast.Name) and part.id == "_":
+        return node
+    new = type(part)(**{field: filled(value, node) for field, value in ast.iter_fields(part)})
+    return ast.copy_location(new, node)
+
+
+def without(items: list, i: int) -> list:
+    """A list without one of its entries."""
+    return items[:i] + items[i + 1 :]
+
+
+def exchanged(items: list, i: int, j: int) -> list:
+    """A list with two of its entries exchanged."""
+    new = list(items)
+    new[i], new[j] = new[j], new[i]
     return new
-
-
-def name(old: ast.AST, text: str) -> ast.expr:
-    """A name in the place of a node."""
-    return ast.copy_location(ast.Name(text, ast.Load()), old)
 
 
 def operators(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """Another operator, another order, other brackets, one operand too many, or a sign."""
     if isinstance(node, ast.UnaryOp):
         kind = "sign" if isinstance(node.op, ast.USub) else "not"
-        yield Recipe(kind, "without the sign", 1, lambda n: n.operand)
+        yield Recipe(kind, "without the sign", 1, the(node.operand))
         return
     if not isinstance(node, ast.BinOp):
         return
+    left, right = node.left, node.right
     for op in OPERATORS.get(type(node.op), ()):
         if not isinstance(node.op, op):
-            make = lambda n, op=op: ast.copy_location(ast.BinOp(n.left, op(), n.right), n)  # noqa: E731
-            yield Recipe("operator", op.__name__, 1, make, (between(node.left, node.right),))
-    yield Recipe("too much", "without the right", 1, lambda n: n.left, (node.right,))
-    yield Recipe("too much", "without the left", 1, lambda n: n.right, (node.left,))
-    if isinstance(node.op, ast.Mult) and isinstance(node.left, ast.UnaryOp):
-        make = lambda n: ast.copy_location(ast.UnaryOp(n.left.op, n.right), n)  # noqa: E731
-        yield Recipe("too much", "without the left but its sign", 1, make, (node.left.operand,))
+            yield Recipe("operator", op.__name__, 1, partial(changed, node, op=op()), (between(left, right),))
+    yield Recipe("too much", "without the right", 1, the(left), (right,))
+    yield Recipe("too much", "without the left", 1, the(right), (left,))
+    if isinstance(node.op, ast.Mult) and isinstance(left, ast.UnaryOp):
+        make = partial(changed, left, operand=right)
+        yield Recipe("too much", "without the left but its sign", 1, make, (left.operand,))
     if not isinstance(node.op, ast.Add | ast.Mult | ast.BitAnd | ast.BitOr):
-        yield Recipe("order", "sides", 1, lambda n: ast.copy_location(ast.BinOp(n.right, n.op, n.left), n))
-    if isinstance(node.left, ast.BinOp):
-
-        def to_the_right(n):
-            inner = ast.copy_location(ast.BinOp(n.left.right, n.op, n.right), n)
-            return ast.copy_location(ast.BinOp(n.left.left, n.left.op, inner), n)
-
-        yield Recipe("brackets", "right", 1, to_the_right)
-    if isinstance(node.right, ast.BinOp):
-
-        def to_the_left(n):
-            inner = ast.copy_location(ast.BinOp(n.left, n.op, n.right.left), n)
-            return ast.copy_location(ast.BinOp(inner, n.right.op, n.right.right), n)
-
-        yield Recipe("brackets", "left", 1, to_the_left)
+        yield Recipe("order", "sides", 1, partial(changed, node, left=right, right=left))
+    if isinstance(left, ast.BinOp):
+        yield Recipe("brackets", "right", 1, partial(changed, left, right=changed(node, left=left.right)))
+    if isinstance(right, ast.BinOp):
+        yield Recipe("brackets", "left", 1, partial(changed, right, left=changed(node, right=right.left)))
 
 
 def comparisons(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
@@ -421,12 +446,7 @@ def comparisons(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     for i, op in enumerate(node.ops):
         for other in COMPARISONS if isinstance(op, COMPARISONS) else ():
             if not isinstance(op, other):
-
-                def make(n, i=i, other=other):
-                    return ast.copy_location(
-                        ast.Compare(n.left, [*n.ops[:i], other(), *n.ops[i + 1 :]], n.comparators), n
-                    )
-
+                make = partial(changed, node, ops=[*node.ops[:i], other(), *node.ops[i + 1 :]])
                 yield Recipe("comparison", f"{i} {other.__name__}", 1, make, (between(*sides[i : i + 2]),))
 
 
@@ -434,21 +454,18 @@ def conditions(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """`and` for `or`, one condition too many, and one that is missing."""
     if isinstance(node, ast.BoolOp):
         other = ast.Or if isinstance(node.op, ast.And) else ast.And
-        yield Recipe("condition", "and, or", 1, lambda n: ast.copy_location(ast.BoolOp(other(), n.values), n))
+        yield Recipe("condition", "and, or", 1, partial(changed, node, op=other()))
         for i, value in enumerate(node.values):
-
-            def make(n, i=i):
-                rest = n.values[:i] + n.values[i + 1 :]
-                return rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(n.op, rest), n)
-
+            rest = without(node.values, i)
+            make = partial(changed, node, values=rest) if len(rest) > 1 else the(rest[0])
             yield Recipe("condition", f"without {i}", 1, make, (value,))
     masks = ast.BitAnd | ast.BitOr | ast.Invert
     if isinstance(node, ast.Name):
-        yield Recipe("condition", "None", 2.5, template("_ is not None"))
+        yield Recipe("condition", "None", 2.5, template("_ is not None", node))
     if isinstance(node, ast.Compare) or isinstance(getattr(node, "op", None), masks):
         for term in scope.names:
             for text in ROUND_A_CONDITION.format(*[term] * 4).split(" | "):
-                yield Recipe("condition", text, 3, template(text))
+                yield Recipe("condition", text, 3, template(text, node))
 
 
 def calls(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
@@ -456,52 +473,39 @@ def calls(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     if not isinstance(node, ast.Call):
         return
     called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    field = "attr" if isinstance(node.func, ast.Attribute) else "id"
     for other in RELATED.get(called, ()):
-
-        def make(n, other=other):
-            function = ast.copy_location(
-                ast.Attribute(n.func.value, other, ast.Load())
-                if isinstance(n.func, ast.Attribute)
-                else ast.Name(other, ast.Load()),
-                n.func,
-            )
-            return ast.copy_location(ast.Call(function, n.args, n.keywords), n)
-
+        make = partial(changed, node, func=changed(node.func, **{field: other}))
         yield Recipe("function", other, 1, make, (node.func,))
     if called in ("isclose", "allclose") and len(node.args) > 1:
-        equal = lambda n: ast.copy_location(ast.Compare(n.args[0], [ast.Eq()], [n.args[1]]), n)  # noqa: E731
-        yield Recipe("function", "==", 1, equal, (node.func,))
+        equal = ast.Compare(node.args[0], [ast.Eq()], [node.args[1]])
+        yield Recipe("function", "==", 1, partial(ast.copy_location, equal, node), (node.func,))
     for i, j in itertools.combinations(range(len(node.args)), 2):
-
-        def make(n, i=i, j=j):
-            args = list(n.args)
-            args[i], args[j] = args[j], args[i]
-            return ast.copy_location(ast.Call(n.func, args, n.keywords), n)
-
+        make = partial(changed, node, args=exchanged(node.args, i, j))
         yield Recipe("order", f"arguments {i} {j}", 1, make, (node.args[i], node.args[j]))
     for i in range(len(node.args) if len(node.args) > 1 else 0):
-        fewer = lambda n, i=i: ast.copy_location(ast.Call(n.func, n.args[:i] + n.args[i + 1 :], n.keywords), n)  # noqa: E731
-        yield Recipe("too much", f"without argument {i}", 1, fewer, (node.args[i],))
+        make = partial(changed, node, args=without(node.args, i))
+        yield Recipe("too much", f"without argument {i}", 1, make, (node.args[i],))
     method = isinstance(node.func, ast.Attribute) and not is_module(node.func.value, scope)
     if method:
-        yield Recipe("call too many", "method", 1, lambda n: n.func.value)
+        yield Recipe("call too many", "method", 1, the(node.func.value))
     elif node.args and not isinstance(node.args[0], ast.Starred):
-        yield Recipe("call too many", "function", 1, lambda n: n.args[0])
+        yield Recipe("call too many", "function", 1, the(node.args[0]))
     for i, keyword in enumerate(node.keywords):
         kind = keyword.arg if keyword.arg in ("axis", "keepdims") else "option"
-        without = lambda n, i=i: ast.copy_location(ast.Call(n.func, n.args, n.keywords[:i] + n.keywords[i + 1 :]), n)  # noqa: E731
-        yield Recipe(kind, f"without {keyword.arg}", 1, without, (keyword,))
+        make = partial(changed, node, keywords=without(node.keywords, i))
+        yield Recipe(kind, f"without {keyword.arg}", 1, make, (keyword,))
         if keyword.arg == "axis":
             for axis in AXES:
                 if axis != ast.unparse(keyword.value):
-                    yield Recipe("axis", f"axis={axis}", 1, with_option("axis", axis), (keyword,))
+                    yield Recipe("axis", f"axis={axis}", 1, with_option(node, "axis", axis), (keyword,))
     if called in TAKES_AXIS:
         given = {keyword.arg for keyword in node.keywords}
         if "axis" not in given and len(node.args) < (1 if method else 2):
             for axis in AXES:
-                yield Recipe("axis", f"axis={axis}", 1.5, with_option("axis", axis))
+                yield Recipe("axis", f"axis={axis}", 1.5, with_option(node, "axis", axis))
         if "keepdims" not in given:
-            yield Recipe("keepdims", "keepdims", 1.5, with_option("keepdims", "True"))
+            yield Recipe("keepdims", "keepdims", 1.5, with_option(node, "keepdims", "True"))
 
 
 def is_module(node: ast.expr, scope: Scope) -> bool:
@@ -511,63 +515,37 @@ def is_module(node: ast.expr, scope: Scope) -> bool:
     return isinstance(node, ast.Name) and node.id not in scope.names
 
 
-def with_option(option: str, value: str) -> Callable:
+def with_option(node: ast.Call, option: str, value: str) -> Callable:
     """Set an option of a call."""
-    parsed = ast.parse(value, mode="eval").body
-
-    def make(n):
-        kept = [keyword for keyword in n.keywords if keyword.arg != option]
-        return like(n, ast.Call(n.func, n.args, [*kept, ast.keyword(option, copied(parsed))]))
-
-    return make
+    kept = [keyword for keyword in node.keywords if keyword.arg != option]
+    return partial(changed, node, keywords=[*kept, ast.keyword(option, filled(parsed(value), node))])
 
 
 def constants(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """Another number, truth value, or type."""
     if isinstance(node, ast.Attribute) and node.attr in ("nan", "inf", "pi", "e"):
         for text in ("0.0", "1.0", "np.nan", "np.inf", "2 * np.pi", "np.pi / 2"):
-            yield Recipe("constant", text, 1, template(text))
+            yield Recipe("constant", text, 1, template(text, node))
     if not isinstance(node, ast.Constant):
         return
     value = node.value
     if isinstance(value, bool):
         others = [not value]
     elif isinstance(value, int | float):
-        others = [
-            value + 1,
-            value - 1,
-            -value,
-            2 * value,
-            value / 2,
-            0,
-            1,
-            2,
-            255,
-            1000,
-            value**2,
-            1 / value if value else 0,
-        ]
+        others = [value + 1, value - 1, -value, 2 * value, value / 2, 0, 1, 2, 255, 1000, value**2]
+        others += [1 / value if value else 0]
         others += [float("nan")] if value in (0, 1) else [0.5, value * 1000, value / 1000, float("inf")]
     elif isinstance(value, str):
-        others = [o for pair in STRINGS if value in pair for o in pair]
+        others = [o for family in map(str.split, STRINGS) if value in family for o in family]
     else:
         others = []
     for other in dict.fromkeys(map(repr, others)):
         if other != repr(value):
             number = float(other) if other in ("nan", "inf") else ast.literal_eval(other)
-            make = lambda n, number=number: ast.copy_location(ast.Constant(number), n)  # noqa: E731
-            yield Recipe("option" if isinstance(value, str) else "constant", other, 1, make)
+            kind = "option" if isinstance(value, str) else "constant"
+            yield Recipe(kind, other, 1, partial(changed, node, value=number))
 
 
-STRINGS = (
-    ("<f4", ">f4", "<f8", "f4"),
-    ("<u2", ">u2"),
-    ("<i4", ">i4", "<f4"),
-    ("C", "F"),
-    ("ij", "xy"),
-    ("left", "right"),
-)
-STRINGS += (("little", "big"), ("edge", "constant", "reflect", "symmetric", "wrap"), ("<", ">", "="))
 TYPES = ("int", "float", "bool", "complex", "np.uint8", "np.uint16", "np.uint32", "np.int8", "np.int16", "np.int32")
 TYPES += ("np.int64", "np.float16", "np.float32", "np.float64")
 
@@ -577,91 +555,66 @@ def names(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     if isinstance(node, ast.Name) and node.id in scope.names:
         for other in scope.names:
             if other != node.id:
-                yield Recipe("name", other, 1, lambda n, other=other: name(n, other))
+                yield Recipe("name", other, 1, template(other, node))
     text = ast.unparse(node) if isinstance(node, ast.Name | ast.Attribute) else ""
     if text in TYPES:
         for other in ("float", "int", "np.int64", "np.uint8", "np.float32", "bool"):
             if other != text:
-                yield Recipe("type", other, 1, template(other))
+                yield Recipe("type", other, 1, template(other, node))
 
 
 def attributes(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """A transpose too many, another entry of a shape."""
     if isinstance(node, ast.Attribute) and node.attr == "T":
-        yield Recipe("transpose", "without T", 1, lambda n: n.value)
+        yield Recipe("transpose", "without T", 1, the(node.value))
     if isinstance(node, ast.Attribute) and node.attr in ("size", "shape") and not is_module(node, scope):
-        yield Recipe("size", "len", 1, lambda n: like(n, ast.Call(ast.Name("len", ast.Load()), [n.value], [])))
+        yield Recipe("size", "len", 1, template("len(_)", node.value))
     if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "len" and node.args:
-        yield Recipe("size", "size", 1, lambda n: ast.copy_location(ast.Attribute(n.args[0], "size", ast.Load()), n))
-        yield Recipe("size", "columns", 1, template("_.shape[1]", lambda n: n.args[0]))
+        yield Recipe("size", "size", 1, template("_.size", node.args[0]))
+        yield Recipe("size", "columns", 1, template("_.shape[1]", node.args[0]))
 
 
 def subscripts(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """Indices in another order, or one that is too much."""
     if isinstance(node, ast.Subscript):
-        yield Recipe("index too many", "without the index", 1, lambda n: n.value, (node.slice,))
+        yield Recipe("index too many", "without the index", 1, the(node.value), (node.slice,))
         if isinstance(node.slice, ast.Name | ast.Constant | ast.BinOp):
-            yield Recipe("index", "column", 1.5, with_index(lambda i: [ast.Slice(), i]), (node.slice,))
-            yield Recipe("index", "last axis", 1.5, with_index(lambda i: [ast.Constant(...), i]), (node.slice,))
+            for key, before in (("column", ast.Slice()), ("last axis", ast.Constant(...))):
+                make = partial(changed, node, slice=ast.Tuple([before, node.slice], ast.Load()))
+                yield Recipe("index", key, 1.5, make, (node.slice,))
     if isinstance(node, ast.Tuple | ast.List) and 2 <= len(node.elts) <= 4:
         for i, j in itertools.combinations(range(len(node.elts)), 2):
-
-            def make(n, i=i, j=j):
-                elts = list(n.elts)
-                elts[i], elts[j] = elts[j], elts[i]
-                return ast.copy_location(type(n)(elts, ast.Load()), n)
-
+            make = partial(changed, node, elts=exchanged(node.elts, i, j))
             yield Recipe("order", f"entries {i} {j}", 1, make, (node.elts[i], node.elts[j]))
-
-
-def with_index(make_index: Callable) -> Callable:
-    """Replace an index by several."""
-
-    def make(n):
-        return like(n, ast.Subscript(n.value, ast.Tuple(make_index(n.slice), ast.Load()), ast.Load()))
-
-    return make
 
 
 def slices(node: ast.Slice) -> Iterator[Recipe]:
     """Another bound or step of a slice."""
-    for field in ("lower", "upper", "step"):
+    for field, usual in (("lower", "1"), ("upper", "-1"), ("step", "-1")):
         bound = getattr(node, field)
-        if bound is not None:
-            yield Recipe("slice", f"without {field}", 1, lambda n, field=field: sliced(n, field, None))
-            if field != "step":
-                for text in ("_ + 1", "_ - 1"):
-                    fill = template(text)
-                    yield Recipe(
-                        "slice", f"{field} {text}", 2, lambda n, f=field, t=fill: sliced(n, f, t(getattr(n, f)))
-                    )
-        else:
-            for text in {"lower": ("1",), "upper": ("-1",), "step": ("-1",)}[field]:
-                value = ast.parse(text, mode="eval").body
-                yield Recipe("slice", f"{field} {text}", 1.5, lambda n, f=field, v=value: sliced(n, f, copied(v)))
-
-
-def sliced(node: ast.Slice, field: str, value: ast.expr | None) -> ast.Slice:
-    """A slice with another bound."""
-    new = ast.Slice(node.lower, node.upper, node.step)
-    setattr(new, field, value)
-    return like(node, new)
+        if bound is None:
+            new = filled(parsed(usual), node)
+            yield Recipe("slice", f"{field} {usual}", 1.5, partial(changed, node, **{field: new}))
+            continue
+        yield Recipe("slice", f"without {field}", 1, partial(changed, node, **{field: None}))
+        for text in ("_ + 1", "_ - 1") if field != "step" else ():
+            new = filled(parsed(text), bound)
+            yield Recipe("slice", f"{field} {text}", 2, partial(changed, node, **{field: new}))
 
 
 def branches(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
     """The branches of a conditional expression exchanged, or one of them alone."""
     if isinstance(node, ast.IfExp):
-        exchanged = lambda n: ast.copy_location(ast.IfExp(n.test, n.orelse, n.body), n)  # noqa: E731
-        yield Recipe("branch", "exchanged", 1, exchanged)
-        yield Recipe("branch", "first", 1, lambda n: n.body)
-        yield Recipe("branch", "second", 1, lambda n: n.orelse)
+        yield Recipe("branch", "exchanged", 1, partial(changed, node, body=node.orelse, orelse=node.body))
+        yield Recipe("branch", "first", 1, the(node.body))
+        yield Recipe("branch", "second", 1, the(node.orelse))
 
 
 def missing_around(node: ast.expr) -> Iterator[Recipe]:
     """What may be missing around an expression."""
     for kind, cost, texts in AROUND:
         for text in texts.split(" | "):
-            yield Recipe(kind, text, cost, template(text))
+            yield Recipe(kind, text, cost, template(text, node))
 
 
 def missing_terms(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
@@ -671,36 +624,11 @@ def missing_terms(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
         if term == own:
             continue
         for op in ("+", "-", "*", "/"):
-            yield Recipe("term", f"{op} {term}", 2, template(f"_ {op} ({term})"))
+            yield Recipe("term", f"{op} {term}", 2, template(f"_ {op} ({term})", node))
         if term in scope.names:
-            yield Recipe("index missing", term, 2, template(f"_[{term}]"))
-            yield Recipe("term", f"@ {term}", 2.5, template(f"_ @ {term}"))
-            yield Recipe("term", f"& {term}", 2.5, template(f"_ & {term}"))
-
-
-TEMPLATES: dict[str, ast.expr] = {}
-
-
-def template(text: str, inner: Callable = lambda node: node) -> Callable:
-    """A recipe's function that puts a node into the place of `_` in a text."""
-    if text not in TEMPLATES:
-        TEMPLATES[text] = ast.parse(text, mode="eval").body
-    parsed = TEMPLATES[text]
-    return lambda node: copied(parsed, inner(node), node)
-
-
-def copied(part, hole: ast.AST | None = None, old: ast.AST | None = None):
-    """Copy a template, with a node in its hole, and an old node's place in the text."""
-    if isinstance(part, list):
-        return [copied(each, hole, old) for each in part]
-    if not isinstance(part, ast.AST):
-        return part
-    if hole is not None and isinstance(part, ast.Name) and part.id == "_":
-        return hole
-    new = type(part)(**{field: copied(value, hole, old) for field, value in ast.iter_fields(part)})
-    if old is not None and isinstance(new, ast.expr | ast.keyword):
-        ast.copy_location(new, old)
-    return new
+            yield Recipe("index missing", term, 2, template(f"_[{term}]", node))
+            yield Recipe("term", f"@ {term}", 2.5, template(f"_ @ {term}", node))
+            yield Recipe("term", f"& {term}", 2.5, template(f"_ & {term}", node))
 
 
 # --------------------------------------------------------------------------------------------------- statements
@@ -723,54 +651,30 @@ def of_block(place: Place) -> Iterator[Mutation]:
     """Mutations of a list of statements."""
     block = place.node
 
-    def mutation(kind: str, cost: float, make: Callable, *marked: ast.stmt) -> Mutation:
-        return Mutation(kind, cost, (place,), (make,), tuple(map(first_line, marked)))
+    def mutation(kind: str, cost: float, new: list[ast.stmt], *marked: ast.stmt) -> Mutation:
+        return Mutation(kind, cost, (place,), (the(new),), tuple(map(first_line, marked)))
 
     for i, statement in enumerate(block):
+        above, below = block[:i], block[i + 1 :]
         if len(block) > 1 and not is_docstring(statement):
-            yield mutation("line too many", 1, lambda b, i=i: b[:i] + b[i + 1 :], statement)
-        if i + 1 < len(block):
-            swapped = lambda b, i=i: [*b[:i], b[i + 1], b[i], *b[i + 2 :]]  # noqa: E731
-            yield mutation("lines exchanged", 2, swapped, statement, block[i + 1])
+            yield mutation("line too many", 1, above + below, statement)
+        if below:
+            yield mutation("lines exchanged", 2, exchanged(block, i, i + 1), statement, below[0])
         inner = getattr(statement, "body", None)
         if not isinstance(inner, list) or isinstance(statement, ast.FunctionDef | ast.ClassDef):
             continue
-
-        def out(b, i=i):
-            copy = shallow(b[i], b[i].body[:-1])
-            return [*b[:i], copy, b[i].body[-1], *b[i + 1 :]]
-
-        def into(b, i=i):
-            copy = shallow(b[i], [*b[i].body, b[i + 1]])
-            return [*b[:i], copy, *b[i + 2 :]]
-
-        def before(b, i=i):
-            return [*b[:i], b[i].body[0], shallow(b[i], b[i].body[1:]), *b[i + 1 :]]
-
-        def first_in(b, i=i):
-            return [*b[: i - 1], shallow(b[i], [b[i - 1], *b[i].body]), *b[i + 1 :]]
-
         if len(inner) > 1:
-            yield mutation("moved", 2, out, inner[-1])
-            yield mutation("moved", 2, before, inner[0])
-        if i + 1 < len(block):
-            yield mutation("moved", 2, into, block[i + 1])
-        if i > 0:
-            yield mutation("moved", 2, first_in, block[i - 1])
+            yield mutation("moved", 2, [*above, changed(statement, body=inner[:-1]), inner[-1], *below], inner[-1])
+            yield mutation("moved", 2, [*above, inner[0], changed(statement, body=inner[1:]), *below], inner[0])
+        if below:
+            yield mutation("moved", 2, [*above, changed(statement, body=[*inner, below[0]]), *below[1:]], below[0])
+        if above:
+            yield mutation("moved", 2, [*above[:-1], changed(statement, body=[above[-1], *inner]), *below], above[-1])
         if isinstance(statement, ast.If):
-            yield mutation("branch", 1.5, lambda b, i=i: [*b[:i], *b[i].body, *b[i + 1 :]], statement)
+            yield mutation("branch", 1.5, [*above, *inner, *below], statement)
             if statement.orelse:
-                turned = lambda b, i=i: [*b[:i], shallow(b[i], b[i].orelse, b[i].body), *b[i + 1 :]]  # noqa: E731
-                yield mutation("branch", 1.5, turned, statement)
-
-
-def shallow(node: ast.stmt, body: list[ast.stmt], orelse: list[ast.stmt] | None = None) -> ast.stmt:
-    """A copy of a block with another body."""
-    fields = dict(ast.iter_fields(node))
-    fields["body"] = body
-    if orelse is not None:
-        fields["orelse"] = orelse
-    return ast.copy_location(type(node)(**fields), node)
+                turned = changed(statement, body=statement.orelse, orelse=inner)
+                yield mutation("branch", 1.5, [*above, turned, *below], statement)
 
 
 def is_docstring(statement: ast.stmt) -> bool:
@@ -794,18 +698,12 @@ def targets_exchanged(targets: ast.Tuple) -> Iterator[Mutation]:
     """`W, H = y.shape` for `H, W = y.shape`."""
     place = Place(targets, "elts")
     for i, j in itertools.combinations(range(len(targets.elts)), 2):
-
-        def make(elts, i=i, j=j):
-            new = list(elts)
-            new[i], new[j] = new[j], new[i]
-            return new
-
-        yield Mutation("order", 1, (place,), (make,), (span_of(targets.elts[i]), span_of(targets.elts[j])))
+        spans = span_of(targets.elts[i]), span_of(targets.elts[j])
+        yield Mutation("order", 1, (place,), (the(exchanged(targets.elts, i, j)),), spans)
 
 
 def augmented(node: ast.AugAssign) -> Iterator[Mutation]:
     """Another operator of `+=`; `|=` for `&=`."""
     for op in OPERATORS.get(type(node.op), ()):
         if not isinstance(node.op, op):
-            place = Place(node, "op")
-            yield Mutation("operator", 1, (place,), (lambda n, op=op: op(),), (span_of(node),))
+            yield Mutation("operator", 1, (Place(node, "op"),), (the(op()),), (span_of(node),))
