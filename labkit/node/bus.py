@@ -26,6 +26,14 @@ class Transport(ABC):
     def wanted(self, topic: str) -> bool:
         """Whether anybody listens: what is large and asked for by nobody need not be made."""
 
+    def resolve(self, topic: str) -> str:
+        """Give the name that a topic has in the end; by default its own."""
+        return topic
+
+    def serve(self, name: str, request: Callable[[Callable[[bool, str], None]], None]) -> None:
+        """Offer a service; whoever calls it gets what `request` gives to its argument. By default nobody can call."""
+        return None
+
     def now(self) -> int:
         """The time, nanoseconds: by default this machine's."""
         return time.time_ns()

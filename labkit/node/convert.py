@@ -5,6 +5,7 @@ raises a ValueError that names the message's field; the node logs it and goes on
 """
 
 import re
+import struct
 import sys
 
 import cv2
@@ -13,7 +14,7 @@ from jaxtyping import Float, Float32, Shaped, UInt8
 from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
-from labkit.node.messages import Buffer, CameraInfo, Header, Image, PointCloud2, PointField, Pose
+from labkit.node.messages import Buffer, CameraInfo, CompressedImage, Header, Image, PointCloud2, PointField, Pose
 from labkit.support.validation import check_K, check_shape, check_T, require
 
 # Encoding: type of a number, numbers a pixel.
@@ -24,6 +25,7 @@ ENCODINGS = {
     "bgra8": ("u1", 4),
     "mono8": ("u1", 1),
     "16UC1": ("u2", 1),
+    "mono16": ("u2", 1),
     "32FC1": ("f4", 1),
 }
 COLOUR = {
@@ -32,9 +34,10 @@ COLOUR = {
     "bgra8": cv2.COLOR_BGRA2RGB,
     "mono8": cv2.COLOR_GRAY2RGB,
 }
-DEPTH = ("16UC1", "32FC1")
+DEPTH = ("16UC1", "mono16", "32FC1")
 FIELD_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 XYZ = tuple(PointField(name, 4 * i) for i, name in enumerate("xyz"))
+QUANTISED = struct.Struct("<iff")  # what stands before the PNG of a compressedDepth: a number without use, A and B
 
 
 def layout(encoding: str) -> tuple[str, int]:
@@ -58,9 +61,9 @@ def check_image(message: Image, encodings=None) -> Image:
     encodings: those that the reader can use, default all. Takes no time that grows with the image.
     """
     require("message", isinstance(message, Image), "an Image", type(message).__name__)
-    kind, channels = layout(message.encoding)
     if encodings is not None and message.encoding not in encodings:
         raise ValueError(f"encoding: expected one of {', '.join(encodings)}, got {message.encoding!r}")
+    kind, channels = layout(message.encoding)
     _check_counts(message, ("height", "width", "step"))
     row = message.width * channels * np.dtype(kind).itemsize
     require("step", message.step >= row, f"at least {row} bytes for {message.width} pixels", message.step)
@@ -128,17 +131,61 @@ def rgb_image(message: Image) -> UInt8[np.ndarray, "H W 3"]:
 def depth_image(message: Image, scale: float = 0.001) -> Float32[np.ndarray, "H W"]:
     """Read a depth image message in metres; 0 or NaN where there is no reading.
 
-    16UC1 is multiplied by `scale`, metres a unit; 32FC1 holds metres, and its infinities (too near, too far) become
-    NaN.
+    16UC1 and mono16 are multiplied by `scale`, metres a unit; 32FC1 holds metres, and its infinities (too near, too
+    far) become NaN.
 
     >>> depth_image(Image(Header(), 1, 2, "16UC1", 0, 4, bytes([0, 2, 0, 0]))).round(3).tolist()
     [[0.5120000243186951, 0.0]]
     """
     pixels = decode_image(check_image(message, DEPTH))
-    if message.encoding == "16UC1":
+    if pixels.dtype == np.uint16:
         return pixels * np.float32(scale)
     infinite = np.isinf(pixels)
     return np.where(infinite, np.float32(np.nan), pixels) if infinite.any() else pixels
+
+
+def check_compressed(message: CompressedImage, depth: bool) -> CompressedImage:
+    """Return a compressed image that `decompress` can read as colour, or as depth; raises ValueError naming the field.
+
+    Takes no time that grows with the image, so that bytes which are damaged show in `decompress` alone.
+    """
+    require("message", isinstance(message, CompressedImage), "a CompressedImage", type(message).__name__)
+    require("data", isinstance(message.data, Buffer), "bytes", type(message.data).__name__)
+    before, _, how = message.format.partition(";")
+    if depth:
+        readable = before in DEPTH and "compressedDepth" in how and "rvl" not in how
+        wanted = "16UC1 or 32FC1 as a PNG, such as '16UC1; compressedDepth png'"
+    else:
+        readable = "compressedDepth" not in how and not before.startswith("bayer")
+        wanted = "a colour picture, such as 'rgb8; jpeg compressed bgr8'"
+    require("format", readable, wanted, repr(message.format))
+    return message
+
+
+def decompress(message: CompressedImage) -> Image:
+    """Read a message of image_transport's topics "compressed" and "compressedDepth" as the image that it was.
+
+    Colour becomes bgr8 or rgb8, depth what its format says. Float depth travels as whole numbers q with A / (q - B)
+    metres, 0 for no reading. Raises ValueError for bytes that hold no such picture.
+    """
+    before, _, how = message.format.partition(";")
+    depth = "compressedDepth" in how
+    data = np.frombuffer(message.data, np.uint8)[QUANTISED.size if depth else 0 :]
+    flags = cv2.IMREAD_UNCHANGED if depth else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        pixels = cv2.imdecode(data, flags)
+    except cv2.error:  # nothing in it
+        pixels = None
+    if pixels is None or (depth and (pixels.dtype, pixels.ndim) != (np.uint16, 2)):
+        raise ValueError(f"data: expected a whole picture of {message.format!r}, got {len(message.data)} bytes")
+    if not depth:
+        # A format that names what it was before, and not this order, has R and B exchanged in the file.
+        return encode_image(pixels, "rgb8" if how and "compressed bgr" not in how else "bgr8", message.header)
+    if before == "32FC1":
+        _, A, B = QUANTISED.unpack_from(message.data)
+        q = np.where(pixels == 0, np.float32(np.nan), pixels)
+        pixels = np.float32(A) / (q - np.float32(B))
+    return encode_image(pixels, before, message.header)
 
 
 def camera_matrix(message: CameraInfo) -> Float[np.ndarray, "3 3"]:
@@ -167,41 +214,52 @@ def to_frame(
     return RGBDFrame(rgb_image(rgb), depth_image(depth, depth_scale), camera_matrix(info), T_base_cam)
 
 
-def encode_cloud(P: Float[np.ndarray, "N 3"], header: Header) -> PointCloud2:
-    """Write points, metres, as a message of x, y, z in float32.
+def encode_cloud(P: Float[np.ndarray, "N 3"], header: Header, **more: Shaped[np.ndarray, "N"]) -> PointCloud2:
+    """Write points, metres, as a message of x, y, z in float32; more: further numbers of each point, by name.
 
-    >>> message = encode_cloud(np.array([[1.0, 2.0, 3.0]]), Header(0, "base_link"))
-    >>> message.width, message.point_step, decode_cloud(message).tolist()
-    (1, 12, [[1.0, 2.0, 3.0]])
+    >>> message = encode_cloud(np.array([[1.0, 2.0, 3.0]]), Header(0, "base_link"), score=np.array([0.5]))
+    >>> message.width, message.point_step, decode_cloud(message).tolist(), decode_cloud(message, ["score"]).tolist()
+    (1, 16, [[1.0, 2.0, 3.0]], [[0.5]])
     """
-    points = np.ascontiguousarray(check_shape("P", P, (None, 3)), "<f4")
-    return PointCloud2(header, 1, len(points), XYZ, False, 12, 12 * len(points), points.tobytes())
+    P = check_shape("P", P, (None, 3))
+    named = XYZ + tuple(PointField(name, 12 + 4 * i) for i, name in enumerate(more))
+    points = np.empty((len(P), len(named)), "<f4")
+    points[:, :3] = P
+    for i, (name, column) in enumerate(more.items(), start=3):
+        points[:, i] = check_shape(name, column, (len(P),))
+    step = 4 * len(named)
+    return PointCloud2(header, 1, len(points), named, False, step, step * len(points), points.tobytes())
 
 
-def decode_cloud(message: PointCloud2) -> Float32[np.ndarray, "N 3"]:
-    """Read x, y, z of every point of a cloud message, row by row, wherever in a point they stand.
+def pack_rgb(rgb: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, "N"]:
+    """Pack colours as the field "rgb" of clouds holds them: the bytes 0, R, G, B of a number, called a float32."""
+    return (rgb.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)).view(np.float32)
+
+
+def decode_cloud(message: PointCloud2, names=("x", "y", "z")) -> Float32[np.ndarray, "N _"]:
+    """Read numbers of every point of a cloud message, row by row, wherever in a point they stand: a column for a name.
 
     Raises ValueError if one of them is missing or bytes are.
     """
     require("message", isinstance(message, PointCloud2), "a PointCloud2", type(message).__name__)
     where = {field.name: field for field in message.fields}
-    if missing := [name for name in "xyz" if name not in where]:
-        raise ValueError(f"fields: expected x, y and z, got none for {', '.join(missing)}")
+    if missing := [name for name in names if name not in where]:
+        raise ValueError(f"fields: expected {', '.join(names)}, got none for {', '.join(missing)}")
     order = ">" if message.is_bigendian else "<"
-    chosen = [where[name] for name in "xyz"]
+    chosen = [where[name] for name in names]
     if wrong := [field.datatype for field in chosen if field.datatype not in FIELD_TYPES]:
         raise ValueError(f"fields: expected datatypes 1 to 8, got {wrong}")
-    point = {"names": list("xyz"), "formats": [order + FIELD_TYPES[field.datatype] for field in chosen]}
+    point = {"names": list(names), "formats": [order + FIELD_TYPES[field.datatype] for field in chosen]}
     try:
         kind = np.dtype(point | {"offsets": [field.offset for field in chosen], "itemsize": message.point_step})
     except ValueError as error:
-        raise ValueError(f"fields: expected x, y and z within point_step {message.point_step}: {error}") from error
+        raise ValueError(f"fields: expected all within point_step {message.point_step}: {error}") from error
     if message.height * message.width == 0:
-        return np.zeros((0, 3), np.float32)
+        return np.zeros((0, len(names)), np.float32)
     _check_data(message, message.row_step * (message.height - 1) + message.point_step * message.width)
     strides = (message.row_step, message.point_step)
     points = np.ndarray((message.height, message.width), kind, message.data, strides=strides).ravel()
-    return np.stack([points[name].astype(np.float32) for name in "xyz"], axis=1)
+    return np.stack([points[name].astype(np.float32) for name in names], axis=1)
 
 
 def encode_pose(T: Float[np.ndarray, "4 4"], header: Header) -> Pose:

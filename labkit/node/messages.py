@@ -34,6 +34,15 @@ class Image:
     data: Buffer
 
 
+@dataclass(frozen=True, eq=False)
+class CompressedImage:
+    """An image as a file's bytes (JPEG, PNG); format says what it was before: "rgb8; jpeg compressed bgr8"."""
+
+    header: Header
+    format: str
+    data: Buffer
+
+
 @dataclass(frozen=True)
 class CameraInfo:
     """Calibration of a camera: K row by row, D the distortion (empty or zeros for a rectified image)."""
@@ -80,6 +89,14 @@ class Pose:
 
 
 @dataclass(frozen=True)
+class PoseArray:
+    """Several poses in the header's frame; the poses' own headers do not travel."""
+
+    header: Header
+    poses: tuple[Pose, ...]
+
+
+@dataclass(frozen=True)
 class Transform:
     """Where the frame child_frame_id stands in the header's frame: it maps the child's coordinates to the parent's.
 
@@ -110,7 +127,7 @@ class JointState:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """How a node is: level 0 is fine, 1 a warning, 2 an error; values by name, in words. ROS: DiagnosticArray."""
+    """How a node is: level 0 fine, 1 a warning, 2 an error, 3 stale; values by name, in words. ROS: DiagnosticArray."""
 
     header: Header
     name: str
@@ -119,12 +136,15 @@ class Diagnostics:
     values: dict[str, str] = field(default_factory=dict)
 
 
-Message = Image | CameraInfo | PointCloud2 | Pose | Transforms | JointState | Diagnostics
+Message = Image | CompressedImage | CameraInfo | PointCloud2 | Pose | PoseArray | Transforms | JointState | Diagnostics
 
 
 @dataclass(frozen=True)
 class Topics:
-    """The names under which messages travel; each can be changed. Without the leading slash they follow a namespace."""
+    """The names under which messages travel; each can be changed. Without the leading slash they follow a namespace.
+
+    rgb and depth carry a CompressedImage if the name ends in "/compressed" or "/compressedDepth". answer is a service.
+    """
 
     rgb: str = "/camera/rgb/image_raw"
     depth: str = "/camera/depth/image_raw"
@@ -136,8 +156,11 @@ class Topics:
     overlay: str = "/segmentation/overlay"
     cloud: str = "/segmentation/target_cloud"
     grasp: str = "/segmentation/grasp"
+    grasps: str = "/segmentation/grasps"
+    scores: str = "/segmentation/grasp_scores"
     gripper: str = "/segmentation/gripper"
     scene: str = "/segmentation/scene_cloud"
+    answer: str = "/segmentation/answer"
     diagnostics: str = "/diagnostics"
 
 

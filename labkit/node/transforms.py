@@ -75,6 +75,11 @@ class TransformTree:
             up_target, up_source = self._ancestors(target), self._ancestors(source)
             common = next((frame for frame in up_source if frame in up_target), None)
             if common is None:
+                for name in (target, source):
+                    if name.startswith("/"):
+                        raise LookupError(
+                            f"frame id: expected {name[1:]!r}, for tf's have no slash first, got {name!r}"
+                        )
                 raise LookupError(f"no transform between {target!r} and {source!r}")
             T_common_target = self._chain(up_target[: up_target.index(common)], stamp)
             T_common_source = self._chain(up_source[: up_source.index(common)], stamp)

@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from labkit.node.messages import (
     NANOSECONDS,
     CameraInfo,
+    CompressedImage,
     Diagnostics,
     Header,
     Image,
@@ -21,6 +22,7 @@ from labkit.node.messages import (
     PointCloud2,
     PointField,
     Pose,
+    PoseArray,
     Transform,
     Transforms,
 )
@@ -28,9 +30,11 @@ from labkit.support.validation import require
 
 TYPES = {
     Image: "sensor_msgs/msg/Image",
+    CompressedImage: "sensor_msgs/msg/CompressedImage",
     CameraInfo: "sensor_msgs/msg/CameraInfo",
     PointCloud2: "sensor_msgs/msg/PointCloud2",
     Pose: "geometry_msgs/msg/PoseStamped",
+    PoseArray: "geometry_msgs/msg/PoseArray",
     Transforms: "tf2_msgs/msg/TFMessage",
     JointState: "sensor_msgs/msg/JointState",
     Diagnostics: "diagnostic_msgs/msg/DiagnosticArray",
@@ -133,13 +137,20 @@ def _read(kind: type, raw):
     if kind is Transforms:
         return Transforms(tuple(_read_transform(one) for one in raw.transforms))
     if kind is Pose:
-        return Pose(_plain(raw.header), _plain(raw.pose.position), _plain(raw.pose.orientation))
+        return _read_pose(_plain(raw.header), raw.pose)
+    if kind is PoseArray:
+        header = _plain(raw.header)
+        return PoseArray(header, tuple(_read_pose(header, one) for one in raw.poses))
     if kind is Diagnostics:
         require("status", len(raw.status) == 1, "the diagnostics of one node", len(raw.status))
         status = raw.status[0]
         values = {pair.key: pair.value for pair in status.values}
         return Diagnostics(_plain(raw.header), status.name, int(status.level), status.message, values)
     return kind(*(_plain(getattr(raw, f.name, getattr(raw, f.name.lower(), None))) for f in fields(kind)))
+
+
+def _read_pose(header: Header, raw) -> Pose:
+    return Pose(header, _plain(raw.position), _plain(raw.orientation))
 
 
 def _read_transform(raw) -> Transform:

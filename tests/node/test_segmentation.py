@@ -5,6 +5,7 @@ import dataclasses
 import threading
 import time
 
+import cv2
 import numpy as np
 import pytest
 from peers import MS, PATIENCE, small, wait_for
@@ -14,7 +15,7 @@ from labkit.labels import SURFACE, one_hot, overlay
 from labkit.node import convert
 from labkit.node.actors import Arm, Camera
 from labkit.node.bus import Bus
-from labkit.node.messages import CameraInfo, Header, Image, Topics
+from labkit.node.messages import CameraInfo, CompressedImage, Header, Image, Topics
 from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline
@@ -86,7 +87,8 @@ def spinning(node):
 
 
 def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
-    node, camera, out, _ = system(frame, "probabilities", "overlay", "scene", "gripper", base_frame="base_link")
+    more = ("probabilities", "overlay", "scene", "gripper", "grasps", "scores")
+    node, camera, out, _ = system(frame, *more, base_frame="base_link")
     camera.publish(frame, stamp=123456789)
     assert node.spin_once()
     p = node.pipeline.run(frame)
@@ -100,6 +102,13 @@ def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
     assert np.array_equal(convert.decode_image(out.overlay[0]), overlay(frame.rgb, p.labels))
     assert np.allclose(convert.decode_cloud(out.scene[0]), p.scene, atol=1e-6)
     assert sum(out.gripper[0].position) == pytest.approx(p.plan.grasps[0].width)
+    (colours,) = convert.decode_cloud(cloud, ["rgb"]).T
+    pixels = np.concatenate(p.pixels)
+    assert np.array_equal(colours.view(np.uint32), frame.rgb.reshape(-1, 3)[pixels].astype(int) @ (65536, 256, 1))
+    (poses,), (scores,) = out.grasps, out.scores
+    assert poses.poses[0] == grasp and len(poses.poses) == len(p.plan.grasps) > 1
+    numbers = [[g.T_base_grasp[2, 3], g.score, g.width, g.target] for g in p.plan.grasps]
+    assert np.allclose(convert.decode_cloud(scores, ["z", "score", "width", "target"]), numbers)
 
 
 def test_what_nobody_wants_is_not_made(frame):
@@ -253,6 +262,151 @@ def test_a_node_without_frames_still_says_that_it_lives(frame, monkeypatch):
     with spinning(node):
         wait_for(lambda: out.diagnostics, "a word")
     assert out.diagnostics[0].message == "waiting for frames"
+
+
+def heard(out, words: str, level: int):
+    """Wait for diagnostics of a level with these words."""
+    return wait_for(lambda: any(words in m.message and m.level == level for m in out.diagnostics[-3:]), words)
+
+
+def test_after_a_failure_the_heartbeat_warns_and_goes_stale_until_a_frame_is_answered(frame, monkeypatch):
+    monkeypatch.setattr("labkit.node.segmentation.HEARTBEAT", 0.01)
+    monkeypatch.setattr("labkit.node.segmentation.STALE_AFTER", 0.5)
+    node, camera, out, bus = system(frame, T_base_cam=frame.T_base_cam)
+    good = messages(frame)
+    with spinning(node):
+        heard(out, "waiting for frames", level=0)
+        send(bus, good | {"info": dataclasses.replace(good["info"], height=99)})
+        heard(out, "frame skipped: info: expected the size of rgb", level=1)
+        failed = len(out.diagnostics)
+        heard(out, "s: frame skipped: info: expected the size of rgb", level=3)
+        assert not any(m.level == 0 for m in out.diagnostics[failed:])
+        camera.publish(frame, 100 * MS)
+        heard(out, "answered", level=0)
+        heard(out, "waiting for frames", level=0)
+
+
+def test_topics_that_are_silent_while_others_are_not_are_named(frame):
+    node, _, out, bus = system(frame, T_base_cam=frame.T_base_cam)
+    with spinning(node):
+        for number in range(3):
+            good = messages(frame, number * 33 * MS)
+            send(bus, {"rgb": good["rgb"], "depth": good["depth"]})
+        words = f"messages on {TOPICS.rgb} and {TOPICS.depth}, but none on {TOPICS.info}"
+        heard(out, words, level=1)
+        for number in range(3):
+            send(bus, {"info": messages(frame, (5 + number) * 1000 * MS)["info"]})
+        heard(out, f"no stamps of {TOPICS.rgb}, {TOPICS.depth}, {TOPICS.info} lie within 20 ms", level=1)
+
+
+@pytest.mark.bad_input
+def test_reasons_are_told_in_full_and_the_newest_first(frame):
+    """Eight kinds of mistakes: none hides another, and those that differ in a number are one."""
+    node, camera, out, bus = system(frame, T_base_cam=frame.T_base_cam)
+    good = messages(frame)["rgb"]
+    for height in range(6):
+        wrong = dataclasses.replace(good, **{"height": height, "encoding": f"{'abcdef'[height]}8"})
+        bus.publish(TOPICS.rgb, wrong)
+    for length in (100, 200, 300):
+        bus.publish(TOPICS.rgb, dataclasses.replace(good, data=bytes(length)))
+    bus.publish(TOPICS.info, good)
+    camera.publish(frame)
+    assert node.spin_once()
+    reasons = list(out.diagnostics[-1].values.items())[-8:]
+    needed = good.height * good.step
+    assert reasons[:2] == [
+        (f"{TOPICS.info}: message: expected a CameraInfo, got Image", "1"),
+        (f"{TOPICS.rgb}: data: expected {needed} bytes, got 300: the message is truncated", "3"),
+    ]
+    assert [reason[-4:] for reason, _ in reasons[2:]] == ["'f8'", "'e8'", "'d8'", "'c8'", "'b8'", "'a8'"]
+
+
+def test_a_node_that_drops_most_frames_warns(frame):
+    node, camera, out, _ = system(frame)
+    for stamp in range(16):
+        camera.publish(frame, stamp * 33 * MS)
+    assert node.spin_once()
+    assert (out.diagnostics[-1].level, out.diagnostics[-1].message) == (
+        1,
+        "answered; 15 dropped and 0 lost of 20 frames",
+    )
+    for stamp in range(16, 30):
+        camera.publish(frame, stamp * 33 * MS)
+        assert node.spin_once()
+    assert (out.diagnostics[-1].level, out.diagnostics[-1].message) == (0, "answered")
+
+
+def test_on_demand_a_request_is_answered_with_the_next_frame(frame, monkeypatch):
+    monkeypatch.setattr("labkit.node.segmentation.HEARTBEAT", 0.01)
+    monkeypatch.setattr("labkit.node.segmentation.STALE_AFTER", 0.1)
+    node, camera, out, bus = system(frame, T_base_cam=frame.T_base_cam, on_demand=True)
+    replies = []
+    with spinning(node):
+        camera.publish(frame, 1)
+        heard(out, "waiting for a request", level=0)
+        assert not out.mask
+        node.request(lambda *reply: replies.append(reply))
+        wait_for(lambda: replies, "the reply")
+        assert replies == [(False, "no frame came within 0.1 s: waiting for frames")]
+        monkeypatch.setattr("labkit.node.segmentation.STALE_AFTER", 100.0)
+        node.request(lambda *reply: replies.append(reply))
+        camera.publish(frame, 2)
+        wait_for(lambda: len(replies) == 2, "the second reply")
+        node.request(lambda *reply: replies.append(reply))
+        good = messages(frame, 3)
+        send(bus, good | {"info": dataclasses.replace(good["info"], height=99)})
+        wait_for(lambda: len(replies) == 3, "the third reply")
+    assert replies[1][0] and replies[1][1].startswith("answered the frame of stamp 2; grasp: best of")
+    assert not replies[2][0] and "info: expected the size of rgb" in replies[2][1]
+    assert [mask.header.stamp for mask in out.mask] == [2] and node.counts.dropped == 0
+
+
+def test_a_request_is_answered_once_though_frames_come_meanwhile(frame):
+    node, camera, out, _ = system(frame, on_demand=True)
+    truth = node.pipeline
+
+    class Busy:
+        def run(self, frame):
+            camera.publish(frame, 2)
+            return truth.run(frame)
+
+    node.pipeline = Busy()
+    replies = []
+    node.request(lambda *reply: replies.append(reply))
+    camera.publish(frame, 1)
+    assert node.spin_once() and not node.spin_once() and len(replies) == 1
+    assert [mask.header.stamp for mask in out.mask] == [1]
+
+
+def test_while_it_is_inactive_frames_are_let_go(frame):
+    node, camera, out, _ = system(frame)
+    node.active = False
+    camera.publish(frame, 1)
+    assert not node.spin_once()
+    node.active = True
+    camera.publish(frame, 2)
+    assert node.spin_once() and [mask.header.stamp for mask in out.mask] == [2] and node.counts.dropped == 0
+
+
+def test_compressed_images_are_taken_from_topics_that_are_named_so(frame):
+    topics = dataclasses.replace(TOPICS, rgb="/color/compressed", depth="/depth/compressedDepth")
+    node, _, out, bus = system(frame, T_base_cam=frame.T_base_cam, topics=topics)
+    units = np.round(1000.0 * np.nan_to_num(frame.depth)).astype(np.uint16)
+    colour = cv2.imencode(".png", frame.rgb[..., ::-1])[1].tobytes()
+    depth = bytes(12) + cv2.imencode(".png", units)[1].tobytes()
+    header = messages(frame)["rgb"].header
+    bus.publish(topics.rgb, CompressedImage(header, "rgb8; png compressed bgr8", colour))
+    bus.publish(topics.depth, CompressedImage(header, "16UC1; compressedDepth png", depth))
+    bus.publish(topics.info, messages(frame)["info"])
+    assert node.spin_once()
+    expected = node.pipeline.run(dataclasses.replace(frame, depth=units * np.float32(0.001)))
+    assert np.allclose(convert.decode_cloud(out.cloud[0]), np.concatenate(expected.clouds), atol=1e-6)
+    pixels = frame.rgb.reshape(-1, 3)[np.concatenate(expected.pixels)]
+    assert np.array_equal(convert.decode_cloud(out.cloud[0], ["rgb"])[:, 0], convert.pack_rgb(pixels))
+    bus.publish(topics.rgb, CompressedImage(header, "rgb8; jpeg compressed bgr8", colour[:100]))
+    bus.publish(topics.depth, CompressedImage(header, "16UC1; compressedDepth png", depth))
+    bus.publish(topics.info, messages(frame)["info"])
+    assert not node.spin_once() and "data: expected a whole picture" in out.diagnostics[-1].message
 
 
 def test_when_the_clock_is_set_back_the_time_before_is_forgotten(frame):

@@ -174,6 +174,8 @@ def test_the_tree_agrees_with_tf2():
 def test_what_is_not_known_is_said():
     tree = TransformTree(seconds=1.0)
     rng = np.random.default_rng(4)
+    with pytest.raises(LookupError, match="frame id: expected 'camera', for tf's have no slash first, got '/camera'"):
+        tree.lookup("base", "/camera", 0)
     with pytest.raises(LookupError, match="no transform between 'base' and 'camera'"):
         tree.lookup("base", "camera", 0)
     for stamp in (0, 3_000_000_000):

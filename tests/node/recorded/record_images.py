@@ -12,7 +12,7 @@ import sys
 
 import numpy as np
 
-TYPES = {"16UC1": np.uint16, "32FC1": np.float32}
+TYPES = {"16UC1": np.uint16, "mono16": np.uint16, "32FC1": np.float32}
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1, "16UC1": 1, "32FC1": 1}
 
 
