@@ -260,6 +260,12 @@ def node(
     sim: Annotated[bool, typer.Option("--sim", help="Rehearse in this process: camera, node, and an arm.")] = False,
     ros: Annotated[bool, typer.Option("--ros", help="Run on ROS 2 until SIGINT; with --sim also a camera.")] = False,
     ros1: Annotated[bool, typer.Option("--ros1", help="The same on ROS 1.")] = False,
+    lifecycle: Annotated[
+        bool, typer.Option("--lifecycle", help="With --ros: others configure and activate the node.")
+    ] = False,
+    on_demand: Annotated[
+        bool, typer.Option("--on-demand", help="With --ros: answer one frame for each call of segmentation/answer.")
+    ] = False,
     bag: Annotated[
         Path | None, typer.Option(help="Answer the frames of a bag: NAME.bag, or a folder of ROS 2.")
     ] = None,
@@ -285,7 +291,9 @@ def node(
     qos_inputs: Annotated[str, typer.Option(help="What to ask of cameras: best_effort or reliable.")] = "best_effort",
     qos_outputs: Annotated[str, typer.Option(help="What to offer: reliable or best_effort.")] = "reliable",
     qos_depth: Annotated[int, typer.Option(help="Messages that are kept for a slow reader.")] = 10,
-    topic: Annotated[list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image, mask=/my/mask ...")] = None,
+    topic: Annotated[
+        list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image/compressed, mask=/my/mask ...")
+    ] = None,
     probabilities: Annotated[
         bool, typer.Option("--probabilities", help="Write class probabilities to OUT, too.")
     ] = False,
@@ -296,6 +304,8 @@ def node(
     on_ros = ros or ros1
     if (sim and not on_ros, ros, ros1, bag is not None).count(True) != 1:
         raise ValueError("node: expected one of --sim, --ros, --ros1 and --bag, or --sim beside one of ROS")
+    if (lifecycle or on_demand) and not ros:
+        raise ValueError("node: expected --lifecycle and --on-demand beside --ros, for they are ROS 2's")
     if (bag is None) != (out is None):
         raise ValueError("out: expected --out with --bag, and only with it")
     if extra and not (on_ros and extra[0] == "--ros-args"):
@@ -314,6 +324,7 @@ def node(
         qos_inputs=qos_inputs,
         qos_outputs=qos_outputs,
         qos_depth=qos_depth,
+        on_demand=on_demand,
         renamed=tuple(topic or ()),
     )
     if bag is not None:
@@ -321,7 +332,7 @@ def node(
         typer.echo(line)
         raise typer.Exit(0 if answered else 1)
     if on_ros:
-        command.run_on_ros(settings, 1 if ros1 else 2, extra or [], seed if sim else None)
+        command.run_on_ros(settings, 1 if ros1 else 2, extra or [], seed if sim else None, lifecycle)
     else:
         typer.echo(command.rehearse(settings, seed))
 

@@ -4,6 +4,7 @@ import re
 import threading
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import repeat
+from typing import get_args, get_type_hints
 
 from labkit.node import ros
 from labkit.node.actors import Camera
@@ -15,6 +16,7 @@ from labkit.pipeline import Pipeline
 from labkit.support.validation import require
 
 SIMULATED_RATE = 5.0  # frames per second of --ros --sim
+KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,15 @@ class Settings:
     qos_inputs: str = "best_effort"
     qos_outputs: str = "reliable"
     qos_depth: int = 10
+    on_demand: bool = False
     renamed: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        """Raise ValueError for a value of another type, such as a ROS parameter may have; a whole number is a float."""
+        for name, kind in get_type_hints(Settings).items():
+            kinds, value = get_args(kind) or (kind,), getattr(self, name)
+            fits = name == "renamed" or type(value) in kinds or (type(value) is int and float in kinds)
+            require(name, fits, " or ".join(KINDS[one] for one in kinds if one in KINDS), repr(value))
 
     def pipeline(self, table_z: float | None = None) -> Pipeline:
         """The pipeline that is asked for; table_z: the height of the table, if none is asked for."""
@@ -100,8 +110,13 @@ def rehearse(settings: Settings, seed: int) -> str:
     return camera_to_lift(spec, settings.pipeline(spec.table.z))
 
 
-def run_on_ros(settings: Settings, version: int = 2, arguments=(), seed: int | None = None) -> Counts | None:
-    """Run on ROS until SIGINT. version: 2 or 1. arguments: ROS's own. seed: of a scene for a simulated camera."""
+def run_on_ros(
+    settings: Settings, version: int = 2, arguments=(), seed: int | None = None, lifecycle: bool = False
+) -> Counts | None:
+    """Run on ROS until SIGINT. version: 2 or 1. arguments: ROS's own. seed: of a scene for a simulated camera.
+
+    lifecycle: as a node of ROS 2 that others configure and activate.
+    """
     settings.node(), ros.require(version)  # what is wrong or missing is said before anything else happens
     frame = None
     if seed is not None:
@@ -116,13 +131,13 @@ def run_on_ros(settings: Settings, version: int = 2, arguments=(), seed: int | N
             del parameters["renamed"]  # ROS has remappings
             chosen = replace(settings, **transport.parameters(parameters))
             transport.quality(chosen.qos_inputs, chosen.qos_outputs, chosen.qos_depth)
-        options = chosen.node(ROS_TOPICS)
+        options = chosen.node(ROS_TOPICS) | {"on_demand": chosen.on_demand}
         if frame is not None:
             camera = Camera(transport, base_frame=chosen.base_frame, topics=options["topics"])
             threading.Thread(target=camera.run, args=(repeat(frame), SIMULATED_RATE, stop), daemon=True).start()
         return SegmentationNode(chosen.pipeline(frame and frame.table_z), transport, **options)
 
-    return ros.run(build, version=version, arguments=arguments)
+    return ros.run(build, version=version, arguments=arguments, lifecycle=lifecycle)
 
 
 def answer_bag(settings: Settings, bag, out, probabilities: bool, storage: str = "mcap") -> tuple[str, bool]:

@@ -33,20 +33,25 @@ def run(
     *,
     version: int = 2,
     arguments=(),
+    lifecycle: bool = False,
 ) -> Counts | None:
     """Run a node on ROS until a signal or ROS ends it.
 
     build: function of the transport, and of an event that is set at the end, to the node. version: of ROS, 1 or 2.
     arguments: ROS's own, such as those behind --ros-args. Returns what became of the frames, or None if a signal came
-    before ROS did.
+    before ROS did. lifecycle: of ROS 2, as `labkit.node.ros2.Managed` says.
     """
     edge = ros1.Ros1Transport if version == 1 else ros2.Ros2Transport
     with stopped_by_signals() as stop:
-        transport = edge.open(name, stop, arguments)
+        transport = edge.open(name, stop, arguments, *([True] if lifecycle else []))
         if transport is None:
             return None
         with transport:
             log_to_terminal()
+            if lifecycle:
+                managed = ros2.Managed(transport, build)
+                stop.wait()
+                return managed.clean_up()
             node = build(transport, stop)
             logger.info("%s listens to %s", name, node.topics.rgb)
             node.spin(stop)

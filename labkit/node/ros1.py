@@ -101,6 +101,10 @@ class Ros1Transport(Transport):
         """Whether any node listens."""
         return self._publishers[topic].get_num_connections() > 0
 
+    def resolve(self, topic: str) -> str:
+        """Give the name that a topic has after remapping."""
+        return self._rospy.resolve_name(topic)
+
     def now(self) -> int:
         """The time of ROS: the simulator's with use_sim_time, else this machine's; nanoseconds."""
         return self._rospy.Time.now().to_nsec()

@@ -49,29 +49,31 @@ class Ros2Transport(Transport):
     """A node of ROS 2 as a transport.
 
     name: the node's. arguments: what stood behind --ros-args, that words included: namespace, remappings, parameters.
-    A process may hold several transports. Use one as a context manager, or call `close`.
+    lifecycle: whether the node is one that `Managed` can steer. A process may hold several transports. Use one as a
+    context manager, or call `close`.
     """
 
-    def __init__(self, name: str, arguments=()):
+    def __init__(self, name: str, arguments=(), lifecycle: bool = False):
         rclpy = ros("rclpy")
         set_up_shared_memory()
         self.quality()
         self._wire = Wire(ros1=False)
-        self._publishers, self._readers, self._numbers = {}, {}, {}
+        self._publishers, self._readers, self._services, self._numbers = {}, {}, {}, {}
         self._lost, self._refused = Counter(), {}
         self._publishing, self._closed = threading.Lock(), False
         self._context = rclpy.Context()
         self._context.init([name, *arguments])
-        self.node = rclpy.create_node(name, context=self._context)
+        create = ros("rclpy.lifecycle").LifecycleNode if lifecycle else rclpy.create_node
+        self.node = create(name, context=self._context)
         self._executor = ros("rclpy.executors").SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
 
     @classmethod
-    def open(cls, name: str, stop: threading.Event, arguments=()) -> "Ros2Transport":
+    def open(cls, name: str, stop: threading.Event, arguments=(), lifecycle: bool = False) -> "Ros2Transport":
         """Join ROS, which needs no master; ROS sets `stop` when it ends the node."""
-        transport = cls(name, arguments)
+        transport = cls(name, arguments, lifecycle)
         transport._context.on_shutdown(stop.set)
         return transport
 
@@ -83,6 +85,19 @@ class Ros2Transport(Transport):
         self._thread.join()
         self.node.destroy_node()
         self._context.try_shutdown()
+
+    def forget(self) -> None:
+        """Take back what was advertised, subscribed to and served."""
+        with self._publishing:
+            for made, destroy in (
+                (self._publishers, self.node.destroy_publisher),
+                (self._readers, self.node.destroy_subscription),
+                (self._services, self.node.destroy_service),
+            ):
+                for each in made.values():
+                    destroy(each)
+                made.clear()
+            self._refused.clear()
 
     def _spin(self) -> None:
         try:
@@ -169,6 +184,33 @@ class Ros2Transport(Transport):
         overriding = ros("rclpy.qos_overriding_options").QoSOverridingOptions.with_default_policies()
         return {"qos_profile": profile, "qos_overriding_options": overriding}
 
+    def resolve(self, topic: str) -> str:
+        """Give the name that a topic has after remapping."""
+        return self.node.resolve_topic_name(topic)
+
+    def serve(self, name: str, request: Callable[[Callable[[bool, str], None]], None]) -> None:
+        """Offer a service of the type std_srvs/Trigger, if that is installed."""
+        try:
+            kind = importlib.import_module("std_srvs.srv").Trigger
+        except ModuleNotFoundError:
+            logger.warning("no service %s, for std_srvs is missing", name)
+            return
+        service = self._services[name] = self.node.create_service(kind, name, lambda _, response: response)
+        send = service.send_response
+
+        def send_later(response, caller) -> None:
+            """Not when the callback returns, as rclpy does; to wait in the callback would hold up all messages."""
+
+            def reply(success: bool, message: str) -> None:
+                response.success, response.message = success, message
+                with self._publishing:
+                    if self._context.ok() and not self._closed:
+                        send(response, caller)
+
+            request(reply)
+
+        service.send_response = send_later
+
     # ------------------------------------------------------------------------------- time, troubles, parameters
 
     def now(self) -> int:
@@ -207,17 +249,68 @@ class Ros2Transport(Transport):
         return say
 
     def parameters(self, defaults: dict) -> dict:
-        """Declare ROS parameters that are fixed at the start, with these defaults; returns their values.
-
-        A whole number will do for a default of float or None. Raises ValueError for a value of another type.
-        """
+        """Declare ROS parameters that are fixed at the start, with these defaults; returns their values."""
         descriptor = ros("rcl_interfaces.msg").ParameterDescriptor(read_only=True, dynamic_typing=True)
         found = {}
         for name, default in defaults.items():
-            value = self.node.declare_parameter(name, default, descriptor).value
-            if isinstance(default, float) and type(value) is int:
-                value = float(value)
-            if default is not None and type(value) is not type(default):
-                raise ValueError(f"{name}: expected a {type(default).__name__}, got {value!r}")
-            found[name] = value
+            if not self.node.has_parameter(name):
+                self.node.declare_parameter(name, default, descriptor)
+            found[name] = self.node.get_parameter(name).value
         return found
+
+
+class Managed:
+    """The segmentation node as a lifecycle node: whoever configures it has it built, and it answers while it is active.
+
+    transport: a Ros2Transport made with lifecycle=True. build: as in `labkit.node.ros.run`; what it raises is logged,
+    and the node stays unconfigured. Cleaning up takes everything back that configuring made.
+    """
+
+    def __init__(self, transport: Ros2Transport, build):
+        lifecycle = ros("rclpy.lifecycle")
+        self.transport, self.node = transport, None
+        managed, done = self, lifecycle.TransitionCallbackReturn
+
+        class Steps(lifecycle.ManagedEntity):
+            def on_configure(self, state):
+                try:
+                    managed.start(build)
+                except Exception as error:  # rclpy would swallow it
+                    logger.error("not configured: %s", error)
+                    managed.transport.forget()
+                    return done.FAILURE
+                return done.SUCCESS
+
+            def on_activate(self, state):
+                managed.node.active = True
+                return done.SUCCESS
+
+            def on_deactivate(self, state):
+                managed.node.active = False
+                return done.SUCCESS
+
+            def on_cleanup(self, state):
+                managed.clean_up()
+                return done.SUCCESS
+
+            on_shutdown = on_cleanup
+
+        transport.node.add_managed_entity(Steps())
+
+    def start(self, build) -> None:
+        """Build the node and let it spin in a thread of its own, inactive."""
+        self._stop = threading.Event()
+        self.node = build(self.transport, self._stop)
+        self.node.active = False
+        self._spinning = threading.Thread(target=self.node.spin, args=(self._stop,))
+        self._spinning.start()
+
+    def clean_up(self):
+        """End the node, if there is one; returns what became of the frames, or None."""
+        if self.node is None:
+            return None
+        node, self.node = self.node, None
+        self._stop.set()
+        self._spinning.join()
+        self.transport.forget()
+        return node.counts

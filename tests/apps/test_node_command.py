@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import data_gen
+from labkit.apps.node_command import Settings
 from labkit.node.actors import Camera
 from labkit.node.bags import BagWriter
 from labkit.node.messages import DEFAULT_TOPICS, Image
@@ -44,11 +45,28 @@ def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(
 
 @pytest.mark.bad_input
 @pytest.mark.parametrize(
+    "wrong, said",
+    [
+        ({"table_z": "abc"}, "table_z: expected a number, got 'abc'"),
+        ({"crf": 1}, "crf: expected true or false, got 1"),
+        ({"qos_depth": 2.5}, "qos_depth: expected a whole number, got 2.5"),
+        ({"camera_pose": 3}, "camera_pose: expected a text, got 3"),
+    ],
+)
+def test_a_parameter_of_another_type_has_its_own_sentence(wrong, said):
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        Settings(**wrong)
+    assert Settings(table_z=1, crf=True, camera_pose=None).table_z == 1, "a whole number is a number"
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
     "arguments, said",
     [
         ([], "expected one of --sim, --ros, --ros1 and --bag"),
         (["--ros", "--ros1"], "expected one of"),
         (["--sim", "--modle", "unet"], "--modle"),
+        (["--sim", "--on-demand"], "expected --lifecycle and --on-demand beside --ros"),
         (["--sim", "--ros-args", "-r", "__ns:=/left"], "--ros-args"),
         (["--bag", "a.bag"], "out"),
         (["--sim", "--out", "a.bag"], "out"),

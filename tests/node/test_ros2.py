@@ -12,6 +12,7 @@ import threading
 import time
 from xml.etree import ElementTree
 
+import cv2
 import numpy as np
 import pytest
 from peers import MESSAGES, MS, PATIENCE, ROOT, Peer, process, small, variables, wait_for
@@ -23,7 +24,7 @@ from labkit.learning.network import load_model, weights_path
 from labkit.node import ros2, ros2_types
 from labkit.node.actors import Arm
 from labkit.node.convert import decode_image, encode_pose
-from labkit.node.messages import ROS_TOPICS, CameraInfo, Header, Image, Transform, Transforms
+from labkit.node.messages import ROS_TOPICS, CameraInfo, CompressedImage, Header, Image, Transform, Transforms
 from labkit.node.segmentation import SegmentationNode
 from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline, segment_rgb_image
@@ -201,12 +202,127 @@ def parameters(node, of: str, names: list[str]) -> list:
 
 
 @pytest.mark.parametrize(
-    "words, said", [(["-p", "table_z:=high"], "table_z"), (["-p", "qos_inputs:=nice"], "qos_inputs")]
+    "words, said",
+    [
+        (["-p", "table_z:=high"], "table_z: expected a number, got 'high'"),
+        (["-p", "qos_inputs:=nice"], "qos_inputs: expected one of"),
+    ],
 )
 def test_a_wrong_parameter_is_one_line_and_status_2(words, said):
     with process(*NODE, "--ros-args", *words, stderr=subprocess.PIPE) as running:
         line = running.communicate(timeout=PATIENCE)[1].splitlines()[-1]
-    assert running.returncode == 2 and line.startswith(f"labkit: {said}: expected")
+    assert running.returncode == 2 and line.startswith(f"labkit: {said}")
+
+
+def call(peer, kind: type, name: str, **request):
+    """The answer of a service."""
+    client = peer.transport.node.create_client(kind, name)
+    wait_for(client.service_is_ready, name)
+    answer = client.call_async(kind.Request(**request))
+    wait_for(answer.done, f"the answer of {name}")
+    return answer.result()
+
+
+def test_a_service_answers_one_frame_on_demand(peer, frame):
+    """A camera that goes on; of its frames those are answered that were asked for, each taken after the call."""
+    from std_srvs.srv import Trigger
+
+    with peer.node(*NODE, "--on-demand", "--ros-args", "-p", "qos_inputs:=reliable"):
+        stop = threading.Event()
+        camera = threading.Thread(target=peer.camera.run, args=(itertools.repeat(small(frame)), 20.0, stop))
+        camera.start()
+        stamps = []
+        for _ in range(3):
+            stamps.append(time.time_ns() - 50 * MS)
+            answer = call(peer, Trigger, "segmentation/answer")
+            assert answer.success and answer.message.startswith("answered the frame of stamp "), answer
+            time.sleep(0.2)
+        stop.set()
+        camera.join()
+        wait_for(lambda: peer.heard["diagnostics"][-1].message == "waiting for a request", "the state")
+        assert peer.counted()["answered"] == 3 == len(peer.heard["mask"])
+        assert all(mask.header.stamp > asked for mask, asked in zip(peer.heard["mask"], stamps, strict=True))
+        silent = call(peer, Trigger, "segmentation/answer")
+        assert not silent.success and silent.message == "no frame came within 5 s: waiting for frames"
+
+
+def test_a_lifecycle_node_answers_while_it_is_active(peer, frame):
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState, GetState
+
+    def change(name: str) -> bool:
+        step = Transition(id=getattr(Transition, f"TRANSITION_{name}"))
+        return call(peer, ChangeState, "segmentation_node/change_state", transition=step).success
+
+    def state() -> str:
+        return call(peer, GetState, "segmentation_node/get_state").current_state.label
+
+    def says(message: str) -> None:
+        peer.heard["diagnostics"].clear()
+        wait_for(lambda: peer.heard["diagnostics"] and peer.heard["diagnostics"][-1].message == message, message)
+
+    words = ("--lifecycle", "--ros-args", "-p", "qos_inputs:=reliable")
+    with process(*NODE, *words, stderr=subprocess.PIPE) as running:
+        assert state() == "unconfigured" and not published(peer.transport, ROS_TOPICS.mask)
+        for stamp in (10, 20):
+            assert change("CONFIGURE") and state() == "inactive"
+            wait_for(peer.connected, "the node")
+            says("inactive")
+            peer.camera.publish(small(frame), stamp * MS)
+            assert change("ACTIVATE") and state() == "active"
+            peer.ask(small(frame), (stamp + 1) * MS)
+            assert change("DEACTIVATE") and change("CLEANUP") and state() == "unconfigured"
+            wait_for(lambda: not published(peer.transport, ROS_TOPICS.mask), "the end of its topics")
+        assert [mask.header.stamp // MS for mask in peer.heard["mask"]] == [11, 21]
+        running.send_signal(signal.SIGINT)
+        assert running.wait(PATIENCE) == 0, running.stderr.read()
+
+
+def test_a_lifecycle_node_that_cannot_be_built_stays_unconfigured(peer):
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    step = Transition(id=Transition.TRANSITION_CONFIGURE)
+    words = ("--lifecycle", "--ros-args", "-p", "table_z:=high")
+    with process(*NODE, *words, stderr=subprocess.PIPE) as running:
+        for _ in range(2):
+            assert not call(peer, ChangeState, "segmentation_node/change_state", transition=step).success
+        running.send_signal(signal.SIGINT)
+        said = running.communicate(timeout=PATIENCE)[1]
+    assert running.returncode == 0 and said.count("not configured: table_z: expected a number, got 'high'") == 2
+
+
+def test_compressed_images_from_remapped_topics_and_a_silent_calibration(peer, frame):
+    """As image_transport names and writes them; what is missing is told until it comes."""
+    units = np.round(1000.0 * np.nan_to_num(frame.depth)).astype(np.uint16)
+    header = Header(7 * MS, peer.camera.frame_id)
+    sent = {
+        "/c/compressed": CompressedImage(
+            header, "rgb8; jpeg compressed bgr8", cv2.imencode(".jpg", frame.rgb[..., ::-1])[1].tobytes()
+        ),
+        "/d/compressedDepth": CompressedImage(
+            header, "16UC1; compressedDepth png", bytes(12) + cv2.imencode(".png", units)[1].tobytes()
+        ),
+        ROS_TOPICS.info: CameraInfo(header, *frame.depth.shape, tuple(frame.K.ravel().tolist())),
+    }
+    words = ["-r", "camera/rgb/image_raw:=/c/compressed", "-r", "camera/depth/image_raw:=/d/compressedDepth"]
+    words += ["-p", "qos_inputs:=reliable", "-p", "camera_pose:=0.5 0 0.8 1 0 0 0"]
+    for topic in ("/c/compressed", "/d/compressedDepth"):
+        peer.transport.advertise(topic, CompressedImage)
+    with process(*NODE, "--ros-args", *words, stderr=subprocess.PIPE) as running:
+        wait_for(lambda: all(map(peer.transport.wanted, sent)), "the node")
+        wait_for(lambda: peer.heard_from(peer.transport, ROS_TOPICS.mask), "its topics")
+        for _ in range(3):
+            for topic in ("/c/compressed", "/d/compressedDepth"):
+                peer.transport.publish(topic, sent[topic])
+        missing = "messages on camera/rgb/image_raw and camera/depth/image_raw, but none on camera/camera_info"
+        wait_for(lambda: [m for m in peer.heard["diagnostics"] if missing in m.message and m.level == 1], missing)
+        for topic, message in sent.items():
+            peer.transport.publish(topic, message)
+        expected = segment_rgb_image(load_model(weights_path("smallsegnet")), frame.rgb)
+        assert np.mean(decode_image(peer.answer("mask", 7 * MS)) != expected) < 0.05
+        running.send_signal(signal.SIGINT)
+        assert running.wait(PATIENCE) == 0
 
 
 def test_a_peer_that_cannot_be_talked_to_is_reported_in_words(peer, caplog):
@@ -234,7 +350,7 @@ def test_every_frame_is_answered_or_superseded(peer, frame):
         fast = join("fast", depth=250)
         with fast.transport:
             wait_for(lambda: peer.connected() and fast.connected(), "the node")
-            inside.node.pipeline.model = slow
+            inside.node.pipeline = Pipeline(slow)
             fast.camera.run((small(frame) for _ in range(200)), 60.0)
             counts = inside.node.counts
             wait_for(lambda: counts.answered + counts.dropped == 200, "the last frame")
