@@ -127,13 +127,16 @@ def evaluate(
     perturb: Annotated[
         bool, typer.Option("--perturb", help="Depth as a sensor measures it, pose off by 5 mm and 0.5 degree.")
     ] = False,
-    json: Annotated[Path | None, typer.Option(help="Write the scores to this file, too.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the scores, and a row per trial, to this file, too.")] = None,
+    worst: Annotated[int, typer.Option(help="Show so many of the worst trials in OUT/worst.html.", min=0)] = 0,
+    out: Annotated[Path, typer.Option(help="Folder for worst.html.")] = Path("out"),
     workers: Workers = 1,
     dask: Dask = None,
 ) -> None:
     """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target."""
     from data_gen import sample_scene
     from labkit.apps.evaluation import as_json, run_trials, summarise, table
+    from labkit.apps.worst import page
     from labkit.learning.network import load_model, weights_path
     from labkit.support.files import write_atomically
 
@@ -141,10 +144,14 @@ def evaluate(
     if weights is not None:
         load_model(weights)  # so that wrong weights are said before anything is simulated
     specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
-    report = summarise(run_trials(specs, weights, crf=crf, perturb=perturb, workers=workers, dask=dask))
+    trials = run_trials(specs, weights, crf=crf, perturb=perturb, workers=workers, dask=dask)
+    report = summarise(trials)
     typer.echo(table(report))
     if json is not None:
         write_atomically(json, as_json(report).encode())
+    if worst:
+        write_atomically(out / "worst.html", page(specs, trials, worst, weights, (320, 240), crf, perturb).encode())
+        typer.echo(f"wrote {out / 'worst.html'}")
 
 
 @app.command()

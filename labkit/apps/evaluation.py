@@ -22,7 +22,7 @@ from labkit.metrics import (
     reliability_counts,
     wilson_interval,
 )
-from labkit.pipeline import Pipeline, timed
+from labkit.pipeline import Perception, Pipeline, timed
 
 BOUNDARY_WIDTH = 2  # pixels
 
@@ -45,6 +45,11 @@ class Trial:
     certainty: float = 0.0
     reliability: np.ndarray | None = None
 
+    @property
+    def target_iou(self) -> float:
+        """IoU of the targets in this scene's mask; NaN if they are in neither."""
+        return float(iou(self.counts)[TARGET])
+
 
 def run_trial(
     spec, model=None, size: tuple[int, int] = (320, 240), crf: bool | None = None, perturb: bool = False
@@ -61,18 +66,11 @@ def run_trial(
 
     if crf and model is None:
         raise ValueError("crf: expected none with true masks, which there is nothing to refine in")
-    if isinstance(model, (str, Path)):
-        model = _loaded(str(model), Path(model).stat().st_mtime_ns)
-    pipeline, seconds = Pipeline(model, crf=crf), {}
     with World(spec) as world:
-        with timed(seconds, "render"):
-            frame = world.render(size)
-        if perturb:
-            frame = perturbed(frame, np.random.default_rng([spec.seed, 2]))
-        perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)
-        seconds |= perception.seconds
+        perception, seconds = look(world, model, size, crf, perturb)
         with timed(seconds, "lift"):
             result = lift(world, perception)
+    frame = perception.frame
     families = {thing.name: thing.family for thing in spec.objects}
     return Trial(
         seed=spec.seed,
@@ -87,6 +85,19 @@ def run_trial(
         if perception.probabilities is None
         else reliability_counts(np.clip(perception.probabilities[..., TARGET], 0.0, 1.0), frame.labels == TARGET),
     )
+
+
+def look(world, model, size: tuple[int, int], crf: bool | None, perturb: bool) -> tuple[Perception, dict[str, float]]:
+    """What a trial perceives in a World before it lifts, its frame with the true labels; and the seconds by stage."""
+    if isinstance(model, (str, Path)):
+        model = _loaded(str(model), Path(model).stat().st_mtime_ns)
+    pipeline, seconds = Pipeline(model, crf=crf), {}
+    with timed(seconds, "render"):
+        frame = world.render(size)
+    if perturb:
+        frame = perturbed(frame, np.random.default_rng([world.spec.seed, 2]))
+    perception = pipeline.locate(frame, frame.labels) if model is None else pipeline.run(frame)
+    return perception, seconds | perception.seconds
 
 
 @lru_cache(maxsize=1)
@@ -122,7 +133,8 @@ class Report:
     within 2 of a mask's edge. lift_interval: 95 %. failures: how many trials failed for each reason. seconds: medians.
     calibration: for each tenth of the target's probability the mean probability, how often it was a target, and the
     number of pixels. declining: if only trials of at least some certainty were tried: that certainty, the share of the
-    trials that is left, and the share of these that lifted; ten steps.
+    trials that is left, and the share of these that lifted; ten steps. rows: for each trial its seed, the targets' IoU,
+    the certainty, and why it failed, "" if it did not.
     """
 
     iou: dict[str, float]
@@ -137,6 +149,7 @@ class Report:
     seconds: dict[str, float]
     calibration: list[tuple[float, float, int]]
     declining: list[tuple[float, float, float]]
+    rows: list[tuple[int, float, float, str]]
 
 
 def summarise(trials: Iterable[Trial]) -> Report:
@@ -166,6 +179,7 @@ def summarise(trials: Iterable[Trial]) -> Report:
         seconds={stage: float(np.median([trial.seconds[stage] for trial in trials])) for stage in stages},
         calibration=calibration([trial.reliability for trial in trials if trial.reliability is not None]),
         declining=declining(trials),
+        rows=[(trial.seed, trial.target_iou, trial.certainty, trial.reason) for trial in trials],
     )
 
 
@@ -211,14 +225,23 @@ def run_trials(
 def as_json(report: Report) -> str:
     """The report as JSON; null is the IoU of a class that no scene has, which JSON's numbers cannot say.
 
+    A row for each trial says its seed, target_iou, certainty and reason, on a line of its own.
+
     >>> n = np.diag([3, 4, 5, 0])
     >>> report = summarise([Trial(1, n, (n.diagonal(), n.diagonal()), True, "", "mug")])
     >>> json.loads(as_json(report))["iou"]
     {'background': 1.0, 'surface': 1.0, 'target': 1.0, 'obstacle': None}
     """
-    fields = asdict(report)
-    fields["iou"] = {name: None if np.isnan(value) else value for name, value in report.iou.items()}
-    return json.dumps(fields, indent=1, allow_nan=False) + "\n"
+    fields, names = asdict(report), ("seed", "target_iou", "certainty", "reason")
+    fields["iou"] = {name: _or_null(value) for name, value in report.iou.items()}
+    rows = [dict(zip(names, (seed, _or_null(score), *rest), strict=True)) for seed, score, *rest in fields.pop("rows")]
+    text = json.dumps(fields, indent=1, allow_nan=False).removesuffix("\n}")
+    lines = ",\n  ".join(json.dumps(row, allow_nan=False) for row in rows)
+    return f'{text},\n "rows": [\n  {lines}\n ]\n}}\n'
+
+
+def _or_null(value: float) -> float | None:
+    return None if np.isnan(value) else value
 
 
 def table(report: Report) -> str:

@@ -18,21 +18,22 @@ from matplotlib.colors import to_hex
 
 from labkit.apps.node_command import numbers_of
 from labkit.frame import RGBDFrame, read_image
-from labkit.geometry import Plane, back_project, fit_plane, invert_transform
+from labkit.geometry import Plane, back_project, fit_plane, invert_transform, project, transform_points
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, PALETTE, SURFACE, TARGET, overlay
 from labkit.notices import notices
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
-from labkit.views import View
+from labkit.views import View, fingers
 
 MOST_POINTS = 9000  # of the report's view: more make the page heavy, and the eye sees no difference
 TABLE_MARGIN = 0.02  # metres under the table that noise may reach
 ROOM = 0.5  # metres over the table that matter for a grasp
 WORKSPACE = ((-20.0, 20.0), (-20.0, 20.0), (-TABLE_MARGIN, ROOM))  # further off nothing is grasped
 SHOWN = 5  # grasps that the report lists and draws
-NEAR = 0.45  # metres around the targets that the view shows
+AROUND = 0.12  # metres around the targets that the view shows
+JAWS = (255, 255, 255), (30, 110, 255)  # colours of the other grasps' jaws and of the best one's, in the picture
 
 
 # --------------------------------------------------------------------------------------------- what comes in
@@ -275,12 +276,14 @@ def grasps_json(seen: Seen) -> dict:
 
 
 def view(seen: Seen) -> View:
-    """Cloud, targets and jaws in 3-D."""
+    """Cloud, targets and jaws in 3-D: the targets and what is close to them, or without any what is on the table."""
     p, table_z = seen.perception, seen.frame.table_z or 0.0
     P, rgb = p.points.reshape(-1, 3), seen.frame.rgb.reshape(-1, 3)
-    others = (P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM) & (p.labels.ravel() != TARGET)
-    middle = np.median(np.concatenate(p.clouds) if p.clouds else P[others], axis=0) if others.any() else np.zeros(3)
-    others &= np.abs(P[:, :2] - middle[:2]).max(axis=1) < NEAR
+    others = (P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM)
+    shown = np.concatenate(p.clouds or [P[others]] if others.any() else [np.zeros((1, 3))])
+    low, high = np.percentile(shown, [1, 99], axis=0)
+    middle, half = (low + high) / 2, (high - low) / 2 + AROUND
+    others &= (p.labels.ravel() != TARGET) & (np.abs(P - middle) < half).all(axis=1)
     others = np.flatnonzero(others)
     others = others[:: max(1, len(others) // MOST_POINTS)]
     shown = View(eye=tuple((seen.frame.T_base_cam[:3, 3] - middle).tolist()), height=560)
@@ -289,8 +292,9 @@ def view(seen: Seen) -> View:
         some = cloud[:: max(1, len(cloud) // 3000)]
         shown.points(some, f"target {number}", to_hex(PALETTE[TARGET] / 255), 2.5)
     hand = Gripper()
-    shown.jaws(p.plan.grasps[:1], hand, "best grasp").jaws(p.plan.grasps[1:SHOWN], hand, "other grasps", "#bbbbbb")
-    return shown.frame(np.eye(4), "base", 0.1)
+    return shown.jaws(p.plan.grasps[:1], hand, "best grasp").jaws(
+        p.plan.grasps[1:SHOWN], hand, "other grasps", "#bbbbbb"
+    )
 
 
 def picture(rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
@@ -299,6 +303,19 @@ def picture(rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]) -
     target = (labels == TARGET).astype(np.uint8)
     outlines, _ = cv2.findContours(target, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     return cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+
+
+def with_grasps(frame: RGBDFrame, grasps, gripper: Gripper | None = None) -> UInt8[np.ndarray, "H W 3"]:
+    """The colour picture with the outlines of the opened jaws as the camera would see them, the best ones blue."""
+    image, T_cam_base = frame.rgb.copy(), invert_transform(frame.T_base_cam)
+    for grasp in grasps[:SHOWN][::-1]:  # the best one last, on top
+        for corners in fingers(grasp.T_base_grasp, grasp.width, gripper or Gripper()):
+            uv = np.stack(project(transform_points(T_cam_base, corners), frame.K), axis=1)
+            if np.isfinite(uv).all():  # all in front of the camera
+                hull = cv2.convexHull(np.rint(16.0 * uv).astype(np.int32))  # in sixteenths of a pixel
+                thickness = max(1, round(frame.size[0] / 400))
+                cv2.polylines(image, [hull], True, JAWS[grasp is grasps[0]], thickness, cv2.LINE_AA, shift=4)
+    return image
 
 
 # -------------------------------------------------------------------------------------------------- what goes out
@@ -330,15 +347,12 @@ def report(seen: Seen) -> str:
     coloured = cv2.applyColorMap((255 * np.where(known, grey, 0.0)).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     coloured[~known] = 0
     pictures = {
-        "what the camera saw": seen.frame.rgb,
+        "what the camera saw, and the jaws: of the best grasp blue, of others white": with_grasps(
+            seen.frame, seen.perception.plan.grasps
+        ),
         f"depth: {low:.2f} m (yellow) to {high:.2f} m (violet), black without a reading": coloured[..., ::-1],
         "labels: targets orange, obstacles green": picture(seen.frame.rgb, seen.perception.labels),
     }
-    figures = "".join(
-        f'<figure><img alt="{html.escape(title)}" src="data:image/png;base64,{_base64(_at_most(image, 640))}">'
-        f"<figcaption>{html.escape(title)}</figcaption></figure>"
-        for title, image in pictures.items()
-    )
     rows = "".join(
         f"<tr><td>{number}</td><td>{grasp.target + 1}</td>"
         + "".join(f"<td>{x:+.3f}</td>" for x in grasp.T_base_grasp[:3, 3])
@@ -349,29 +363,31 @@ def report(seen: Seen) -> str:
         "<table><caption>the best grasps, in the base frame</caption><tr><th>grasp</th><th>target</th><th>x (m)</th>"
         f"<th>y (m)</th><th>z (m)</th><th>opening (cm)</th><th>score</th></tr>{rows}</table>"
     )
-    return PAGE.format(
-        figures=figures,
-        words=html.escape(describe(seen)),
-        table=table if rows else "",
-        view=view(seen).html(script=True),
+    body = [figures(pictures), f"<pre>{html.escape(describe(seen))}</pre>", table if rows else ""]
+    body += ["<h2>The view in 3-D: drag to turn, wheel to come closer</h2>", view(seen).html(script=True)]
+    return PAGE.format(title="What the camera saw, and where to close the jaws", body="\n".join(body))
+
+
+def figures(pictures: dict[str, UInt8[np.ndarray, "_ _ 3"]]) -> str:
+    """Pictures, by their captions, as HTML that holds them."""
+    return "".join(
+        f'<figure><img alt="{html.escape(title)}" src="data:image/png;base64,{_base64(_at_most(image, 640))}">'
+        f"<figcaption>{html.escape(title)}</figcaption></figure>"
+        for title, image in pictures.items()
     )
 
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>labkit perceive</title><style>
+<title>{title}</title><style>
 body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 66em; margin: 2em auto; padding: 0 1em; color: #222 }}
 figure {{ display: inline-block; width: 19em; margin: 0 1em 1em 0; vertical-align: top }}
 img {{ width: 100% }} figcaption, caption {{ font-size: 0.85em; color: #555; text-align: left }}
 table {{ border-collapse: collapse; margin: 1em 0 }} th, td {{ padding: 0.2em 0.8em; text-align: right }}
 tr + tr {{ border-top: 1px solid #ddd }} pre {{ white-space: pre-wrap; background: #f5f5f5; padding: 1em }}
 </style></head><body>
-<h1>What the camera saw, and where to close the jaws</h1>
-{figures}
-<pre>{words}</pre>
-{table}
-<h2>The view in 3-D: drag to turn, wheel to come closer</h2>
-{view}
+<h1>{title}</h1>
+{body}
 </body></html>
 """
 

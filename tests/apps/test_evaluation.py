@@ -80,6 +80,7 @@ def test_lifting_a_non_target_is_a_failure():
 def test_the_command_writes_the_promised_keys(tmp_path):
     out = tmp_path / "scores.json"
     arguments = ["--scenes", "2", "--first-seed", "500000", "--config", "test", "--masks", "truth", "--json", str(out)]
+    arguments += ["--worst", "1", "--out", str(tmp_path)]
     run = subprocess.run(
         [sys.executable, "-m", "labkit.apps.cli", "evaluate", *arguments], capture_output=True, text=True
     )
@@ -89,6 +90,12 @@ def test_the_command_writes_the_promised_keys(tmp_path):
     assert set(promised.split()) <= set(scores)
     assert set(scores["iou"]) == set(CLASSES) and scores["trials"] == 2
     assert scores["mean_iou"] == scores["boundary_iou"] == scores["pixel_accuracy"] == 1.0
+    assert [row["seed"] for row in scores["rows"]] == [500_000, 500_001]
+    assert sum(row["reason"] == "" for row in scores["rows"]) == round(2 * scores["lift_rate"])
+    assert all(row["target_iou"] == 1.0 and 0.0 <= row["certainty"] <= 1.0 for row in scores["rows"])
+    page = (tmp_path / "worst.html").read_text()
+    first = min(scores["rows"], key=lambda row: row["reason"] == "")
+    assert page.count("<figure>") == 3 and f"Seed {first['seed']}: target IoU 1.000" in page
     assert "IoU" in run.stdout and "95 %" in run.stdout and "lifted" in run.stdout
 
 
