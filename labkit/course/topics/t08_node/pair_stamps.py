@@ -73,6 +73,9 @@ def numbers_of_b(a, b, slop, j):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+FAR = np.iinfo(np.int64).max
+
+
 def pairs(a, b, slop, distance):
     """For each stamp of a the b of least distance if a is its nearest, too; -1 if it is over slop."""
     if len(b) == 0:
@@ -85,17 +88,14 @@ def pairs(a, b, slop, distance):
 
 @wrong("Two images share one partner: is the nearest of b also nearer to this stamp than to any other?")
 def one_partner_for_two(a, b, slop):
-    if len(b) == 0:
-        return np.full(len(a), -1)
-    apart = np.abs(a[:, None] - b[None, :])
-    return np.where(apart.min(axis=1) <= slop, apart.argmin(axis=1), -1)
+    return np.concatenate([pair_stamps(alone, b, slop) for alone in a[:, None]])
 
 
 @wrong("The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?")
 def first_come_first_served(a, b, slop):
     j, free = np.full(len(a), -1), np.ones(len(b), bool)
     for i in range(len(a)):
-        apart = np.where(free, np.abs(b - a[i]), np.iinfo(np.int64).max)
+        apart = np.where(free, np.abs(b - a[i]), FAR)
         if free.any() and apart.min() <= slop:
             j[i] = apart.argmin()
             free[j[i]] = False
@@ -104,25 +104,22 @@ def first_come_first_served(a, b, slop):
 
 @wrong("A frame whose partner was lost must stay alone: what is slop for?")
 def no_bound(a, b, slop):
-    return pairs(a, b, np.iinfo(np.int64).max, lambda x, y: np.abs(x - y))
+    return pairs(a, b, FAR, lambda x, y: np.abs(x - y))
 
 
 @wrong("Depth may be stamped a little later than colour as well as a little earlier.")
 def never_later(a, b, slop):
-    far = np.iinfo(np.int64).max
-    return pairs(a, b, slop, lambda x, y: np.where(y <= x, x - y, far))
+    return pairs(a, b, slop, lambda x, y: np.where(y <= x, x - y, FAR))
 
 
 @wrong("Depth may be stamped a little earlier than colour as well as a little later.")
 def never_earlier(a, b, slop):
-    far = np.iinfo(np.int64).max
-    return pairs(a, b, slop, lambda x, y: np.where(y >= x, y - x, far))
+    return pairs(a, b, slop, lambda x, y: np.where(y >= x, y - x, FAR))
 
 
 @wrong("Where all stamps of b are too far, argmin is still a number, 0: what is asked for there?")
 def far_ones_left_in_argmin(a, b, slop):
-    far = np.iinfo(np.int64).max
-    return pairs(a, b, far, lambda x, y: np.where(np.abs(x - y) <= slop, np.abs(x - y), far))
+    return pairs(a, b, FAR, lambda x, y: np.where(np.abs(x - y) <= slop, np.abs(x - y), FAR))
 
 
 @wrong("The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
@@ -137,11 +134,8 @@ def first_within(a, b, slop):
 
 @wrong("One lost message shifts all pairs after it: compare stamps, not positions.")
 def in_order_of_arrival(a, b, slop):
-    j = np.arange(len(a))
-    there = j < len(b)
-    near = np.zeros(len(a), bool)
-    near[there] = np.abs(a[there] - b[j[there]]) <= slop
-    return np.where(near, j, -1)
+    near = np.abs(a[: len(b)] - b[: len(a)]) <= slop
+    return np.append(np.where(near, np.arange(len(near)), -1), np.full(len(a) - len(near), -1))
 
 
 @wrong("Nanoseconds since 1970 have 19 digits; float32 keeps 7. Subtract before you round anything.")

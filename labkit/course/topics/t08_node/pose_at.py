@@ -119,12 +119,12 @@ def slerp(a, b, share):
     return unit(np.sin((1 - share) * angle) * a + np.sin(share * angle) * b)
 
 
-def arc(a, b, first, second, divided=True):
-    """first(omega) a + second(omega) b; a, if both are one turn."""
+def arc(a, b, first, second, sine=np.sin, divided=True):
+    """sine(first omega) a + sine(second omega) b; a, if both are one turn."""
     omega = np.arccos(np.clip(a @ b, -1.0, 1.0))
     if np.sin(omega) < 1e-12:
         return a
-    return (first(omega) * a + second(omega) * b) / (np.sin(omega) if divided else 1.0)
+    return (sine(first * omega) * a + sine(second * omega) * b) / (sine(omega) if divided else 1.0)
 
 
 STRAIGHT = "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?"
@@ -150,10 +150,7 @@ def the_long_way_round(*given):
 
 @wrong(LONG, side=("left", "right"))
 def the_long_way_by_the_arc(*given, side):
-    def turn(a, b, share):
-        return arc(a, b, lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o))
-
-    return with_turn(*given, turn, side)
+    return with_turn(*given, lambda a, b, share: arc(a, b, 1 - share, share), side)
 
 
 @wrong("The camera moved between the two poses: where was it when the image was taken?")
@@ -227,20 +224,14 @@ def nan_between_equal_turns(stamps, positions, quaternions, t):
 
 @wrong("Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?")
 def angle_of_the_turn(*given):
-    def factor(share, omega):
-        return np.sin(2 * share * omega) / 2 / np.cos(omega)
-
-    return with_turn(*given, lambda a, b, s: arc(a, nearer(a, b), lambda o: factor(1 - s, o), lambda o: factor(s, o)))
+    return with_turn(*given, lambda a, b, s: arc(a, nearer(a, b), 1 - s, s, sine=lambda omega: np.sin(2 * omega)))
 
 
 @wrong(
     "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?", side=("left", "right")
 )
 def not_divided_by_the_sine(*given, side):
-    def turn(a, b, share):
-        return arc(a, nearer(a, b), lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o), divided=False)
-
-    return with_turn(*given, turn, side)
+    return with_turn(*given, lambda a, b, share: arc(a, nearer(a, b), 1 - share, share, divided=False), side)
 
 
 @wrong(
@@ -248,16 +239,9 @@ def not_divided_by_the_sine(*given, side):
     side=("left", "right"),
 )
 def shares_of_the_turn_exchanged(*given, side):
-    def turn(a, b, share):
-        return arc(a, nearer(a, b), lambda o: np.sin(share * o), lambda o: np.sin((1 - share) * o))
-
-    return with_turn(*given, turn, side)
+    return with_turn(*given, lambda a, b, share: arc(a, nearer(a, b), share, 1 - share), side)
 
 
 @wrong("The nearer one of b and -b is near to a: does the sign of b's own w know where a is?")
 def sign_of_w(*given):
-    def turn(a, b, share):
-        b = b if b[3] >= 0 else -b
-        return arc(a, b, lambda o: np.sin((1 - share) * o), lambda o: np.sin(share * o))
-
-    return with_turn(*given, turn)
+    return with_turn(*given, lambda a, b, share: arc(a, b if b[3] >= 0 else -b, 1 - share, share))

@@ -96,7 +96,7 @@ def chosen_always(features, mean, covariance, allowed):
 @wrong("The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
 def inverse_twice(features, mean, covariance, allowed):
     squared = (((features - mean) @ np.linalg.inv(covariance)) ** 2).sum(axis=1)
-    return np.where(allowed, squared, np.inf).argmin() + 1 if allowed.any() else 0
+    return chosen(squared, allowed)
 
 
 @wrong("If no piece is allowed, the answer is 0, which is no piece's number.")
@@ -120,8 +120,7 @@ def variances_made_larger(features, mean, covariance, allowed, more):
 @wrong("1 / covariance divides entry by entry: is its matrix product with covariance the identity?")
 def inverse_entry_by_entry(features, mean, covariance, allowed):
     off = features - mean
-    squared = np.einsum("ni,ij,nj->n", off, 1.0 / (covariance + 1e-12), off)
-    return int(np.where(allowed, squared, np.inf).argmin()) + 1 if allowed.any() else 0
+    return chosen((off @ (1.0 / (covariance + 1e-12)) * off).sum(axis=1), allowed)
 
 
 @wrong("off @ inverse @ off.T is n x n: which of its entries is piece i's own distance?")
@@ -132,15 +131,13 @@ def first_row_of_all_products(features, mean, covariance, allowed):
 
 @wrong("The density is largest where the distance is least: is argmin its best piece?")
 def least_density(features, mean, covariance, allowed):
-    off = features - mean
-    return chosen(np.exp(-0.5 * np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)), allowed)
+    return chosen(np.exp(-0.5 * distances(features, mean, covariance)), allowed)
 
 
 @wrong("An allowed piece may be farther away than what you give the others: which number is never less?")
 def others_at_1000(features, mean, covariance, allowed):
-    off = features - mean
-    squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off)
-    return int(np.where(allowed, squared, 1000.0).argmin()) + 1 if allowed.any() else 0
+    squared = np.where(allowed, distances(features, mean, covariance), 1000.0)
+    return int(squared.argmin()) + 1 if allowed.any() else 0
 
 
 @wrong("A spread of 0.1 should count for more than one of 10: do you multiply by the covariance, or divide?")

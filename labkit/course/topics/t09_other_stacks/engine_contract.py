@@ -64,90 +64,78 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def changed(reference, other):
-    return engine_contract(reference, other, 1.0)[1]
-
-
-def at_risk(reference, most):
-    ordered = np.sort(reference, axis=0)
-    return np.mean(ordered[-1] - ordered[-2] <= most)
-
-
 @wrong("One logit may go up while the other goes down: how much can the gap between them shrink?")
 def margin_of_one_tolerance(reference, other, tolerance):
-    kept = np.abs(reference - other).max() <= tolerance
-    return kept, changed(reference, other), at_risk(reference, tolerance)
+    at_risk = engine_contract(reference, other, tolerance / 2)[2]
+    return *engine_contract(reference, other, tolerance)[:2], at_risk
 
 
 @wrong("A contract holds for each logit: a mean forgives the one pixel that is far off.")
 def kept_on_average(reference, other, tolerance):
-    return np.abs(reference - other).mean() <= tolerance, changed(reference, other), at_risk(reference, 2 * tolerance)
+    return np.abs(reference - other).mean() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
 
 @wrong("An engine that is too low by a mile keeps your contract: which way may a logit be off?")
 def kept_upwards_alone(reference, other, tolerance):
-    return (other - reference).max() <= tolerance, changed(reference, other), at_risk(reference, 2 * tolerance)
+    return (other - reference).max() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
 
 @wrong("NaN is neither above nor below: is a comparison with it true the way you ask?")
 def kept_unless_above(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance
-    return not broken.any(), changed(reference, other), at_risk(reference, 2 * tolerance)
+    return not broken.any(), *engine_contract(reference, other, tolerance)[1:]
 
 
 @wrong("np.allclose and np.isclose forgive more at large logits: their rtol is not 0 unless you say so.")
 def kept_by_allclose(reference, other, tolerance):
-    kept = np.allclose(reference, other, atol=tolerance)
-    return kept, changed(reference, other), at_risk(reference, 2 * tolerance)
+    return np.allclose(reference, other, atol=tolerance), *engine_contract(reference, other, tolerance)[1:]
 
 
 @wrong("The gap that counts is the one between the best class and the second, not the last.")
 def margin_to_the_worst(reference, other, tolerance):
-    kept = np.abs(reference - other).max() <= tolerance
-    return kept, changed(reference, other), np.mean(np.ptp(reference, axis=0) <= 2 * tolerance)
+    at_risk = np.mean(np.ptp(reference, axis=0) <= 2 * tolerance)
+    return *engine_contract(reference, other, tolerance)[:2], at_risk
 
 
 @wrong("The two best are to be found among a pixel's classes: along which axis do these lie?")
 def sorted_along_a_row(reference, other, tolerance):
-    kept, ordered = np.abs(reference - other).max() <= tolerance, np.sort(reference)
-    return kept, changed(reference, other), np.mean(ordered[..., -1] - ordered[..., -2] <= 2 * tolerance)
+    best, second = np.sort(reference)[..., [-1, -2]].T
+    return *engine_contract(reference, other, tolerance)[:2], np.mean(best - second <= 2 * tolerance)
 
 
 @wrong("An engine that is too high by a mile keeps your contract: which way may a logit be off?")
 def kept_downwards_alone(reference, other, tolerance):
-    return ((reference - other) <= tolerance).all(), changed(reference, other), at_risk(reference, 2 * tolerance)
+    return ((reference - other) <= tolerance).all(), *engine_contract(reference, other, tolerance)[1:]
 
 
 @wrong("A label is the best of a pixel's classes: which axis do they lie on? Yours is the best column.")
 def labels_along_rows(reference, other, tolerance):
-    kept = np.abs(reference - other).max() <= tolerance
-    return kept, np.mean(reference.argmax(axis=-1) != other.argmax(axis=-1)), at_risk(reference, 2 * tolerance)
+    kept, _, at_risk = engine_contract(reference, other, tolerance)
+    return kept, np.mean(reference.argmax(axis=-1) != other.argmax(axis=-1)), at_risk
 
 
 @wrong("The tolerance is a difference of logits. Yours grows with the logit: where is it multiplied?")
 def kept_relative_to_the_logits(reference, other, tolerance):
     kept = (np.abs(reference - other) <= tolerance * np.abs(reference)).all()
-    return kept, changed(reference, other), at_risk(reference, 2 * tolerance)
+    return kept, *engine_contract(reference, other, tolerance)[1:]
 
 
 @wrong("np.sort goes upwards: where do the two best of a pixel stand?")
 def margin_of_the_two_worst(reference, other, tolerance):
     lowest, next_one = np.sort(reference, axis=0)[:2]
-    kept = np.abs(reference - other).max() <= tolerance
-    return kept, changed(reference, other), np.mean(next_one - lowest <= 2 * tolerance)
+    return *engine_contract(reference, other, tolerance)[:2], np.mean(next_one - lowest <= 2 * tolerance)
 
 
 @wrong("np.argmax takes NaN for the largest. What does the task say of a pixel that has one?")
 def nan_for_the_best(reference, other, tolerance):
-    kept = np.abs(reference - other).max() <= tolerance
-    return kept, np.mean(reference.argmax(axis=0) != other.argmax(axis=0)), at_risk(reference, 2 * tolerance)
+    kept, _, at_risk = engine_contract(reference, other, tolerance)
+    return kept, np.mean(reference.argmax(axis=0) != other.argmax(axis=0)), at_risk
 
 
 @wrong("You take the best of a pixel's other logits. What does the task say of a pixel that has a NaN?")
 def nan_for_the_worst(reference, other, tolerance):
-    kept = np.abs(reference - other).max() <= tolerance
-    labels = np.where(np.isnan(other), -np.inf, other).argmax(axis=0)
-    return kept, np.mean(reference.argmax(axis=0) != labels), at_risk(reference, 2 * tolerance)
+    kept = engine_contract(reference, other, tolerance)[0]
+    return kept, *nan_for_the_best(reference, np.where(np.isnan(other), -np.inf, other), tolerance)[1:]
 
 
 @wrong("NaN is neither above nor below: is a comparison with it true the way you ask?")

@@ -72,6 +72,14 @@ def between(hsv, lower, upper):
     return (hsv >= np.asarray(lower)) & (hsv <= np.asarray(upper))
 
 
+def inside(hsv, lower, upper):
+    """Which channels of which pixels are right, (H, W, 3)."""
+    found = between(hsv, lower, upper)
+    if lower[0] > upper[0]:
+        found[..., 0] = (hsv[..., 0] >= lower[0]) | (hsv[..., 0] <= upper[0])
+    return found
+
+
 @wrong("Try red, from 170 to 10: can any hue be above the one and below the other?")
 def mask_without_going_round(hsv, lower, upper):
     return between(hsv, lower, upper).all(axis=-1)
@@ -79,10 +87,7 @@ def mask_without_going_round(hsv, lower, upper):
 
 @wrong("A pixel is inside only if all three channels are.")
 def mask_of_any_channel(hsv, lower, upper):
-    inside = between(hsv, lower, upper)
-    if lower[0] > upper[0]:
-        inside[..., 0] = (hsv[..., 0] >= lower[0]) | (hsv[..., 0] <= upper[0])
-    return inside.any(axis=-1)
+    return inside(hsv, lower, upper).any(axis=-1)
 
 
 @wrong("A pixel that equals a bound is inside, as in OpenCV.")
@@ -100,8 +105,7 @@ def mask_with_swapped_bounds(hsv, lower, upper):
 
 @wrong("Grey pixels have a hue too, any one: what excludes them?")
 def mask_of_hue(hsv, lower, upper):
-    h = hsv[..., 0]
-    return (h >= lower[0]) & (h <= upper[0]) if lower[0] <= upper[0] else (h >= lower[0]) | (h <= upper[0])
+    return inside(hsv, lower, upper)[..., 0]
 
 
 @wrong("OpenCV's hue goes to 179: the bounds are in the same unit.")
@@ -165,11 +169,7 @@ def value_forgotten(hsv, lower, upper):
 
 @wrong("A mask has a truth value per pixel, (H, W): along which axis do hue, saturation and value stand?")
 def all_along_the_rows(hsv, lower, upper):
-    above, below = hsv >= lower, hsv <= upper
-    inside = above & below
-    if lower[0] > upper[0]:
-        inside[..., 0] = above[..., 0] | below[..., 0]
-    return inside.all(axis=0)
+    return inside(hsv, lower, upper).all(axis=0)
 
 
 @wrong("A hue that equals a bound is inside: what does your `not` make of `>=` and `<=` there?")

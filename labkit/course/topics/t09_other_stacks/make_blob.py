@@ -55,6 +55,11 @@ def planes(bgr):
     return bgr.transpose(2, 0, 1)[None]
 
 
+def with_room(bgr, room):
+    """The blob with room(n) pixels of 0 before and behind an axis of n."""
+    return scaled(planes(np.pad(bgr, (*map(room, bgr.shape[:2]), (0, 0)))[..., ::-1]))
+
+
 @wrong("Put in one pure red pixel: which plane lights up?")
 def blob_still_bgr(bgr, multiple):
     return scaled(planes(padded(bgr, multiple)))
@@ -83,20 +88,17 @@ def blob_of_256(bgr, multiple):
 
 @wrong("A side that is a multiple already needs no room: what do you add to 8 for a multiple of 4?")
 def room_for_one_more(bgr, multiple):
-    room = [(0, multiple - n % multiple) for n in bgr.shape[:2]]
-    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+    return with_room(bgr, lambda n: (0, multiple - n % multiple))
 
 
 @wrong("The room goes below and at the right, so that pixel (0, 0) stays where it is.")
 def room_all_round(bgr, multiple):
-    room = [(-n % multiple // 2, -n % multiple - -n % multiple // 2) for n in bgr.shape[:2]]
-    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+    return with_room(bgr, lambda n: (-n % multiple // 2, -n % multiple - -n % multiple // 2))
 
 
 @wrong("The room goes below and at the right, so that pixel (0, 0) stays where it is.")
 def room_above_and_left(bgr, multiple):
-    room = [(-n % multiple, 0) for n in bgr.shape[:2]]
-    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+    return with_room(bgr, lambda n: (-n % multiple, 0))
 
 
 @wrong("What is left over was cut off: the network should see all of the image.")
@@ -113,14 +115,12 @@ def room_like_the_edge(bgr, multiple):
 @wrong("Rows and columns may need different numbers of zeros: compute each by itself.")
 def one_margin_for_both(bgr, multiple):
     margin = max(-bgr.shape[0] % multiple, -bgr.shape[1] % multiple)
-    rgb = np.pad(bgr[..., ::-1], ((0, margin), (0, margin), (0, 0)))
-    return (rgb.transpose(2, 0, 1)[None] / 255).astype(np.float32)
+    return with_room(bgr, lambda n: (0, margin))
 
 
 @wrong("For a multiple of 4, 6 rows lack 2, and 6 % 4 is 2 as well. What do 5 rows lack?")
 def room_of_the_remainder(bgr, multiple):
-    room = [(0, n % multiple) for n in bgr.shape[:2]]
-    return scaled(planes(np.pad(bgr, (*room, (0, 0)))[..., ::-1]))
+    return with_room(bgr, lambda n: (0, n % multiple))
 
 
 @wrong("White is byte 255 in every image: what becomes of a dark image in yours?")
