@@ -97,6 +97,7 @@ train: .venv/installed
 	$$rgbd data/wide --init data/runs/unet_rgbd.pt --epochs $(or $(EPOCHS),24) --lr 2e-3 --seed 1 --out data/runs/again
 	$$rgbd data/any --init data/runs/again/unet_rgbd.pt --epochs $(or $(EPOCHS),4) --lr 1e-3 --seed 2 --out data/runs/any
 	cp data/runs/{smallsegnet,unet}.pt data/runs/any/unet_rgbd.pt labkit/weights/
+	for model in smallsegnet unet; do $(BIN)/labkit export --model $$model --onnx labkit/weights/$$model.onnx; done
 
 # Environments, and the extras of pyproject.toml that each holds.
 .venv/installed: EXTRAS := course,instructor,stacks,cluster,test

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+import labkit
 from labkit.learning.channels import CHANNELS
 from labkit.learning.inference import Engine, FunctionEngine, NetworkInput
 from labkit.support.files import write_atomically
@@ -22,6 +23,7 @@ from labkit.support.validation import check_rgb, check_shape, require
 
 OPSET = 13  # the newest that OpenCV 4.6 reads without a word
 ENGINES = ("torch", "opencv", "onnxruntime")
+SHIPPED = ("unet", "smallsegnet")  # as ONNX beside their weights
 
 
 class OpenCVEngine(Engine):
@@ -83,6 +85,18 @@ def open_engine(model, engine: str = "torch") -> Engine:
     got = repr(str(model)) if isinstance(model, str | Path) else type(model).__name__
     require("model", callable(model), "a PyTorch network, an engine or a function of an RGB image", got)
     return FunctionEngine(model)
+
+
+def shipped(name: str) -> Engine:
+    """The kit's own "unet" or "smallsegnet" in OpenCV: the labels of PyTorch without loading it, 120 MB less memory.
+
+    Raises ValueError for another name. Topic 09.
+
+    >>> shipped("unet")(np.zeros((5, 7, 3), np.uint8)).shape
+    (5, 7, 4)
+    """
+    require("name", name in SHIPPED, f"one of {', '.join(SHIPPED)}", repr(name))
+    return open_engine(Path(labkit.__file__).with_name("weights") / f"{name}.onnx", "opencv")
 
 
 def is_network(model) -> bool:

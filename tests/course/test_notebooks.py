@@ -6,6 +6,7 @@ That they run, and give the outputs that are committed, is nbval's part of `make
 import ast
 import base64
 import importlib
+import os
 import re
 import subprocess
 import sys
@@ -215,6 +216,23 @@ def test_every_solution_passes_under_another_seed_than_the_checks(path):
     for function, question in of_topic(path.stem).items():
         verdict = judge(question, answer(path, function), 20_260_102)
         assert verdict.passed and not verdict.notes, (function, verdict)
+
+
+def cells_to_first_check(path: Path) -> str:
+    """A lab's code from its first cell to its first check."""
+    sources = [cell.source for cell in code(path)]
+    return "\n".join(sources[: next(i for i, text in enumerate(sources) if " = check(" in text) + 1])
+
+
+@pytest.mark.parametrize("topic", ["01_labels", "04_iou", "06_back_projection"])
+def test_a_lab_loads_no_heavy_package_before_its_first_check(topic):
+    """On a hub everybody's kernel has its own copy: PyTorch takes 120 MB of memory, numba 30."""
+    path = ROOT / "labs" / topic / f"{topic}.ipynb"
+    heavy = "print(sorted({'torch', 'numba', 'onnxruntime', 'plotly', 'pandas'} & set(sys.modules)))"
+    program = f"{cells_to_first_check(path)}\nimport sys\n{heavy}".replace("raise NotImplementedError", "pass")
+    environment = {**os.environ, "MPLBACKEND": "agg"}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, env=environment)
+    assert done.stdout.splitlines()[-1:] == ["[]"], done.stderr
 
 
 def test_labs_and_what_they_come_from_are_as_the_release_makes_them():

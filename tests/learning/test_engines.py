@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import data_gen
 from labkit.apps.cli import app
-from labkit.learning.engines import ENGINES, export, labels_of_scores, open_engine, segment_like_cpp
+from labkit.learning.engines import ENGINES, SHIPPED, export, labels_of_scores, open_engine, segment_like_cpp, shipped
 from labkit.learning.network import UNetRGBD, load_model, weights_path
 from labkit.pipeline import Pipeline, segment_rgb_image
 
@@ -44,6 +44,14 @@ def frames():
 
 
 # -------------------------------------------------------------------------------- the same answer everywhere
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_what_ships_as_onnx_is_the_network_of_the_weights_that_ship(name, frames):
+    expected = open_engine(load_model(weights_path(name))).logits(frames[0].rgb)
+    assert np.abs(shipped(name).logits(frames[0].rgb) - expected).max() < 1e-4
+    with pytest.raises(ValueError, match="name: expected one of unet, smallsegnet, got 'unet_rgbd'"):
+        shipped("unet_rgbd")
 
 
 @pytest.mark.parametrize("name", ENGINES)
