@@ -10,8 +10,11 @@ from functools import cache
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
 import pytest
 from notebooks import LESSONS, ROOT, SOLUTIONS, code, notebook, prose
+
+from labkit.course.topics import TOPICS
 
 MOST_MINUTES, MOST_LAB_MINUTES, WORDS_PER_MINUTE, NEW = 50, 105, 200, 0.6
 
@@ -32,15 +35,16 @@ def section(path: Path, title: str) -> str:
 
 
 def minutes(path: Path) -> float:
-    """Minutes that a lesson takes: 200 words per minute, one minute per code cell.
+    """Minutes that a lesson takes: 200 words per minute, one minute per code cell, two per displayed equation.
 
     A formula is a word. Folded answers count. What to read next is a list to look things up in, and does not.
     """
     text = prose(path).replace(section(path, "Read next") or "\0", " ")
+    equations = len(re.findall(r"\$\$.*?\$\$", text, flags=re.DOTALL))
     text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$|```.*?```", " formula ", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->|<[^<>\n]+>|\]\([^)]*\)", " ", text, flags=re.DOTALL)
     words = re.findall(r"[^\W_]+(?:['.,-][^\W_]+)*", text)
-    return len(words) / WORDS_PER_MINUTE + len(code(path))
+    return len(words) / WORDS_PER_MINUTE + len(code(path)) + 2 * equations
 
 
 def test_a_lesson_is_read_in_fifty_minutes_and_says_so():
@@ -249,27 +253,35 @@ def test_a_mark_is_compared(text, right):
 # -------------------------------------------------------------------------------------- endings, schematics
 
 
-def test_a_lesson_ends_with_a_recap_five_questions_and_what_to_read():
-    """Headings `## Recap` (a quoted box), `## Test yourself` (five folded answers), `## Read next` (works by name)."""
+def test_a_lesson_ends_with_a_recap_questions_and_what_to_read():
+    """Headings `## Recap` (a quoted box), `## Test yourself` (folded answers), `## Read next` (works by name)."""
+
+    def ending(path: Path) -> tuple[int, int, int]:
+        recap, test, read = (section(path, title) for title in ("Recap", "Test yourself", "Read next"))
+        works = re.findall(r"^- .*(?:\*|\").*(?:19|20)\d\d", read, re.MULTILINE)
+        return len(re.findall(r"^> \S", recap, re.MULTILINE)), test.count("<details"), len(works)
 
     def complaint(path: Path) -> str:
-        recap, test, read = (section(path, title) for title in ("Recap", "Test yourself", "Read next"))
-        said = [] if len(re.findall(r"^> \S", recap, re.MULTILINE)) >= 3 else ["no recap box of three lines or more"]
-        said += [] if test.count("<details") == 5 else [f"{test.count('<details')} questions with folded answers"]
-        works = re.findall(r"^- .*(?:\*|\").*(?:19|20)\d\d", read, re.MULTILINE)
-        said += [] if len(works) >= 3 else [f"{len(works)} works by author, title and year to read next"]
-        return "; ".join(said)
+        lines, questions, works = ending(path)
+        return (
+            ""
+            if lines >= 3 and questions >= 2 and works >= 1
+            else f"{lines} lines, {questions} questions, {works} works"
+        )
 
     holds(LESSONS, complaint)
+    for topic in {path.name[:2] for path in LESSONS}:
+        _, questions, works = np.sum([ending(path) for path in LESSONS if path.name.startswith(topic)], axis=0)
+        assert questions >= 5 and works >= 3, f"lessons of topic {topic}: {questions} questions, {works} works"
 
 
-def test_each_lesson_opens_with_a_schematic():
+def test_each_topic_opens_with_a_schematic():
     def complaint(path: Path) -> str:
         first = "\n".join(cell.source for cell in notebook(path).cells[:8] if cell.cell_type == "markdown")
         shown = re.findall(r"!\[([^\]]{40,})\]\((schematics/\w+\.svg)\)", first)
         return "" if shown and all((path.parent / file).is_file() for _, file in shown) else "none, or not described"
 
-    holds(LESSONS, complaint)
+    holds([path for path in LESSONS if path.stem in TOPICS], complaint)
 
 
 def test_the_schematics_are_as_the_code_beside_them_draws_them():
