@@ -8,6 +8,7 @@ starts from the points of three targets in a 320x240 frame: outliers removed, th
 
 import cv2
 import numpy as np
+import open3d
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -23,11 +24,6 @@ from labkit.geometry import (
 )
 from labkit.sim.spec import Camera
 from tests.bench.measure import in_turns, table
-
-try:
-    import open3d
-except ImportError:
-    open3d = None
 
 TURNS, REPEATS = 30, 5
 RADIUS, MIN_NEIGHBOURS, GAP = 0.01, 4, 0.015
@@ -97,19 +93,15 @@ def clouds_with_open3d(P):
 
 
 def against_the_first(title: str, ways: dict, bars: dict[str, str]) -> str:
-    """Time the ways that are installed; the first is labkit's, which the others are compared with."""
-    times = in_turns({name: way for name, way in ways.items() if way}, TURNS, best_of=REPEATS)
-    ms = {name: float(np.median(turns)) for name, turns in times.items()}
+    """Time the ways; the first is labkit's, which the others are compared with."""
+    ms = {name: float(np.median(turns)) for name, turns in in_turns(ways, TURNS, best_of=REPEATS).items()}
     own = ms[next(iter(ways))]
-    rows = []
-    for name in ways:
-        measured = (f"{ms[name]:.2f}", f"{ms[name] / own:.2f}") if name in ms else ("not installed", "")
-        rows.append((name, *measured, bars.get(name, "")))
+    rows = [(name, f"{ms[name]:.2f}", f"{ms[name] / own:.2f}", bars.get(name, "")) for name in ways]
     return table(f"{title} | median ms | times the first row | asked for", rows)
 
 
 def frame_table() -> str:
-    """Back-project a full 640x480 frame in every way that is installed."""
+    """Back-project a full 640x480 frame in every way."""
     depth, mask, K, T_base_cam = scene(640, 480)
     everything = np.ones_like(mask)
     holes = np.where(np.random.default_rng(1).random(depth.shape) < 0.1, np.float32(0.0), depth)
@@ -125,16 +117,14 @@ def frame_table() -> str:
         "labkit, base frame, the camera moves every frame": new_camera,
         "labkit, camera frame": lambda: back_project(depth, K),
         "the text's listing": lambda: text_listing(everything, depth, K, T_base_cam, 1),
-        "Open3D create_from_depth_image": with_open3d(depth, K, T_base_cam) if open3d else None,
-        "cv2.depthTo3d, camera frame": (lambda: cv2.depthTo3d(depth, K)) if hasattr(cv2, "depthTo3d") else None,
+        "Open3D create_from_depth_image": with_open3d(depth, K, T_base_cam),
+        "cv2.depthTo3d, camera frame": lambda: cv2.depthTo3d(depth, K),
     }
     P = ways["labkit, base frame"]().reshape(-1, 3)
     np.testing.assert_allclose(ways["the text's listing"](), P, atol=1e-5)
-    if open3d:
-        np.testing.assert_allclose(ways["Open3D create_from_depth_image"]().points, P, atol=1e-5)
-    if ways["cv2.depthTo3d, camera frame"]:
-        peer = ways["cv2.depthTo3d, camera frame"]()[..., :3]
-        np.testing.assert_allclose(peer, back_project(depth, K), atol=1e-5)
+    np.testing.assert_allclose(ways["Open3D create_from_depth_image"]().points, P, atol=1e-5)
+    peer = ways["cv2.depthTo3d, camera frame"]()[..., :3]
+    np.testing.assert_allclose(peer, back_project(depth, K), atol=1e-5)
     bars = {
         "the text's listing": "at least 15",
         "Open3D create_from_depth_image": "at least 2",
@@ -144,7 +134,7 @@ def frame_table() -> str:
 
 
 def cloud_table() -> str:
-    """Turn the points of three targets into three clouds in every way that is installed."""
+    """Turn the points of three targets into three clouds in every way."""
     depth, mask, K, T_base_cam = scene(320, 240)
     P = backproject_to_base(mask, depth, K, T_base_cam, 2)
 
@@ -155,7 +145,7 @@ def cloud_table() -> str:
     ways = {
         "labkit, remove_outliers and cluster": lambda: cluster(remove_outliers(P, RADIUS, MIN_NEIGHBOURS), GAP),
         "SciPy, k-d trees and connected_components": lambda: with_scipy(P),
-        "Open3D remove_radius_outlier and cluster_dbscan": (lambda: clouds_with_open3d(P)) if open3d else None,
+        "Open3D remove_radius_outlier and cluster_dbscan": lambda: clouds_with_open3d(P),
         "labkit, all geometry of a frame: depth to three clouds with axes": whole,
     }
     expected = [len(cloud) for cloud in ways["labkit, remove_outliers and cluster"]()]
