@@ -125,7 +125,7 @@ def test_every_target_can_be_held():
 
 
 def test_statistics_of_test_are_as_promised():
-    s = statistics(range(900_000, 900_060), "test", (160, 120))
+    s = statistics(range(900_000, 900_030), "test", (160, 120))
     assert sum(share >= 0.10 for share in s.families.values()) >= 5
     assert s.not_boxes >= 0.60
     assert s.obstacles >= 5.0

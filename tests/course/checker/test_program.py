@@ -139,7 +139,7 @@ def test_a_check_does_not_redefine_what_it_checks():
         "%%",
         "?" * 1000,
         "%time",
-        "x = 1\n" * 20_000,
+        "x = 1\n" * 5_000,
     ],
     ids=range(9),
 )
