@@ -169,8 +169,9 @@ class SegmentationNode:
         topic = getattr(self.topics, stream)
 
         def receive(message: Message | ValueError) -> None:
-            with self._news:
-                self._heard[stream] += stream in INPUTS
+            if stream in INPUTS:
+                with self._news:
+                    self._heard[stream] += 1
             try:
                 if isinstance(message, ValueError):
                     raise message
@@ -316,7 +317,7 @@ class SegmentationNode:
         speaking = [topic for stream, topic in named.items() if self._heard[stream]]
         if silent := [topic for topic in named.values() if topic not in speaking]:
             return f"messages on {' and '.join(speaking)}, but none on {' and '.join(silent)}"
-        if min(self._heard.values()) < 2:
+        if self._trouble or min(self._heard.values()) < 2:  # what was skipped has been heard, too
             return ""
         return f"no stamps of {', '.join(named.values())} lie within {self._sync.slop / 1e6:g} ms"
 
