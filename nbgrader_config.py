@@ -1,5 +1,9 @@
 """nbgrader's configuration: this checkout is the course. What is graded goes to folders that git ignores."""
 
+from importlib.util import find_spec
+
+from nbconvert.exporters import HTMLExporter
+
 c = get_config()  # nbgrader defines it
 
 c.CourseDirectory.course_id = "labkit"
@@ -10,3 +14,10 @@ c.CourseDirectory.ignore = [".ipynb_checkpoints", "*.pyc", "__pycache__", "feedb
 c.ZipCollectApp.collector_plugin = "labkit.course.grading.collect.LmsCollector"
 # `nbgrader autograde` and formgrader's Autograde refuse: `labkit grade` grades.
 c.Autograde.exporter_class = "labkit.course.grading.refusal.GradedByLabkit"
+# Copies have rubrics for formgrader; nbgrader's feedback leaves them out.
+c.GenerateFeedback.exporter_class = "labkit.course.grading.refusal.FeedbackPages"
+# With `pip install jupyter-server-mathjax` formgrader's formulas need no network; feedback is read elsewhere.
+if find_spec("jupyter_server_mathjax"):
+    c.FeedbackPages.mathjax_url = HTMLExporter.mathjax_url.default_value
+    mathjax = "../../../static/jupyter_server_mathjax/MathJax.js"
+    c.HTMLExporter.mathjax_url = f"{mathjax}?config=TeX-AMS-MML_HTMLorMML-full,Safe"

@@ -445,7 +445,9 @@ def grade(
     how = {"workers": workers, "force": force, "unsafe": unsafe, "tidy": tidy, "undone": undo}
     how["change"] = change_of(topic, everybody, drop, points, reason)
     graded = grade_course(topic, course, submissions, out, seed, new_round, comment, **how)
-    typer.echo(terminal_table(graded.lab, graded.records))
+    typer.echo(terminal_table(graded.lab, graded.records, graded.late))
+    if graded.strangers:
+        typer.echo(f"course.toml has extensions of nobody here: {', '.join(graded.strangers)}", err=True)
     for student, failure in graded.failures.items():
         typer.echo(f"{student}: {failure}", err=True)
     for old, name in graded.renamed.items():
@@ -465,21 +467,28 @@ def grades(
     topic: Annotated[str, typer.Argument(help="Which lab, such as 04_iou.")],
     moodle: Annotated[bool, typer.Option("--moodle", help="Moodle's grading worksheet, and its zip of pages.")] = False,
     canvas: Annotated[bool, typer.Option("--canvas", help="Canvas's columns, and its zip of pages.")] = False,
+    gradescope: Annotated[bool, typer.Option("--gradescope", help="An autograder for Gradescope, as a zip.")] = False,
     course: Annotated[Path, typer.Option(help="Folder that holds nbgrader's gradebook.")] = Path("."),
 ) -> None:
     """Write a table of grades: for Moodle or Canvas as they import it, with a zip of feedback that they hand out."""
+    from labkit.course.grading.gradescope import write_autograder
     from labkit.course.grading.platforms import write_grades
     from labkit.course.grading.run import private
 
-    if moodle and canvas:
-        raise ValueError("expected --moodle or --canvas, got both")
+    if moodle + canvas + gradescope > 1:
+        raise ValueError("expected one of --moodle, --canvas and --gradescope, got more")
+    if gradescope:
+        with private():
+            tell_written([write_autograder(course, topic)])
+        return
     with private():
-        files, waiting = write_grades(course, topic, "moodle" if moodle else "canvas" if canvas else "scores")
-    for path in files:
-        typer.echo(f"wrote {path}")
-    if waiting:
-        typer.echo(f"to be graded by hand yet: {', '.join(waiting)}")
-    raise typer.Exit(1 if waiting else 0)
+        written = write_grades(course, topic, "moodle" if moodle else "canvas" if canvas else "scores")
+    tell_written(written.files)
+    for student, why in written.without.items():
+        typer.echo(f"no grade: {student} ({why})")
+    if written.waiting:
+        typer.echo(f"to be graded by hand yet: {', '.join(written.waiting)}")
+    raise typer.Exit(1 if written.waiting else 0)
 
 
 def main() -> None:

@@ -13,8 +13,13 @@ outputs    grades.csv, results.json, and `feedback`, a page per student
 markdown   a stranger's Markdown, made harmless
 tell       what to say about a wrong answer, in a process with limits
 changes    what an instructor changed after the release: course.toml
+settings   course.toml, read with line numbers
+deadlines  who is late, and what it costs
+roster     names and emails
 gradebook  nbgrader's database and the copies that formgrader shows
 students   those who were renamed, and those who are gone
+final      what students have in the end, and the end of their pages
 platforms  tables and zips that Moodle and Canvas take back
+gradescope an autograder for Gradescope, and what runs in its container
 refusal    why nbgrader's own Autograde does nothing
 """

@@ -24,11 +24,11 @@ from pathlib import Path
 from labkit.course.grading.batch import Record
 from labkit.course.grading.grade import Result
 from labkit.course.grading.reading import Lab, grade_id
+from labkit.course.grading.settings import BLOCK, FILE, fault_of_fields, read_blocks
 from labkit.support.files import write_atomically
 
-FILE = "course.toml"
 KINDS = ("everybody", "drop", "points")
-BLOCK = re.compile(r"(?ms)^\[\[change\]\].*?(?=^\s*\[|\Z)")
+NO_COUNT, FOR_ALL = "It does not count", "Everybody has these points"
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,9 @@ class Change:
         """What stands in the file."""
         kind = {"points": self.points} if self.points is not None else {"drop" if self.drop else "everybody": True}
         return {"lab": self.lab, "question": self.question, **kind, "date": self.date, "reason": self.reason}
+
+    def __str__(self) -> str:
+        return f"{NO_COUNT if self.drop else FOR_ALL}: {self.reason}"
 
 
 def as_toml(change: Change) -> str:
@@ -78,18 +81,10 @@ def read_changes(course: Path, lab: Lab) -> list[Change]:
 
     Raises ValueError, with the file and the line, for what cannot be used.
     """
-    path = Path(course) / FILE
-    text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    try:
-        tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path}: {error}") from None
     found = []
-    for block in BLOCK.finditer(text):
-        line = text.count("\n", 0, block.start()) + 1
-        (data,) = tomllib.loads(block[0])["change"]
+    for where, data in read_blocks(course, "change"):
         if fault := fault_of(data, lab):
-            raise ValueError(f"{path}, line {line}: {fault}")
+            raise ValueError(f"{where}: {fault}")
         if data["lab"] == lab.topic:
             found.append(Change(**data))
     return found
@@ -97,21 +92,16 @@ def read_changes(course: Path, lab: Lab) -> list[Change]:
 
 def fault_of(data: dict, lab: Lab) -> str:
     """What of a change cannot be used, "" if nothing; questions of other labs are not looked for."""
-    known = {"lab": str, "question": str, "date": datetime.date, "reason": str}
-    for name, kind in known.items():
-        if not isinstance(data.get(name), kind):
-            return f"expected {name}, {'a date such as 2026-10-05' if name == 'date' else 'a text'}, in this [[change]]"
-    if odd := data.keys() - known.keys() - set(KINDS):
-        return f"expected {', '.join((*known, *KINDS))} in a [[change]], got {min(odd)}"
-    kinds = [kind for kind in KINDS if kind in data]
-    if len(kinds) != 1 or (kinds[0] != "points" and data[kinds[0]] is not True):
-        return "expected one of everybody = true, drop = true and points = NUMBER in this [[change]]"
-    points = data.get("points", 0)
-    if isinstance(points, bool) or not isinstance(points, int | float) or not 0 <= points < 1e6:
-        return f"expected points, a number that is not negative, got {points}"
-    if data["lab"] == lab.topic and data["question"] not in lab.points:
-        return f"question: expected one of {', '.join(lab.points)}, got {data['question']}"
-    return ""
+    needed = {"lab": str, "question": str, "date": datetime.date, "reason": str}
+    if fault := fault_of_fields(data, needed, {"everybody": bool, "drop": bool, "points": float}):
+        return fault
+    if len(data.keys() & set(KINDS)) != 1:
+        return "expected one of everybody = true, drop = true and points = NUMBER in this block"
+    if data["lab"] != lab.topic or data["question"] in lab.points:
+        return ""
+    if data["question"] not in lab.written:
+        return f"question: expected one of {', '.join((*lab.points, *lab.written))}, got {data['question']}"
+    return "points: a person gives those of an answer in words; drop and everybody are possible" * ("points" in data)
 
 
 def add_change(course: Path, lab: Lab, change: Change) -> None:
@@ -135,8 +125,9 @@ def undo(course: Path, lab: Lab, question: str, missing: bool = False) -> None:
     text = path.read_text(encoding="utf-8")
 
     def kept(block: re.Match) -> str:
-        (data,) = tomllib.loads(block[0])["change"]
-        return "" if (data["lab"], data["question"]) == (lab.topic, question) else block[0]
+        data = tomllib.loads(block[0])[block[1]][0]
+        same = block[1] == "change" and (data["lab"], data["question"]) == (lab.topic, question)
+        return "" if same else block[0]
 
     write_atomically(path, BLOCK.sub(kept, text).encode())
 
@@ -148,11 +139,13 @@ def changed(lab: Lab, records: Sequence[Record], changes: Sequence[Change]) -> t
         return lab, list(records)
     points, notebook = dict(lab.points), copy.deepcopy(lab.notebook)
     for name, change in by_question.items():
-        points[name] = 0.0 if change.drop else points[name] if change.points is None else float(change.points)
+        if name in points:
+            points[name] = 0.0 if change.drop else points[name] if change.points is None else float(change.points)
     for cell in notebook["cells"]:
         name = (grade_id(cell) or "").removeprefix("check_")
         if name in by_question and "points" in cell["metadata"]["nbgrader"]:
-            cell["metadata"]["nbgrader"]["points"] = points[name]
+            mark = cell["metadata"]["nbgrader"]
+            mark["points"] = points.get(name, 0.0 if by_question[name].drop else mark["points"])
     now = []
     for record in records:
         results = (under(result, by_question.get(result.question), points) for result in record.results)
@@ -168,5 +161,5 @@ def under(result: Result, change: Change | None, points: dict[str, float]) -> Re
     earned = worth if result.right or change.everybody else 0.0
     says = result.says
     if change.points is None:
-        says += f". {'It does not count' if change.drop else 'Everybody has these points'}: {change.reason}"
+        says += f". {change}"
     return replace(result, points=earned, max_points=worth, says=says)

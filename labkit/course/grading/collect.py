@@ -5,15 +5,19 @@
     Canvas                 lovelaceada_LATE_1234_567890_04_iou-2.ipynb
 
 A student is named by name and number, since two may share a name: "Ada Lovelace_1234567", "lovelaceada_1234".
+Moodle's zip tells when each file was handed in; Canvas's only which are late.
 """
 
+import datetime
 import re
 import unicodedata
+import zipfile
+from pathlib import Path
 
 from nbgrader.plugins import FileNameCollectorPlugin
 
 MOODLE = re.compile(r"(?P<name>[^/\\]+)_(?P<number>\d+)_assignsubmission_file_?[/\\]?(?:.*[/\\])?(?P<file>[^/\\]+)$")
-CANVAS = re.compile(r"(?:.*[/\\])?(?P<name>[^/\\_]+)(?:_LATE)?_(?P<number>\d+)_\d+_(?P<file>[^/\\]+)$")
+CANVAS = re.compile(r"(?:.*[/\\])?(?P<name>[^/\\_]+)(?P<late>_LATE)?_(?P<number>\d+)_\d+_(?P<file>[^/\\]+)$")
 
 
 def student_and_notebook(path: str) -> tuple[str, str] | None:
@@ -31,6 +35,31 @@ def student_and_notebook(path: str) -> tuple[str, str] | None:
     return f"{unicodedata.normalize('NFC', found['name'])}_{found['number']}", notebook
 
 
+def marked_late(course: Path, topic: str) -> set[str]:
+    """The students whose files Canvas marks as late."""
+    found = set()
+    for path in (Path(course) / "downloaded" / topic).rglob("*.ipynb"):
+        mark = CANVAS.match(str(path))
+        if not MOODLE.search(str(path)) and mark and mark["late"]:
+            found.add(student_and_notebook(str(path))[0])
+    return found
+
+
+def handed_in(path: Path) -> str:
+    """When a file in an extracted zip of Moodle's was handed in, as the zip says in local time; "" if it does not."""
+    folder = next((parent for parent in path.parents if parent.name == "extracted"), None)
+    if folder is None or not MOODLE.search(str(path)):
+        return ""
+    archive, *parts = path.relative_to(folder).parts
+    try:
+        with zipfile.ZipFile(folder.with_name("archive") / f"{archive}.zip") as packed:
+            stamp = packed.getinfo("/".join(parts)).date_time
+        when = datetime.datetime(*stamp).astimezone(datetime.UTC)
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        return ""
+    return f"{when:%Y-%m-%d %H:%M:%S} UTC" if when.year > 1980 else ""  # of a zip without times
+
+
 class LmsCollector(FileNameCollectorPlugin):
     """Tells nbgrader whose a file is. Of two notebooks of one student the first counts: the other is named and left."""
 
@@ -44,4 +73,4 @@ class LmsCollector(FileNameCollectorPlugin):
         if whose is None or whose in self.seen:
             return None
         self.seen.add(whose)
-        return {"student_id": whose[0], "file_id": whose[1]}
+        return {"student_id": whose[0], "file_id": whose[1], "timestamp": handed_in(Path(submitted_file)) or None}

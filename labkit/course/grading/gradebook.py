@@ -31,22 +31,30 @@ from labkit.course.grading.batch import Record
 from labkit.course.grading.markdown import harmless_markdown
 from labkit.course.grading.outputs import lines_of
 from labkit.course.grading.reading import Lab, Submission, grade_id, source_of
-from labkit.course.grading.refusal import KERNEL
+from labkit.course.grading.refusal import KERNEL, RUBRIC_TAG
+from labkit.course.grading.roster import Person, person_of
 from labkit.course.grading.sandbox import NO_SANDBOX
 from labkit.support.executors import inherited
 from labkit.support.files import write_atomically
 
+RUBRIC = "**Rubric"  # begins it in a solution
+
 
 def write_gradebook(
-    course: Path, lab: Lab, graded: Iterable[tuple[Record, Submission]], comments: Mapping[str, str]
+    course: Path,
+    lab: Lab,
+    graded: Iterable[tuple[Record, Submission]],
+    comments: Mapping[str, str],
+    roster: dict[str, Person],
 ) -> dict[str, str]:
     """Write scores and comments into course/gradebook.db, and the copies; returns by student why that failed.
 
-    comments: an instructor's, by group of wrong answers. What stands there as it should, scores, time and copy, is
-    left alone. Manual scores stay, and are marked for another look where something changed. Raises ValueError if the
-    gradebook has a lab of that name with other questions.
+    comments: an instructor's, by group of wrong answers; roster: names for formgrader. What stands there as it should,
+    scores, time and copy, is left alone. Manual scores stay, and are marked for another look where something changed.
+    Raises ValueError if the gradebook has a lab of that name with other questions.
     """
     course, failures = Path(course), {}
+    rubrics = rubrics_of(course, lab)
     register(course, lab)
     with opened(course) as gradebook:
         kept = kept_scores(gradebook, lab)
@@ -58,7 +66,8 @@ def write_gradebook(
                     if there is not None and any(there.values()):
                         write_nothing(gradebook, lab, record)
                 else:
-                    copied = copy_for_formgrader(lab, record, submission, comments)
+                    name_student(gradebook, record.student, person_of(roster, record.student))
+                    copied = copy_for_formgrader(lab, record, submission, comments, rubrics)
                     wanted = {f"check_{result.question}": result.points for result in record.results}
                     wanted["timestamp"] = timestamp_of(submission)
                     if there is not None and wanted.items() <= there.items() and is_file_of(target, copied):
@@ -129,7 +138,6 @@ def register(course: Path, lab: Lab) -> None:
 def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, comments: Mapping[str, str]) -> None:
     """Write one submission's scores, what is said about each answer, and what a person has to grade."""
     where = (lab.topic, lab.topic, record.student)
-    gradebook.update_or_create_student(record.student)
     gradebook.update_or_create_submission(lab.topic, record.student, timestamp=timestamp_of(submission))
     for result in record.results:
         grade = gradebook.find_grade(f"check_{result.question}", *where)
@@ -145,6 +153,15 @@ def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, co
         grade.auto_score = None if answered else 0.0
         grade.needs_manual_grade = answered or grade.manual_score is not None
         gradebook.find_comment(name, *where).auto_comment = None if answered else "No response."
+
+
+def name_student(gradebook, student: str, person: Person | None) -> None:
+    """Make a student known to the gradebook, with name and email if the roster has them."""
+    if person is None:
+        gradebook.update_or_create_student(student)
+        return
+    first, last = person.first_and_last
+    gradebook.update_or_create_student(student, first_name=first, last_name=last, email=person.email or None)
 
 
 def write_nothing(gradebook, lab: Lab, record: Record) -> None:
@@ -166,8 +183,27 @@ def timestamp_of(submission: Submission) -> datetime.datetime | None:
         return None
 
 
-def copy_for_formgrader(lab: Lab, record: Record, submission: Submission, comments: Mapping[str, str]) -> bytes:
-    """The released lab with a student's answers, and the verdict as the output of each tests cell."""
+def rubrics_of(course: Path, lab: Lab) -> dict[str, str]:
+    """The rubric of each written question, from course/solutions; {} if that is not there."""
+    path = course / "solutions" / lab.topic / f"{lab.topic}.ipynb"
+    if not path.is_file():
+        return {}
+    cells = {grade_id(cell): source_of(cell) for cell in json.loads(path.read_bytes())["cells"]}
+    found = {name: cells.get(name, "").partition(RUBRIC) for name in lab.written}
+    return {name: RUBRIC + rubric for name, (_, mark, rubric) in found.items() if mark}
+
+
+def copy_for_formgrader(
+    lab: Lab,
+    record: Record,
+    submission: Submission,
+    comments: Mapping[str, str],
+    rubrics: Mapping[str, str],
+) -> bytes:
+    """The released lab with a student's answers, verdicts as the tests' outputs, and a rubric above each written one.
+
+    nbgrader's feedback leaves out what is tagged as a rubric (`refusal.FeedbackPages`).
+    """
     notebook = copy.deepcopy(lab.notebook)
     programs = {result.question: result.program for result in record.results}
     results = {f"check_{result.question}": result for result in record.results}
@@ -184,4 +220,11 @@ def copy_for_formgrader(lab: Lab, record: Record, submission: Submission, commen
             if not record.sandboxed:
                 text += f"\nWarning: {NO_SANDBOX}."
             cell["outputs"] = [{"output_type": "stream", "name": "stdout", "text": text + "\n"}]
+    shown = []
+    for cell in notebook["cells"]:
+        if rubric := rubrics.get(grade_id(cell)):
+            tags = {"tags": [RUBRIC_TAG]}
+            shown.append({"cell_type": "markdown", "id": f"rubric-{len(shown)}", "metadata": tags, "source": rubric})
+        shown.append(cell)
+    notebook["cells"] = shown
     return (json.dumps(notebook, indent=1) + "\n").encode()

@@ -181,14 +181,15 @@ def warning_of(records: Sequence[Record]) -> str:
     return "" if sandboxed else f'<p class="warning">Warning: {escape(NO_SANDBOX)}.</p>'
 
 
-def terminal_table(lab: Lab, records: Sequence[Record]) -> str:
-    """A line per student: points by question, all together, and what an instructor should look at."""
+def terminal_table(lab: Lab, records: Sequence[Record], late: Mapping[str, str]) -> str:
+    """A line per student: points by question, all together, how late, and what an instructor should look at."""
     names = list(lab.points)
     rows = [["student", *names, "points", ""]]
     for record in records:
         earned = {result.question: f"{result.points:g}" for result in record.results}
         flags = [f"{result.question}: {result.flag}" for result in record.results if result.flag]
-        look = f"{NOT_GRADED}: {record.reason}" if record.reason else "; ".join(flags)
+        flags = [f"{NOT_GRADED}: {record.reason}"] if record.reason else flags
+        look = "; ".join([late[record.student], *flags] if record.student in late else flags)
         rows.append([record.student, *(earned.get(name, "-") for name in names), f"{record.points:g}", look])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
     return "\n".join(aligned(row, widths) for row in rows)

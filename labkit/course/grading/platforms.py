@@ -4,119 +4,122 @@
     Canvas   a file for "Import Grades", and a zip for "Upload Submissions"
 
 Scores are those of nbgrader's gradebook: functions, what a person graded, and penalties. Students have the names that
-`nbgrader zip_collect` gave them, which end with the platform's number: "Ada Lovelace_1234567".
+`nbgrader zip_collect` gave them, which end with the platform's number, "Ada Lovelace_1234567"; a roster knows more.
 """
 
 import csv
 import io
-import re
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
+from labkit.course.grading.changes import changed, read_changes
 from labkit.course.grading.collect import student_and_notebook
-from labkit.course.grading.gradebook import opened
+from labkit.course.grading.deadlines import read_deadline
+from labkit.course.grading.final import Final, finish_pages, settle
+from labkit.course.grading.gradebook import register
 from labkit.course.grading.outputs import harmless
+from labkit.course.grading.reading import read_lab
+from labkit.course.grading.roster import Person, keys_of, person_of, read_roster
 from labkit.support.files import write_atomically
 
-NUMBERED = re.compile(r"(?P<name>.+)_(?P<number>\d+)")
+CANVAS = ("SIS User ID", "SIS Login ID", "Section")  # columns beside name and ID
 
 
 @dataclass(frozen=True)
-class Graded:
-    """A student's grade. waits: whether something is still to be graded by hand; by_hand: that page section, HTML."""
+class Written:
+    """Files for a platform. waiting: who is still to be graded by hand; without: who has no grade, and why."""
 
-    student: str
-    score: float
-    max_score: float
-    waits: bool
-    by_hand: str
-
-    @property
-    def name(self) -> str:
-        """The name without the platform's number."""
-        return NUMBERED.fullmatch(self.student)["name"]
-
-    @property
-    def number(self) -> str:
-        """The platform's number."""
-        return NUMBERED.fullmatch(self.student)["number"]
+    files: list[Path]
+    waiting: list[str]
+    without: dict[str, str]
 
 
-def write_grades(course: Path, topic: str, platform: str) -> tuple[list[Path], list[str]]:
-    """Write the files of a platform into grades/TOPIC; returns their paths, and who is still to be graded by hand.
+def write_grades(course: Path, topic: str, platform: str) -> Written:
+    """Write the files of a platform into grades/TOPIC, and bring the pages there up to date.
 
     platform: "moodle" or "canvas", or "scores" for a table and no zip. Raises ValueError, and writes nothing, if
-    nothing was graded, or if a platform's number is missing in a student's name.
+    nothing was graded, if course.toml or the roster cannot be used, or if the platform could not find a student.
     """
     course = Path(course)
-    out = course / "grades" / topic
-    graded = graded_students(course, topic) if (course / "gradebook.db").is_file() else []
-    if not graded:
+    out, lab = course / "grades" / topic, read_lab(course, topic)
+    roster, changes, deadline = read_roster(course), read_changes(course, lab), read_deadline(course, topic)
+    pages = {page.stem: page for page in sorted((out / "feedback").glob("*.html"))}
+    if not pages or not (course / "gradebook.db").is_file():
         raise ValueError(f"topic: expected a lab with grades in {course}; `labkit grade {topic}` makes them")
-    odd = [one.student for one in graded if not NUMBERED.fullmatch(one.student)]
+    people = {student: person_of(roster, student) or person_by_name(student) for student in pages}
+    odd = [student for student, person in people.items() if person is None]
     if odd and platform != "scores":
-        names = ", ".join(odd)
         raise ValueError(
-            f"{platform}: expected names that end with _NUMBER, as `nbgrader zip_collect` makes, got {names}"
+            f"{platform}: expected students in roster.csv, or names that end with _NUMBER, as `nbgrader zip_collect` "
+            f"makes, got {', '.join(odd)}"
         )
+    register(course, changed(lab, [], changes)[0])
+    finals = settle(course, topic, changes, deadline)
+    finish_pages(out, finals.values())
+    graded = [(people[student], final) for student, final in finals.items() if student in pages]
     rows = {"scores": plain_rows, "moodle": moodle_rows, "canvas": canvas_rows}[platform](topic, graded)
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in row] for row in rows)
     files = {out / f"{platform}.csv": text.getvalue().encode()}
     if platform != "scores":
-        names = names_in_zip(course, topic, graded, platform)
-        files[out / f"{platform}_feedback.zip"] = zip_of(out / "feedback", graded, names)
+        files[out / f"{platform}_feedback.zip"] = zip_of(pages, names_in_zip(course, topic, people, platform))
     for path, data in files.items():
         write_atomically(path, data)
-    return list(files), [one.student for one in graded if one.waits]
+    here = {key for student in pages for key in keys_of(student)}
+    without = dict.fromkeys(pages.keys() - finals.keys(), "not graded")
+    without |= {person.name or person.id: "handed in nothing" for person in roster.values() if person.id not in here}
+    return Written(list(files), [student for student, final in finals.items() if final.waits], without)
 
 
-def graded_students(course: Path, topic: str) -> list[Graded]:
-    """The grades of a lab in the gradebook, by students' names."""
-    found = []
-    with opened(course) as gradebook:
-        for submission in gradebook.assignment_submissions(topic):
-            (notebook,) = submission.notebooks
-            said = {comment.name: comment.comment or "" for comment in notebook.comments}
-            sections = [
-                f"<h2>{escape(grade.name)}: {grade.score:g} of {grade.max_score:g} points</h2>"
-                f"<p>{escape(said.get(grade.name, ''))}</p>"
-                for grade in sorted(notebook.grades, key=lambda grade: grade.name)
-                if grade.manual_score is not None
-            ]
-            total = f"<h2>All together: {submission.score:g} of {submission.max_score:g} points</h2>"
-            by_hand = "".join([*sections, total])
-            waits = bool(notebook.needs_manual_grade)
-            found.append(Graded(submission.student.id, submission.score, submission.max_score, waits, by_hand))
-    return sorted(found, key=lambda one: one.student)
+def person_by_name(student: str) -> Person | None:
+    """Whom a platform knows by the number that ends a student's name, None without a number."""
+    name, *number = reversed(keys_of(student))
+    return Person(name, student.removesuffix(f"_{name}")) if number else None
 
 
-def plain_rows(topic: str, graded: Sequence[Graded]) -> list[list[str]]:
+def plain_rows(topic: str, graded: Sequence[tuple[Person | None, Final]]) -> list[list[str]]:
     """A row per student."""
-    rows = [[one.student, f"{one.score:g}", f"{one.max_score:g}", "yes" if one.waits else ""] for one in graded]
-    return [["student", "score", "max_score", "to be graded by hand"], *rows]
+    heading = ["student", "name", "email", "score", "max_score", "late", "to be graded by hand"]
+    rows = [
+        [
+            *(final.student, person.name if person else "", person.email if person else ""),
+            *(f"{final.score:g}", f"{final.max_score:g}", str(final.late), "yes" if final.waits else ""),
+        ]
+        for person, final in graded
+    ]
+    return [heading, *rows]
 
 
-def moodle_rows(topic: str, graded: Sequence[Graded]) -> list[list[str]]:
-    """Moodle's grading worksheet: it finds students by their identifier."""
-    rows = [[f"Participant {one.number}", one.name, f"{one.score:g}", f"{one.max_score:g}"] for one in graded]
-    return [["Identifier", "Full name", "Grade", "Maximum Grade"], *rows]
+def moodle_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
+    """Moodle's grading worksheet, which finds students by their identifier; its gradebook can find them by email."""
+    rows = [
+        [f"Participant {person.id}", person.name, person.email, f"{final.score:g}", f"{final.max_score:g}"]
+        for person, final in graded
+    ]
+    return [["Identifier", "Full name", "Email address", "Grade", "Maximum Grade"], *rows]
 
 
-def canvas_rows(topic: str, graded: Sequence[Graded]) -> list[list[str]]:
-    """Canvas's gradebook: it finds students by its own ID, and the assignment by its name, which is the lab's here."""
-    possible = ["    Points Possible", "", "", "", "", f"{graded[0].max_score:g}"]
-    rows = [[one.name, one.number, "", "", "", f"{one.score:g}"] for one in graded]
-    return [["Student", "ID", "SIS User ID", "SIS Login ID", "Section", topic], possible, *rows]
+def canvas_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
+    """Canvas's gradebook, which finds students by its own ID.
+
+    The assignment has the name that an exported gradebook gives it, "04_iou (5511)", or else the lab's.
+    """
+    headings = [heading for person, _ in graded for heading in person.more if heading.partition(" (")[0] == topic]
+    possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), f"{graded[0][1].max_score:g}" if graded else ""]
+    rows = [
+        [person.name, person.id, *(person.more.get(column, "") for column in CANVAS), f"{final.score:g}"]
+        for person, final in graded
+    ]
+    return [["Student", "ID", *CANVAS, next(iter(headings), topic)], possible, *rows]
 
 
-def names_in_zip(course: Path, topic: str, graded: Sequence[Graded], platform: str) -> dict[str, str]:
+def names_in_zip(course: Path, topic: str, people: dict[str, Person], platform: str) -> dict[str, str]:
     """By student the name that the platform knows a page by; Canvas knows only names of files that it gave out."""
     if platform == "moodle":
-        return {one.student: f"{one.student}_assignsubmission_file_{topic}.html" for one in graded}
+        named = {student: keys_of(student)[0].removesuffix(f"_{person.id}") for student, person in people.items()}
+        return {s: f"{named[s].replace('_', ' ')}_{people[s].id}_assignsubmission_file_{topic}.html" for s in people}
     names = {}
     for path in sorted((course / "downloaded" / topic).rglob("*.ipynb")):
         if (whose := student_and_notebook(str(path))) is not None:
@@ -124,13 +127,11 @@ def names_in_zip(course: Path, topic: str, graded: Sequence[Graded], platform: s
     return names
 
 
-def zip_of(pages: Path, graded: Sequence[Graded], names: dict[str, str]) -> bytes:
-    """A zip of the students' pages, with what a person graded; the same pages give the same bytes."""
+def zip_of(pages: dict[str, Path], names: dict[str, str]) -> bytes:
+    """A zip of the students' pages; the same pages give the same bytes."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for one in graded:
-            page = pages / f"{one.student}.html"
-            if one.student in names and page.is_file():
-                text = page.read_text(encoding="utf-8").replace("</body>", f"{one.by_hand}\n</body>")
-                archive.writestr(zipfile.ZipInfo(names[one.student]), text)
+        for student, page in pages.items():
+            if student in names:
+                archive.writestr(zipfile.ZipInfo(names[student]), page.read_bytes())
     return content.getvalue()

@@ -4,9 +4,11 @@
 anything. For a course with another configuration the gradebook names `KERNEL`, which no machine has.
 """
 
+from nbconvert.exporters import HTMLExporter
 from nbgrader.converters.base import NbGraderException, NotebookExporter
 
 SAYS = "this course is graded by `labkit grade LAB`; nbgrader's Autograde changed nothing"
+RUBRIC_TAG = "rubric"
 KERNEL = {"name": "graded-by-labkit-grade", "display_name": "graded by labkit grade", "language": "python"}
 
 
@@ -17,3 +19,11 @@ class GradedByLabkit(NotebookExporter):
         super().__init__(**options)
         self.log.error(SAYS)
         raise NbGraderException(SAYS)
+
+
+class FeedbackPages(HTMLExporter):
+    """nbgrader's feedback without the rubrics, which copies have for formgrader."""
+
+    def from_notebook_node(self, nb, resources=None, **how):
+        nb.cells = [cell for cell in nb.cells if RUBRIC_TAG not in cell.metadata.get("tags", ())]
+        return super().from_notebook_node(nb, resources, **how)

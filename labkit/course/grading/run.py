@@ -8,10 +8,13 @@ from pathlib import Path
 
 from labkit.course.grading.batch import Batch, Record, grade_batch, secret_for
 from labkit.course.grading.changes import Change, add_change, changed, read_changes, undo
+from labkit.course.grading.deadlines import read_deadline, strangers
+from labkit.course.grading.final import finish_pages, settle
 from labkit.course.grading.gradebook import write_gradebook
 from labkit.course.grading.outputs import write_outputs
 from labkit.course.grading.overview import add_comment, read_comments, standings
 from labkit.course.grading.reading import Lab, read_lab, read_submissions
+from labkit.course.grading.roster import read_roster
 from labkit.course.grading.sandbox import Limits
 from labkit.course.grading.students import known_students, remove_students, rename_students
 
@@ -20,7 +23,8 @@ from labkit.course.grading.students import known_students, remove_students, rena
 class Graded:
     """The records of all students, by name, and how many were graded in this run.
 
-    failures: what could not be written into the gradebook, by student. renamed: new names by the old ones; gone: of
+    failures: what could not be written into the gradebook, by student. late: how late who is; strangers: in extensions,
+    but not here. renamed: new names by the old ones; gone: of
     whom there are pages and grades but no submission any more, in this run removed if it was to `tidy`.
     """
 
@@ -28,6 +32,8 @@ class Graded:
     records: list[Record]
     graded_now: int
     failures: dict[str, str]
+    late: dict[str, str]
+    strangers: list[str]
     renamed: dict[str, str]
     gone: list[str]
 
@@ -65,6 +71,7 @@ def grade_course(
     lab = read_lab(course, topic)
     read = read_submissions(course / "submitted" if submissions is None else Path(submissions), lab)
     out = course / "grades" / topic if out is None else Path(out)
+    deadline, roster = read_deadline(course, topic), read_roster(course)
     if undone is not None:
         undo(course, lab, undone)
     if change is not None:
@@ -81,12 +88,16 @@ def grade_course(
             groups = [group.name for standing in standings(lab, records) for group in standing.groups]
             comments = add_comment(out, groups, *comment)
         write_outputs(out, lab, records, comments)
-        failures = write_gradebook(course, lab, zip(records, read, strict=True), comments)
+        failures = write_gradebook(course, lab, zip(records, read, strict=True), comments, roster)
+        finals = settle(course, topic, changes, deadline)
+        finish_pages(out, finals.values())
         gone = sorted(known_students(out) - {record.student for record in records})
         if tidy:
             remove_students(course, out, topic, gone)
         close_to_others(course, out)
-    return Graded(lab, records, graded_now, failures, renamed, gone)
+    late = {student: str(final.late) for student, final in finals.items() if final.late.days}
+    known = {record.student for record in records} | roster.keys()
+    return Graded(lab, records, graded_now, failures, late, strangers(deadline, known), renamed, gone)
 
 
 @contextmanager

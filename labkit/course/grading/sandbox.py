@@ -12,6 +12,7 @@ import functools
 import itertools
 import json
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -52,7 +53,8 @@ counter = itertools.count(os.getpid())
 class Limits:
     """What one answer may use. Seconds are of the clock; MB of memory are address space, with torch or without it.
 
-    case_s: for one call; question_s: for all cases of a question.
+    case_s: for one call; question_s: for all cases of a question. container: whether this machine is a container that
+    is made for one submission; then there is no bubblewrap, and answers only become another user.
     """
 
     start_s: float = 120.0
@@ -62,24 +64,27 @@ class Limits:
     torch_memory_mb: int = 3072
     file_mb: int = 16
     threads: int = 32
+    container: bool = False
 
 
-def options_for(packages: Sequence[str], limits: Limits, unsafe: bool) -> str:
-    """What the worker's program is told, as its argument."""
+def options_for(packages: Sequence[str], limits: Limits, unsafe: bool, shown: str = "") -> str:
+    """What the worker's program is told, as its argument. shown: the folder where a container shows what is needed."""
+    is_open = unsafe or limits.container
     return json.dumps(
         {
             "first_uid": None if os.getuid() else FIRST_UID + next(counter) * UIDS_OF_ONE % UIDS,
             "uids": UIDS_OF_ONE,
-            "path": site_folders() if unsafe else [SITE],
+            "path": site_folders() if unsafe else [shown + SITE],
             "load": list(packages),
             "only": [name.partition(".")[0] for name in package_files(tuple(packages))] if unsafe else None,
             "memory": (limits.torch_memory_mb if "torch" in packages else limits.memory_mb) << 20,
             "file_size": limits.file_mb << 20,
             "threads": None if unsafe else limits.threads,
             "cpu_s": int(limits.question_s) + 5,
-            "tools": TOOLS if unsafe else {name: f"/{name}.py" for name in TOOLS},
+            "tools": TOOLS if is_open else {name: f"/{name}.py" for name in TOOLS},
             "look": {
-                name: str(CHECKER / file) if unsafe else f"/look/{file}" for name, file in LOOK_FOR_MISTAKES.items()
+                name: str(CHECKER / file) if unsafe else f"{shown}/look/{file}"
+                for name, file in LOOK_FOR_MISTAKES.items()
             },
             "filter": "" if unsafe else base64.b64encode(seccomp.program()).decode(),
         }
@@ -91,10 +96,16 @@ class Server:
 
     def __init__(self, packages: Sequence[str], limits: Limits):
         self.packages, self.limits, self.forked = tuple(packages), limits, False
+        self.shown = show_in_container(self.packages) if limits.container else None
         ours, theirs = socket.socketpair()
         with theirs:
-            command = [*bubblewrap(self.packages), options_for(packages, limits, unsafe=False)]
             quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            if self.shown is None:
+                command = bubblewrap(self.packages)
+            else:
+                command = [sys.executable, "-P", "-s", "-S", "-B", worker.__file__]
+                quiet |= {"cwd": "/tmp", "env": ENVIRONMENT}
+            command.append(options_for(packages, limits, False, self.shown.name if self.shown else ""))
             self.process = subprocess.Popen(command, stdin=theirs, **quiet)
         self.control = ours
         if not self.hears(b"r", limits.start_s):
@@ -139,6 +150,8 @@ class Server:
         self.process.kill()
         self.control.close()
         self.process.wait()
+        if self.shown is not None:
+            self.shown.cleanup()
 
 
 class Servers:
@@ -233,8 +246,24 @@ def plain_worker(packages: Sequence[str], limits: Limits) -> Worker:
 
 def probe(packages: Sequence[str], limits: Limits) -> None:
     """Start a server to see whether the sandbox works here; raises bwrap.NoSandbox, a ValueError with a remedy."""
-    bwrap.executable()
+    if not limits.container:
+        bwrap.executable()
+    elif os.getuid():
+        raise ValueError("container: expected to be root, who can let answers become another user")
     servers.give_back(servers.take(packages, limits))
+
+
+def show_in_container(packages: tuple[str, ...]) -> tempfile.TemporaryDirectory:
+    """A folder that other users can read, with the packages and what looks for mistakes."""
+    folder = tempfile.TemporaryDirectory()
+    for path in (Path(folder.name), Path(folder.name + SITE), Path(folder.name, "look")):
+        path.mkdir(exist_ok=True)
+        path.chmod(0o755)
+    for name, path in package_files(packages).items():
+        os.symlink(path, f"{folder.name}{SITE}/{name}")
+    for file in LOOK_FOR_MISTAKES.values():
+        Path(shutil.copyfile(CHECKER / file, f"{folder.name}/look/{file}")).chmod(0o644)
+    return folder
 
 
 def bubblewrap(packages: tuple[str, ...]) -> list[str]:

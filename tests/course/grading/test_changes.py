@@ -77,6 +77,27 @@ def test_a_second_change_to_a_question_takes_the_place_of_the_first(course):
     assert points(course) == [TOTAL - POINTS["mean_iou"] + 1] * 2
 
 
+def test_an_answer_in_words_is_dropped_or_given_and_what_a_person_gave_comes_back(course):
+    def score() -> tuple[float, float, bool]:
+        with opened(course) as book:
+            submission = book.find_submission(TOPIC, "ada")
+            return submission.score, submission.max_score, bool(submission.needs_manual_grade)
+
+    grade(course)
+    with opened(course) as book:
+        given = book.find_grade("explain", TOPIC, TOPIC, "ada")
+        given.manual_score, given.needs_manual_grade = 1.0, False
+        book.db.commit()
+    assert grade(course, "--drop", "explain", "--reason", "unfair").exit_code == 0
+    assert score() == (TOTAL, TOTAL, False)
+    assert grade(course, "--everybody", "explain", "--reason", "unfair").exit_code == 0
+    assert score() == (TOTAL + 3, TOTAL + 3, False)
+    told = (course / f"grades/{TOPIC}/feedback/ada.html").read_text()
+    assert "explain: 3 of 3 points" in told and "Everybody has these points: unfair" in told
+    assert grade(course, "--undo", "explain").exit_code == 0
+    assert score() == (TOTAL + 1, TOTAL + 3, False)
+
+
 GOOD = '[[change]]\nlab = "04_iou"\nquestion = "iou"\ndrop = true\ndate = 2026-10-05\nreason = "unfair"\n'
 
 
@@ -107,6 +128,7 @@ def test_a_file_that_a_person_broke_stops_grading_with_its_line(course, text, sa
         (("--drop", "oiu", "--reason", "unfair"), "question: expected one of confusion_matrix, iou"),
         (("--drop", "iou"), "and a --reason"),
         (("--points", "iou", "--reason", "unfair"), "points: expected QUESTION=NUMBER"),
+        (("--points", "explain=1", "--reason", "short"), "points: a person gives those of an answer in words"),
         (("--undo", "iou"), "undo: there is no change to iou"),
     ],
 )

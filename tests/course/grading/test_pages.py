@@ -49,6 +49,9 @@ PAYLOADS = (
 )
 
 
+SOLUTION = "A model.\n\n**Rubric (3 points).**\n\n- 3 points: one for the union, two for the rest."
+
+
 class Tags(HTMLParser):
     """The tags of a page with their attributes."""
 
@@ -105,13 +108,15 @@ def course(tmp_path_factory):
     course = tmp_path_factory.mktemp("course")
     shutil.copy(ROOT / "nbgrader_config.py", course)
     kit.write_lab(course, TOPIC)
+    kit.write(course / "solutions" / TOPIC / f"{TOPIC}.ipynb", kit.notebook([kit.written_cell(SOLUTION)]))
+    (course / "roster.csv").write_text("id,name\neve,Eve Adams\n")
     message = "; ".join(PAYLOADS)
     cells = {
         "iou": f"def iou(n):\n    raise ValueError({message[:150]!r})\n",
         "mean_iou": f"def mean_iou(n):\n    x = {message!r}\n    return x.{RUN.split('=', maxsplit=1)[0]}\n",
     }
     notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC) | cells)
-    notebook["cells"][-1]["source"] = "\n\n".join(PAYLOADS)
+    notebook["cells"][-1]["source"] = "\n\n".join([*PAYLOADS, "So $\\frac{a}{b}$."])
     for student in ("eve", "raw"):
         kit.submit(course, student, TOPIC, notebook)
     graded = grade_course(TOPIC, course, seed="secret", progress=False)
@@ -143,6 +148,8 @@ def test_nothing_that_a_student_wrote_runs_in_formgrader(course, page, tmp_path)
         attacked, asked = visit(page, f"{url}/formgrader/submissions/{ids['eve']}/?index=0&{token}")
         assert page.locator("#check_iou").count() == 1 and page.locator("text=onerror").count() > 0
         assert not attacked and not asked
+        assert page.locator("text=one for the union").count() == 1 and page.locator("text=A model").count() == 0
+        assert page.locator(".name-shown", has_text="Adams, Eve").count() > 0
         for table in ("manage_submissions/04_iou", "gradebook/04_iou/04_iou", "manage_students"):
             assert visit(page, f"{url}/formgrader/{table}?{token}") == (False, [])
         visit(page, f"{url}/formgrader/submissions/{ids['raw']}/?index=0&{token}")
@@ -153,6 +160,7 @@ def test_nothing_that_a_student_wrote_runs_in_formgrader(course, page, tmp_path)
 def test_nothing_that_a_student_wrote_runs_in_the_feedback(course, page):
     page.on("dialog", lambda dialog: dialog.dismiss())
     feedback = course / "feedback/eve" / TOPIC / f"{TOPIC}.html"
+    assert "one for the union" not in feedback.read_text()
     assert visit(page, feedback.as_uri()) == (False, []) and page.locator("text=Comments").count() > 0
     visit(page, (course / "feedback/raw" / TOPIC / f"{TOPIC}.html").as_uri())
     page.wait_for_function("window.attacked === 1")  # so this test can fail

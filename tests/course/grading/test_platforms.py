@@ -25,6 +25,13 @@ MOODLE = (
     "Ada Lovelace_1234567_assignsubmission_file_/04_iou.ipynb",
     "Zoë O'Brien_12_assignsubmission_file_/04_iou.ipynb",
 )
+COURSE = """
+[[deadline]]
+lab = "04_iou"
+due = 2026-10-05T23:59:00
+penalty_per_day = 10
+"""
+ROSTER = "Identifier,Full name,Email address\nParticipant 12,Zoë O'Brien,zoe@x.org\nParticipant 99,Cher,c@x.org\n"
 CANVAS = ("lovelaceada_1234_567890_04_iou.ipynb", "obrienzoe_LATE_1235_567891_04_iou-2.ipynb")
 
 
@@ -37,7 +44,10 @@ def collected(course: Path, names: tuple[str, str]) -> list[str]:
     right = kit.right_answers(TOPIC)
     with zipfile.ZipFile(archive, "w") as packed:
         for name, answers in zip(names, (right, right | {"iou": "def iou(n):\n    return n / 2\n"}), strict=True):
-            packed.writestr(name, json.dumps(kit.lab_notebook(TOPIC, answers)))
+            late = answers is not right
+            info = zipfile.ZipInfo(name, date_time=(2026, 10, 6 if late else 5, 12, 0, 0))
+            packed.writestr(info, json.dumps(kit.lab_notebook(TOPIC, answers)))
+    (course / "course.toml").write_text(COURSE)
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     collect = [sys.executable, "-m", "nbgrader", "zip_collect", TOPIC]
     subprocess.run(collect, cwd=course, env=environment, capture_output=True, check=True)
@@ -61,17 +71,27 @@ def grades(course: Path, platform: str) -> tuple[list[list[str]], dict[str, str]
 
 
 def test_moodle_gets_its_worksheet_and_pages_by_participant(tmp_path):
+    (tmp_path / "roster.csv").write_text(ROSTER)
     collected(tmp_path, MOODLE)
     rows, pages = grades(tmp_path, "moodle")
+    late = 0.9 * (TOTAL - 2)
     assert rows == [
-        ["Identifier", "Full name", "Grade", "Maximum Grade"],
-        ["Participant 1234567", "Ada Lovelace", f"{TOTAL + 2.5:g}", f"{TOTAL + 3}"],
-        ["Participant 12", "Zoë O'Brien", f"{TOTAL - 2:g}", f"{TOTAL + 3}"],
+        ["Identifier", "Full name", "Email address", "Grade", "Maximum Grade"],
+        ["Participant 1234567", "Ada Lovelace", "", f"{TOTAL + 2.5:g}", f"{TOTAL + 3}"],
+        ["Participant 12", "Zoë O'Brien", "zoe@x.org", f"{late:g}", f"{TOTAL + 3}"],
     ]
     first, second = pages
     assert first == "Ada Lovelace_1234567_assignsubmission_file_04_iou.html" and second.startswith("Zoë O'Brien_12_")
     assert "explain: 2.5 of 3 points" in pages[first] and "Union, &lt;not&gt; sum." in pages[first]
-    assert f"All together: {TOTAL - 2:g} of {TOTAL + 3} points" in pages[second]
+    assert f"All together: {late:g} of {TOTAL + 3} points" in pages[second]
+    assert "Handed in 1 day late, 10 % less." in pages[second] and "late" not in pages[first]
+    page = tmp_path / f"grades/{TOPIC}/feedback/Ada Lovelace_1234567.html"
+    assert page.read_text() == pages[first]  # one page for students, the same everywhere
+    with opened(tmp_path) as book:
+        submission = book.find_submission(TOPIC, "Zoë O'Brien_12")
+        assert (submission.student.first_name, submission.student.last_name) == ("Zoë", "O'Brien")
+        assert submission.late_submission_penalty == pytest.approx(0.1 * (TOTAL - 2))
+        assert 43200 < submission.total_seconds_late < 43300
 
 
 def test_canvas_gets_its_columns_and_its_own_names_of_files(tmp_path):
@@ -81,7 +101,7 @@ def test_canvas_gets_its_columns_and_its_own_names_of_files(tmp_path):
     assert rows[1][0].strip() == "Points Possible" and rows[1][5] == f"{TOTAL + 3}"
     assert [(row[0], row[1], float(row[5])) for row in rows[2:]] == [
         ("lovelaceada", "1234", TOTAL + 2.5),
-        ("obrienzoe", "1235", TOTAL - 2.0),
+        ("obrienzoe", "1235", pytest.approx(0.9 * (TOTAL - 2.0))),
     ]
     assert list(pages) == ["lovelaceada_1234_567890_04_iou.html", "obrienzoe_LATE_1235_567891_04_iou-2.html"]
 
@@ -90,12 +110,14 @@ def test_canvas_gets_its_columns_and_its_own_names_of_files(tmp_path):
 def test_what_a_platform_cannot_find_is_refused(tmp_path):
     runner = CliRunner()
     command = ["grades", TOPIC, "--course", str(tmp_path)]
-    assert "`labkit grade 04_iou` makes them" in str(runner.invoke(app, command).exception)
     kit.write_lab(tmp_path, TOPIC)
+    assert "`labkit grade 04_iou` makes them" in str(runner.invoke(app, command).exception)
     kit.submit(tmp_path, "ada", TOPIC, {})
     grade_course(TOPIC, tmp_path, seed="secret", progress=False)
-    assert "names that end with _NUMBER" in str(runner.invoke(app, [*command, "--moodle"]).exception)
-    assert "got both" in str(runner.invoke(app, [*command, "--moodle", "--canvas"]).exception)
+    assert "expected students in roster.csv, or names that end with _NUMBER" in str(
+        runner.invoke(app, [*command, "--moodle"]).exception
+    )
+    assert "got more" in str(runner.invoke(app, [*command, "--moodle", "--canvas"]).exception)
     assert runner.invoke(app, command).exit_code == 1  # its words are to be graded by hand
     rows = list(csv.reader((tmp_path / f"grades/{TOPIC}/scores.csv").open()))
-    assert rows[1][:2] == ["ada", "0"] and not (tmp_path / f"grades/{TOPIC}/moodle.csv").exists()
+    assert (rows[1][0], rows[1][3]) == ("ada", "0") and not (tmp_path / f"grades/{TOPIC}/moodle.csv").exists()
