@@ -69,6 +69,9 @@ def train(
     epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
     lr: Annotated[float | None, typer.Option(help="Highest learning rate; the model's recipe if not given.")] = None,
     batch: Annotated[int | None, typer.Option(help="Images in a batch; the model's recipe if not given.")] = None,
+    depth_scale: Annotated[
+        float | None, typer.Option(help="Metres per unit of a folder's depth; else the camera file's, or 0.001.")
+    ] = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
     seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
@@ -98,7 +101,7 @@ def train(
     config = replace(recipe, seed=seed, **asked)
 
     def opened(path: Path):
-        return PictureFolder(path) if (path / "color").is_dir() else data_gen.load(path)
+        return PictureFolder(path, depth_scale) if (path / "color").is_dir() else data_gen.load(path)
 
     val_set = None if val is None else opened(val)
     train_set = data_gen.Joined([opened(path) for path in data], each=scenes)

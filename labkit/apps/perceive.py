@@ -32,7 +32,7 @@ TABLE_MARGIN = 0.02  # metres under the table that noise may reach
 ROOM = 0.5  # metres over the table that matter for a grasp
 WORKSPACE = ((-20.0, 20.0), (-20.0, 20.0), (-TABLE_MARGIN, ROOM))  # further off nothing is grasped
 SHOWN = 5  # grasps that the report lists and draws
-AROUND = 0.12  # metres around the targets that the view shows
+AROUND = 0.08  # metres around the targets that the view shows
 JAWS = (255, 255, 255), (30, 110, 255)  # colours of the other grasps' jaws and of the best one's, in the picture
 
 

@@ -16,7 +16,7 @@ from data_gen import DepthSensor
 from labkit.apps import perceive
 from labkit.apps.cli import app
 from labkit.apps.own_data import PictureFolder
-from labkit.geometry import back_project_to_base, transform_points
+from labkit.geometry import back_project_to_base, project, transform_points
 from labkit.labels import SURFACE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
@@ -186,3 +186,34 @@ def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own):
         PictureFolder(own)
     with pytest.raises(FileNotFoundError, match="color/, depth/ and mask/"):
         PictureFolder(own / "mask")
+
+
+def test_a_picture_that_cannot_be_used_is_named_and_left_out(shot, own, capsys):
+    """The others are a data set; what is said of them, and the share of each class, is said once."""
+    (own / "color" / "notes.txt").write_text("taken on Monday")
+    for kind, image in (("color", shot.frame.rgb), ("mask", shot.frame.labels)):
+        cv2.imwrite(str(own / kind / "b.png"), image)  # has no depth
+    folder = PictureFolder(own)
+    said = capsys.readouterr().err
+    assert [path.name for path in folder.pictures] == ["a.png"] and len(folder[:]) == 1
+    assert f"{own / 'color' / 'b.png'} is left out:" in said and str(own / "depth" / "b.png") in said
+    assert "notes.txt is left out: color:" in said and f"{own}: 1 of 3 pictures; " in said
+    assert f"target {np.mean(shot.frame.labels == TARGET):.1%}" in said and capsys.readouterr().err == ""
+
+
+def test_the_depth_unit_of_a_folder_can_be_given(own):
+    (usual,) = PictureFolder(own)[:]
+    depth = cv2.imread(str(own / "depth" / "a.png"), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(own / "depth" / "a.png"), 4 * depth)
+    assert np.allclose(PictureFolder(own, depth_scale=0.00025)[0].depth, usual.depth)
+
+
+def test_jaws_are_drawn_where_the_camera_would_see_them(shot):
+    seen = perceive.perceive(shot.frame, labels=shot.frame.labels, T_base_cam=shot.frame.T_base_cam)
+    drawn = perceive.with_grasps(shot.frame, seen.perception.plan.grasps)
+    best = seen.perception.plan.grasps[0]
+    v, u = np.nonzero((drawn != shot.frame.rgb).any(axis=2))
+    P_cam = transform_points(np.linalg.inv(shot.frame.T_base_cam), best.T_base_grasp[:3, 3])
+    middle = np.array([u, v]).mean(axis=1)
+    assert np.linalg.norm(middle - np.ravel(project(P_cam, shot.frame.K))) < 25.0
+    assert np.array_equal(perceive.with_grasps(shot.frame, ()), shot.frame.rgb)
