@@ -2,6 +2,8 @@
 
 tests/data/right.json has right ones in unusual ways; tests/data/answers.json wrong ones, each with its question, what
 the reader thought, and what a good reply is: the kind of the sentence, and the marked parts with their lines' numbers.
+tests/data/refused.json has wrong ones that were right by mistake once, or whose hint, some words of which it has, came
+without a look at their program; of a question's listed mistakes none is among them.
 """
 
 import ast
@@ -20,8 +22,9 @@ from labkit.course.checker.run import define, judge
 from labkit.course.topics import find
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
-ANSWERS, RIGHT = (
-    json.loads((Path(__file__).parents[2] / "data" / name).read_text()) for name in ("answers.json", "right.json")
+ANSWERS, RIGHT, REFUSED = (
+    json.loads((Path(__file__).parents[2] / "data" / f"{name}.json").read_text())
+    for name in ("answers", "right", "refused")
 )
 UNSEEN = (101, 102, 103)  # seeds that repair does not try
 
@@ -68,6 +71,15 @@ def test_an_answer_is_told_what_its_reader_can_use(answer, monkeypatch):
     assert first_sentence(verdict, pieces, found) == (answer["kind"], answer["marked"])
     if answer["kind"] not in WATCHES:
         assert mended(question, pieces, next(f for f in found if f.kind == answer["kind"]))
+
+
+@pytest.mark.parametrize("answer", REFUSED, ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}")
+def test_what_was_accepted_by_mistake_is_refused_and_what_was_only_counted_is_named(answer):
+    question = find(answer["question"])
+    function = define(Program(pieces_of(answer)), question.function)
+    first, *others = (judge(question, function, seed) for seed in (0, 1, 2, 16))
+    assert not first.passed and not any(verdict.passed for verdict in others)
+    assert answer["hint"] in (first.hint or "")
 
 
 @pytest.mark.parametrize("name", sorted({answer["question"] for answer in RIGHT}))
