@@ -53,13 +53,15 @@ def numbers_and_seen(segmentation):
     return segmentation & 0xFFFFFF, segmentation >= 0
 
 
+def links_alone(segmentation, class_of_body, links):
+    """The right labels of some links, 0 elsewhere."""
+    return labels_from_segmentation(np.where(np.isin((segmentation >> 24) - 1, links), segmentation, -1), class_of_body)
+
+
 @wrong("The robot has holes: values in the millions are body + ((link + 1) << 24). How do you get the body back?")
 def base_links_only(segmentation, class_of_body):
     """Compare the raw values with body numbers: whatever has link bits matches none."""
-    labels = np.zeros(segmentation.shape, np.uint8)
-    for body, c in enumerate(class_of_body):
-        labels[segmentation == body] = c
-    return labels
+    return links_alone(segmentation, class_of_body, [-1])
 
 
 @wrong("Where nothing is seen stands -1, and in NumPy the index -1 means the last entry.")
@@ -99,10 +101,7 @@ def link_looked_up(segmentation, class_of_body):
 
 @wrong("You find the base and link 0 alone, and a body may have many links. What holds for all of them?")
 def first_link_alone(segmentation, class_of_body):
-    labels = np.zeros(segmentation.shape, np.uint8)
-    for body, c in enumerate(class_of_body):
-        labels[(segmentation == body) | (segmentation == body + (1 << 24))] = c
-    return labels
+    return links_alone(segmentation, class_of_body, [-1, 0])
 
 
 @wrong("These are body numbers: one more step leads to the class, and class_of_body knows it.")

@@ -38,43 +38,36 @@ def one_of_two_is_0(psi, out):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def terminals(source, sink, constant):
-    """Two (H, W) capacities and a number, as the question asks for them."""
-    return source, sink, float(constant)
-
-
 @wrong("Try one pixel: on the source's side it has label 0, and which of its two arcs is cut then?")
 def source_and_sink_exchanged(psi):
     """A pixel that wants label 0 is bound to the sink."""
-    lowest = psi.min(axis=2)
-    return terminals(psi[..., 0] - lowest, psi[..., 1] - lowest, lowest.sum())
+    source, sink, constant = terminal_capacities(psi)
+    return sink, source, constant
 
 
 @wrong("Subtract the minimum pixel by pixel, so that one of each pixel's two arcs vanishes.")
 def one_minimum_for_all(psi):
     """Right as a cut, but both arcs of a pixel stay."""
-    return terminals(psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size)
+    return psi[..., 1] - psi.min(), psi[..., 0] - psi.min(), psi.min() * psi[..., 0].size
 
 
 @wrong("A negative cost needs no clipping: less the pixel's smaller cost, both of its arcs are 0 or more.")
 def negative_costs_clipped(psi):
-    clipped = np.maximum(psi, 0.0)
-    lowest = clipped.min(axis=2)
-    return terminals(clipped[..., 1] - lowest, clipped[..., 0] - lowest, lowest.sum())
+    return terminal_capacities(np.maximum(psi, 0.0))
 
 
 @wrong("What goes into the constant leaves both arcs: the one that stays carries the costs' difference.")
 def whole_costs_kept(psi):
     dearer = np.where(psi > psi.min(axis=2, keepdims=True), psi, 0.0)
-    return terminals(dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum())
+    return dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum()
 
 
 @wrong("Each pixel has one arc of capacity 0: which label cuts the arc from the source, the dearer one?")
 def difference_in_both_arcs(psi):
     difference = np.abs(psi[..., 1] - psi[..., 0])
-    return terminals(difference, difference, psi.min(axis=2).sum())
+    return difference, difference, psi.min(axis=2).sum()
 
 
 @wrong("A pixel pays its smaller cost in any case, whatever its sign: did you take it from both arcs?")
 def only_negative_costs_taken(psi):
-    return terminals(np.maximum(psi[..., 1], 0.0), np.maximum(psi[..., 0], 0.0), np.minimum(psi, 0.0).sum())
+    return np.maximum(psi[..., 1], 0.0), np.maximum(psi[..., 0], 0.0), np.minimum(psi, 0.0).sum()

@@ -44,10 +44,7 @@ def mean_is_1(counts, power, w):
 
 @wrong("What is the mean weight over the pixels? It should be 1.")
 def weights_not_scaled(counts, power):
-    present = counts > 0
-    w = np.ones(len(counts))
-    w[present] = counts[present] ** -power
-    return w
+    return np.maximum(counts, 1) ** -power
 
 
 @wrong("Not the weights are to sum to one: their mean over pixels is 1.")

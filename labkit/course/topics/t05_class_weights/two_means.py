@@ -41,6 +41,12 @@ def means(loss, weight):
     return float((loss * weight).mean()), float((loss * weight).sum() / weight.sum())
 
 
+def of_log_probabilities(log_p, y, w):
+    """Both means for log-probabilities of all classes."""
+    counted = y != 255
+    return means(-np.take_along_axis(log_p[counted], y[counted][:, None], -1)[:, 0], w[y[counted]])
+
+
 @wrong("A pixel that adds no loss is not one of those that you divide by.")
 def means_over_all_pixels(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
@@ -73,26 +79,19 @@ def logits_weighted(z, y, w):
 
 @wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has log 0.")
 def one_maximum_for_all(z, y, w):
-    z, y = z[y != 255], y[y != 255]
-    z = z - z.max()
-    loss, weight = np.log(np.exp(z).sum(axis=-1)) - z[np.arange(len(y)), y], w[y]
-    return means(loss, weight)
+    z = z - z[y != 255].max()
+    return of_log_probabilities(z - np.log(np.exp(z).sum(axis=-1, keepdims=True)), y, w)
 
 
 @wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
 def means_that_overflow(z, y, w):
     p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
-    counted = y != 255
-    loss, weight = -np.log(np.take_along_axis(p[counted], y[counted][:, None], -1))[:, 0], w[y[counted]]
-    return means(loss, weight)
+    return of_log_probabilities(np.log(p), y, w)
 
 
 @wrong("The probabilities of one pixel add up to 1: along which axis of z do its classes stand?")
 def normalised_along_the_first_axis(z, y, w):
-    log_p = z - np.logaddexp.reduce(z, axis=0, keepdims=True)
-    counted = y != 255
-    loss, weight = -np.take_along_axis(log_p[counted], y[counted][:, None], -1)[:, 0], w[y[counted]]
-    return means(loss, weight)
+    return of_log_probabilities(z - np.logaddexp.reduce(z, axis=0, keepdims=True), y, w)
 
 
 @wrong(

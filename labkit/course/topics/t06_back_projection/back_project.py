@@ -51,9 +51,7 @@ def holes(depth):
 
 @wrong("Your cloud is mirrored and sheared: u counts columns, v counts rows, and the array is indexed [v, u].")
 def u_is_the_row(depth, K):
-    u, v = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
-    return holes(depth) * q
+    return holes(depth) * rays(depth.shape[::-1], K).swapaxes(0, 1)
 
 
 @wrong("A wall seen head-on has one depth, and it must come out flat: is z the depth, or the length of the ray?")
@@ -119,9 +117,7 @@ def holes_without_z_alone(depth, K):
 
 @wrong("np.meshgrid with indexing='ij' stands on its side, and reshape does not turn it: which axis is u?")
 def grid_on_its_side(depth, K):
-    u, v = (grid.reshape(depth.shape) for grid in np.meshgrid(*map(np.arange, depth.shape[::-1]), indexing="ij"))
-    q = np.dstack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(depth.shape)])
-    return holes(depth) * q
+    return holes(depth) * rays(depth.shape, K).swapaxes(0, 1).reshape(*depth.shape, 3)
 
 
 @wrong("An image of points is asked for, one at each pixel's place: what stands where there is no reading?")

@@ -49,8 +49,7 @@ def focal_length_alone_scaled(K, left, top, scale):
 
 @wrong("First cropped, then resized: left and top count pixels of the image before it was resized.")
 def resized_first(K, left, top, scale):
-    half = (scale - 1.0) / 2.0
-    return with_centre(K, scale, scale * K[0, 2] + half - left, scale * K[1, 2] + half - top)
+    return cropped_intrinsics(K, left / scale, top / scale, scale)
 
 
 @wrong("What was at column `left` is at column 0 of the crop: do columns grow or shrink?")

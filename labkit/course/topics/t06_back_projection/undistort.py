@@ -110,12 +110,8 @@ def normalised(pixels, K, k):
 
 @wrong("x is divided by fx and y by fy: by what do you divide each of them before you square it?")
 def radius_in_pixels(pixels, K, k):
-    c = K[:2, 2]
-    seen = ideal = pixels - c
-    for _ in range(60):
-        r2 = (ideal**2).sum(axis=1, keepdims=True) / (K[0, 0] * K[1, 1])
-        ideal = seen / (1.0 + k[0] * r2 + k[1] * r2**2)
-    return c + ideal
+    f = np.sqrt(K[0, 0] * K[1, 1])
+    return undistort(pixels, K_of(f, f, *K[:2, 2]), k)
 
 
 @wrong("k1 stands beside r squared and k2 beside r to the fourth.")
