@@ -31,7 +31,7 @@ class Property:
     holds: Callable[..., bool]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Question:
     """One blank of a lab: a function of arrays to an array, a number, or a tuple of these.
 

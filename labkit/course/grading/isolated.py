@@ -16,31 +16,22 @@ from labkit.course.checker.question import PACKAGES, PUBLIC_SEED, Question
 from labkit.course.grading import sandbox
 from labkit.course.grading.channel import Changed, Worker, WorkerLost
 from labkit.course.grading.sandbox import Limits
-from labkit.course.topics import of_topic
 
 drawing = threading.Lock()  # references are called with Python's warnings off, which no thread has for itself
 
 
 @functools.cache
-def _public_cases(topic: str, function: str) -> tuple[Case, ...]:
+def public_cases(question: Question) -> tuple[Case, ...]:
+    """The cases that `check` uses; computed once in a process."""
     with drawing:
-        return tuple(expected_cases(of_topic(topic)[function], PUBLIC_SEED))
+        return tuple(expected_cases(question, PUBLIC_SEED))
 
 
 @functools.cache
-def _more_public_cases(topic: str, function: str) -> tuple[Case, ...]:
-    with drawing:
-        return tuple(fresh_cases(of_topic(topic)[function], PUBLIC_SEED))
-
-
 def more_public_cases(question: Question) -> tuple[Case, ...]:
     """Cases of other public seeds, on which a repair is tried; computed once in a process."""
-    return _more_public_cases(question.topic, question.function)
-
-
-def public_cases(question: Question) -> tuple[Case, ...]:
-    """The cases that `check` uses; computed once in a process."""
-    return _public_cases(question.topic, question.function)
+    with drawing:
+        return tuple(fresh_cases(question, PUBLIC_SEED))
 
 
 def secret_cases(question: Question, secret: str, digest: str) -> tuple[Case, ...]:
