@@ -64,8 +64,7 @@ def cloud(figure: Figure, clouds: Mapping[str, Float[np.ndarray, "_ 3"]], sizes:
         side.scatter(P[:, 0], P[:, 2], s=sizes, linewidths=0)
     for axes, vertical in ((above, "y"), (side, "z")):
         axes.set_aspect("equal")
-        axes.set_xlabel("x (m)")
-        axes.set_ylabel(f"{vertical} (m)")
+        axes.set(xlabel="x (m)", ylabel=f"{vertical} (m)")
     above.set_title("from above")
     side.set_title("from the side")
     above.legend(fontsize=8, markerscale=3)

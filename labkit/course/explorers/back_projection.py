@@ -87,9 +87,8 @@ def name_that_bug(frame: RGBDFrame) -> Explorer:
                 axes.plot(P[:, 0], P[:, vertical], ".", markersize=1.5, color=PALETTE[c] / 255.0)
             axes.plot(camera[0], camera[vertical], "k^", markersize=7)
             axes.set_aspect("equal", adjustable="datalim")
-            axes.set_xlabel("x (m)")
-            axes.set_ylabel(f"{'xyz'[vertical]} (m)")
-            axes.set_title(("from above", "from the side")[vertical - 1])
+            side = ("from above", "from the side")[vertical - 1]
+            axes.set(xlabel="x (m)", ylabel=f"{'xyz'[vertical]} (m)", title=side)
         guess = f" | red: mystery {mystery}" if mystery else ""
         colours = "; ".join(BUGS[bug] for bug in bugs) or "no bug"
         figure.suptitle(f"colours: {colours} | triangle: camera{guess}", size=9, wrap=True)

@@ -83,8 +83,7 @@ def draw_energies(axes: Axes, terms: dict[str, tuple[float, float]], limit: floa
     for name, total in zip(names, unary + pairwise, strict=True):
         axes.text(total, name, f" {total:.2f}", va="center", fontsize=9)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, limit or 1.2 * (unary + pairwise).max())
-    axes.set_xlabel("energy")
+    axes.set(xlim=(0.0, limit or 1.2 * (unary + pairwise).max()), xlabel="energy")
     axes.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
 
@@ -103,10 +102,7 @@ def gibbs(psi: Float[np.ndarray, "2 2 2"]) -> Explorer:
         p /= p.sum()
         bars, icons = figure.subplots(2, 1, sharex=True, height_ratios=(5.0, 1.0))
         bars.bar(range(16), p, color=["black" if n == p.argmax() else "0.6" for n in range(16)])
-        bars.set_ylim(0.0, 1.0)
-        bars.set_xlim(-0.6, 15.6)
-        bars.set_ylabel("p(y)")
-        bars.set_xticks([])
+        bars.set(xlim=(-0.6, 15.6), ylim=(0.0, 1.0), xticks=[], ylabel="p(y)")
         bars.spines[["top", "right"]].set_visible(False)
         bars.set_title(f"w = {w:.1f}: the likeliest labelling has {p.max():.2f}, Z = {np.exp(-energies).sum():.3f}")
         n, v, u = np.indices(labellings.shape)
@@ -180,16 +176,14 @@ def lam_slider(
         show(seen, overlay(image, labels, 0.4), "over the image")
         show(painted, colorize(labels), f"labels, lam = {lam:g}")
         bars.bar(["unary", "pairwise"], terms, color=[UNARY_COLOUR, PAIRWISE_COLOUR])
-        bars.set_ylabel("energy")
         bars.spines[["top", "right"]].set_visible(False)
         score = iou(confusion_matrix(y_true, labels, 4))[TARGET]
         changed = np.mean(labels != psi.argmin(axis=2))
-        bars.set_title(f"target IoU {score:.3f}\nchanged pixels {changed:.1%}")
+        bars.set(ylabel="energy", title=f"target IoU {score:.3f}\nchanged pixels {changed:.1%}")
 
-    lam = ipywidgets.SelectionSlider(options=[(f"{value:g}", value) for value in LAMS], value=0.0, description="lam")
-    sigma = ipywidgets.SelectionSlider(
-        options=[(f"{value:g}", value) for value in SIGMAS], value=15.0, description="sigma_I"
-    )
+    lams, sigmas = ([(f"{value:g}", value) for value in values] for values in (LAMS, SIGMAS))
+    lam = ipywidgets.SelectionSlider(options=lams, value=0.0, description="lam")
+    sigma = ipywidgets.SelectionSlider(options=sigmas, value=15.0, description="sigma_I")
     stills = ({"lam": 0.0, "sigma_I": 15.0}, {"lam": 2.0, "sigma_I": 15.0}, {"lam": 32.0, "sigma_I": 200.0})
     return Explorer(draw, {"lam": lam, "sigma_I": sigma}, size=(9.0, 2.7), stills=stills)
 
@@ -221,7 +215,5 @@ def draw_cut(axes: Axes, psi: Float[np.ndarray, "n 2"], w: Float[np.ndarray, "m"
     for place, colour, name in nodes:
         axes.scatter(*place, s=420, color=[colour], edgecolor="black", zorder=2)
         axes.text(*place, name, ha="center", va="center", zorder=3)
-    axes.set_xlim(-0.6, n - 0.4)
-    axes.set_ylim(-1.3, 1.3)
+    axes.set(xlim=(-0.6, n - 0.4), ylim=(-1.3, 1.3), title=f"labels {' '.join(map(str, y))}: cut {cut:g}")
     axes.set_axis_off()
-    axes.set_title(f"labels {' '.join(map(str, y))}: cut {cut:g}")

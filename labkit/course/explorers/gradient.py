@@ -6,7 +6,7 @@ from jaxtyping import Integer, UInt8
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.labels import CLASSES
 from labkit.losses import cross_entropy, cross_entropy_grad, softmax
 from labkit.support.validation import check_labels, check_rgb, check_same_size
@@ -78,19 +78,16 @@ def keyhole(
     def draw(figure: Figure, u: int, v: int, width: int, reveal: bool) -> None:
         patch, corner = seen(rgb, u, v, width)
         through, whole = figure.subplots(1, 2)
-        through.imshow(patch)
+        show(through, patch, f"what {width} pixels show")
         through.plot(u - corner[0], v - corner[1], "+", color="white", markersize=14, markeredgewidth=3)
         through.plot(u - corner[0], v - corner[1], "+", color="black", markersize=12, markeredgewidth=1)
-        through.set_title(f"what {width} pixels show")
+        whole.axis("off")
         if reveal:
-            whole.imshow(rgb)
-            whole.add_patch(Rectangle(np.subtract(corner, 0.5), *patch.shape[1::-1], fill=False, color="white"))
             label = y[v, u]
-            whole.set_title(f"true class: {CLASSES[label] if label < len(CLASSES) else 'ignore'}")
+            show(whole, rgb, f"true class: {CLASSES[label] if label < len(CLASSES) else 'ignore'}")
+            whole.add_patch(Rectangle(np.subtract(corner, 0.5), *patch.shape[1::-1], fill=False, color="white"))
         else:
             whole.text(0.5, 0.5, "surface, target,\nobstacle, background?", ha="center", va="center", fontsize=13)
-        for axes in (through, whole):
-            axes.axis("off")
 
     controls = {
         "u": ipywidgets.IntSlider(at[0], min=0, max=width_of_image - 1, description="column u"),

@@ -53,8 +53,7 @@ def draw_matrix(axes: Axes, n: Int64[np.ndarray, "C C"], names: tuple[str, ...] 
             axes.text(j, i, f"{count:,}", ha="center", va="center", fontsize=9)
     axes.set_xticks(range(len(n)), names, rotation=25)
     axes.set_yticks(range(len(n)), names)
-    axes.set_xlabel("predicted j")
-    axes.set_ylabel("true i")
+    axes.set(xlabel="predicted j", ylabel="true i")
 
 
 def toy_object(radius: int) -> Bool[np.ndarray, "64 64"]:
@@ -97,8 +96,7 @@ def sliding_mask() -> Explorer:
         for values, colour, name in zip(scores.T, ("0.55", "tab:red"), ("pixel accuracy", "IoU"), strict=True):
             curves.plot(shifts, values, color=colour, label=name)
             curves.plot(shift, values[shift], "o", color=colour)
-        curves.set(xlabel="shift (pixels)", ylabel="score")
-        curves.set_ylim(-0.03, 1.05)
+        curves.set(xlabel="shift (pixels)", ylabel="score", ylim=(-0.03, 1.05))
         curves.legend(loc="center right")
         share = toy_object(radius).mean()
         curves.set_title(

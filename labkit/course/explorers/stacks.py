@@ -31,10 +31,9 @@ def wipe(
 
     def draw(figure: Figure, at: int, left: str, right: str) -> None:
         axes = figure.subplots()
-        axes.imshow(np.concatenate([painted[left][:, :at], painted[right][:, at:]], axis=1))
+        title = f"{left} {scores[left]:.2f}   |   {scores[right]:.2f} {right}     (IoU of the target)"
+        show(axes, np.concatenate([painted[left][:, :at], painted[right][:, at:]], axis=1), title)
         axes.axvline(at - 0.5, color="white", lw=1.5)
-        axes.set_title(f"{left} {scores[left]:.2f}   |   {scores[right]:.2f} {right}     (IoU of the target)")
-        axes.axis("off")
 
     controls = {
         "at": ipywidgets.IntSlider(width // 2, min=0, max=width, description="edge"),
