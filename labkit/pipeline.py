@@ -70,9 +70,11 @@ class Pipeline:
     """The chain as one object: `Pipeline(model).run(frame)`, which is `perceive` and then `locate`.
 
     model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes), or any function from an
-    RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1; None if labels come from elsewhere, and
-    only `locate` is used. table_z: height of the table in the base
-    frame, metres; None takes the frame's own, or else 0. target_class: what to grasp.
+    RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1; or any function from a frame to the
+    numbers of objects, integers (H, W), 0 for none, whose attribute `gives_instances` is True, such as
+    `labkit.stacks.objects.on_the_table`: then each object is a target. None if labels come from elsewhere, and only
+    `locate` is used. table_z: height of the table in the base frame, metres; None takes the frame's own, or else 0.
+    target_class: what to grasp.
     mirror: let a network look at the image and at its mirror image, and average: a little better, at twice the time.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.learning.engines): equal numbers, other
     speeds; the model may then be an ONNX file of `labkit export`.
@@ -107,7 +109,8 @@ class Pipeline:
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
         grasp: Callable[..., GraspPlan] | None = None,
     ):
-        self.model = None if model is None else open_engine(model, engine)
+        self.gives_instances = getattr(model, "gives_instances", False)
+        self.model = model if model is None or self.gives_instances else open_engine(model, engine)
         check_whole("target_class", target_class, 0, (getattr(self.model, "num_classes", None) or IGNORE) - 1)
         if grasp is not None and gripper is not None:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
@@ -126,31 +129,37 @@ class Pipeline:
     def run(self, frame: RGBDFrame) -> Perception:
         """From a frame to grasps: `perceive`, then `locate`."""
         frame, seconds = self._on_table(frame), {}
-        labels, probabilities = self._perceive(frame, seconds)
-        return self._locate(frame, _check_labels_of(frame, labels), probabilities, seconds)
+        labels, probabilities, instances = self._perceive(frame, seconds)
+        return self._locate(frame, _check_labels_of(frame, labels), probabilities, instances, seconds)
 
-    def perceive(self, frame: RGBDFrame) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"]]:
+    def perceive(self, frame: RGBDFrame) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"] | None]:
         """Label every pixel: labels, and the class probabilities that they were chosen by.
 
-        Raises ValueError without a model, or for one that gives no probabilities or has no such class as the target.
+        A model that gives instances has no probabilities, and its labels are the target's or 0. Raises ValueError
+        without a model, or for one that gives no probabilities or has no such class as the target.
         """
-        return self._perceive(self._on_table(frame), {})
+        return self._perceive(self._on_table(frame), {})[:2]
 
     def locate(
         self,
         frame: RGBDFrame,
         labels: Integer[np.ndarray, "H W"],
         probabilities: Float[np.ndarray, "H W C"] | None = None,
+        instances: Integer[np.ndarray, "H W"] | None = None,
     ) -> Perception:
         """Find the labelled targets in space, and grasps for them.
 
         labels: of this pipeline's `perceive`, true ones, or anybody's: any classes, 255 for "unknown". probabilities:
-        what they were chosen by, if anything. Raises ValueError naming the argument that does not fit.
+        what they were chosen by, if anything. instances: numbers of objects, 0 for none, in place of `split`: of the
+        pixels labelled target, those of one number are one target. Raises ValueError naming the argument that does not
+        fit.
         """
         labels = _check_labels_of(frame, labels)
         if probabilities is not None:
             probabilities = self._with_target(check_probabilities(probabilities, labels.shape))
-        return self._locate(self._on_table(frame), labels, probabilities, {})
+        if instances is not None:
+            instances = _check_instances_of(frame, instances)
+        return self._locate(self._on_table(frame), labels, probabilities, instances, {})
 
     def _on_table(self, frame: RGBDFrame) -> RGBDFrame:
         """The frame with the height of the table that counts: this pipeline's, or else its own, or else 0."""
@@ -165,6 +174,10 @@ class Pipeline:
 
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
         require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
+        if self.gives_instances:
+            with timed(seconds, "objects"):
+                instances = _check_instances_of(frame, self.model(frame))
+            return np.where(instances > 0, self.target_class, 0).astype(np.uint8), None, instances
         with timed(seconds, "network"):
             probabilities = self._with_target(self.model(frame, self.mirror))
         with timed(seconds, "labels"):
@@ -172,13 +185,13 @@ class Pipeline:
         if self.crf:
             with timed(seconds, "crf"):
                 labels = self.crf(probabilities, frame)
-        return labels, probabilities
+        return labels, probabilities, None
 
-    def _locate(self, frame: RGBDFrame, labels, probabilities, seconds: dict[str, float]) -> Perception:
+    def _locate(self, frame: RGBDFrame, labels, probabilities, instances, seconds: dict[str, float]) -> Perception:
         with timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
         with timed(seconds, "clouds"):
-            pixels, clouds, scene = self.targets(labels, points, frame.table_z)
+            pixels, clouds, scene = self.targets(labels, points, frame.table_z, instances)
         with timed(seconds, "grasps"):
             plan = self.plan(clouds, scene, frame.table_z, frame.T_base_cam[:3, 3])
             certainty = tuple(1.0 for _ in pixels)
@@ -190,7 +203,11 @@ class Pipeline:
         return Perception(frame, self.target_class, *known)
 
     def targets(
-        self, labels: UInt8[np.ndarray, "H W"], points: Float[np.ndarray, "H W 3"], table_z: float
+        self,
+        labels: UInt8[np.ndarray, "H W"],
+        points: Float[np.ndarray, "H W 3"],
+        table_z: float,
+        instances: Integer[np.ndarray, "H W"] | None = None,
     ) -> tuple[list[Integer[np.ndarray, "_"]], list[Float[np.ndarray, "_ 3"]], Float[np.ndarray, "M 3"]]:
         """Find each target's pixels (indices v * W + u) and points, and all points of the workspace."""
         points = points.reshape(-1, 3)
@@ -198,7 +215,9 @@ class Pipeline:
         inside = [(x > a) & (x < b) for x, a, b in zip(points.T, low, high, strict=True)]
         inside = np.logical_and.reduce(inside)  # NaN lies nowhere
         pixels = np.flatnonzero(inside & (labels.ravel() == self.target_class))
-        each = [pixels[group] for group in self.split(points[pixels])]
+        P = points[pixels]
+        groups = self.split(P) if instances is None else separate_instances(P, instances.ravel()[pixels])
+        each = [pixels[group] for group in groups]
         return each, [points[chosen] for chosen in each], points.compress(inside, axis=0)
 
     def plan(
@@ -217,6 +236,13 @@ class Pipeline:
 def _check_labels_of(frame: RGBDFrame, labels) -> UInt8[np.ndarray, "H W"]:
     labels = check_labels("labels", check_shape("labels", labels, frame.depth.shape), IGNORE)
     return labels.astype(np.uint8, copy=False)
+
+
+def _check_instances_of(frame: RGBDFrame, instances) -> Integer[np.ndarray, "H W"]:
+    instances = check_shape("instances", instances, frame.depth.shape)
+    fits = instances.dtype.kind in "iu" and instances.min(initial=0) >= 0
+    require("instances", fits, "whole numbers of at least 0", f"{instances.dtype} from {instances.min()}")
+    return instances
 
 
 @contextmanager
@@ -252,6 +278,13 @@ def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Integer[np.ndarray, "_
     """Clean the points of the target class and split them: two targets are two lists of indices into P."""
     kept = inliers(P)
     return [kept[group] for group in cluster_indices(P[kept])]
+
+
+def separate_instances(P: Float[np.ndarray, "N 3"], numbers: Integer[np.ndarray, "N"]) -> list:
+    """Clean the points of each object: a list of indices into P for each number above 0, the most points first."""
+    groups = [np.flatnonzero(numbers == number) for number in np.unique(numbers[numbers > 0])]
+    cleaned = [group[inliers(P[group])] for group in groups]
+    return sorted(filter(len, cleaned), key=len, reverse=True)
 
 
 def rank(plan: GraspPlan, certainty: Sequence[float]) -> GraspPlan:

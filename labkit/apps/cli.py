@@ -240,23 +240,51 @@ def perceive(
     mask: Annotated[
         Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for overlay.png, clouds, grasps.json, report.html.")] = Path("out"),
+    instances: Annotated[
+        bool, typer.Option("--instances", help="Each value above 0 of --mask is an object, and each object a target.")
+    ] = False,
+    anything: Annotated[
+        bool, typer.Option("--anything", help="No network: whatever stands on the table is a target.")
+    ] = False,
+    target: Annotated[
+        int | None, typer.Option(help="The class to grasp, 2 if none is given; with --mask, its value that says so.")
+    ] = None,
+    gripper: Annotated[
+        str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON file.')
+    ] = "",
+    workspace: Annotated[
+        str, typer.Option(help="What the arm can meet: from and to in x, y and z of the base frame; z from the table.")
+    ] = "-20 20 -20 20 -0.02 0.5",
+    out: Annotated[
+        Path, typer.Option(help="Folder for overlay.png, targets.png, clouds, grasps.json, report.html.")
+    ] = Path("out"),
 ) -> None:
     """Find targets and grasps in a picture of your own camera; no target is an answer, too."""
     from labkit.apps import perceive as own
     from labkit.apps.node_command import Settings
+    from labkit.labels import TARGET
     from labkit.learning.network import load_model, weights_path
+    from labkit.stacks.objects import on_the_table
 
     if plane is not None and camera_pose is not None:
         raise ValueError("plane: expected either --plane auto or --camera-pose, got both")
+    if anything and (mask is not None or target is not None):
+        raise ValueError("anything: expected neither --mask nor --target beside it; it takes each object for a target")
+    if instances and (mask is None or target is not None):
+        raise ValueError("instances: expected --mask FILE beside it, and no --target; each value is one")
     T_base_cam = Settings(camera_pose=camera_pose).T_base_cam()
     camera = own.read_intrinsics(intrinsics)
     frame = own.read_frame(color, depth, camera, depth_scale)
     known = {"T_base_cam": T_base_cam, "table_z": table_z, "distortion": camera.distortion}
-    if mask is None:
-        seen = own.perceive(frame, load_model(weights_path(model)), **known)
+    known |= {"gripper": own.read_gripper(gripper), "workspace": own.read_workspace(workspace)}
+    if mask is not None:
+        labels, numbers = own.read_mask(mask, frame.size, target, instances)
+        seen = own.perceive(frame, labels=labels, instances=numbers, **known)
+    elif anything:
+        seen = own.perceive(frame, on_the_table, **known)
     else:
-        seen = own.perceive(frame, labels=own.read_mask(mask, frame.size), **known)
+        known["target_class"] = TARGET if target is None else target
+        seen = own.perceive(frame, load_model(weights_path(model)), **known)
     typer.echo(own.describe(seen))
     for path in own.save(seen, out):
         typer.echo(f"wrote {path}")

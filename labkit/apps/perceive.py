@@ -7,7 +7,7 @@ import base64
 import html
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import cv2
@@ -114,22 +114,56 @@ def _from_json(facts: dict) -> Intrinsics:
     return Intrinsics(K, None if scale is None else 0.001 * float(scale), size, distortion)
 
 
-def read_mask(path, size: tuple[int, int]) -> np.ndarray:
-    """Read somebody's mask as labels, uint8 (H, W): 0 and one other value mean "target"; else the kit's own classes.
+def read_gripper(text: str) -> Gripper:
+    """Read a gripper's measures in metres, "max_opening=0.14 pad_width=0.022" or a JSON file; the rest is the Panda's.
 
-    size: width and height that it must have. Raises ValueError for an image of another kind, size or other values.
+    Raises ValueError for other words, other names, or measures that do not fit together.
+
+    >>> read_gripper("max_opening=0.14").max_opening
+    0.14
+    """
+    names = [measure.name for measure in fields(Gripper)]
+    try:
+        words = json.loads(Path(text).read_text()) if Path(text).is_file() else text.replace(",", " ").split()
+        given = words if isinstance(words, dict) else dict(word.split("=") for word in words)
+        measures = {name: float(metres) for name, metres in given.items()}
+    except (TypeError, ValueError):
+        raise ValueError(f'gripper: expected "NAME=METRES ..." or a JSON file of them, got {text!r}') from None
+    unknown = ", ".join(sorted(measures.keys() - set(names)))
+    require("gripper", not unknown, f"measures of {', '.join(names)}", unknown)
+    return Gripper(**measures)
+
+
+def read_workspace(text: str) -> tuple[tuple[float, float], ...]:
+    """Read "x x y y z z": from and to, metres in the base frame, z from the table.
+
+    Raises ValueError for other words than six numbers.
+    """
+    numbers = numbers_of(text)
+    require("workspace", len(numbers) == 6, "six numbers, x x y y z z", repr(text))
+    return tuple(zip(numbers[::2], numbers[1::2], strict=True))
+
+
+def read_mask(path, size: tuple[int, int], target: int | None = None, instances: bool = False):
+    """Read somebody's mask: labels, uint8 (H, W), and the numbers of the objects if it holds them, else None.
+
+    0 and one other value, such as 255, mean "target"; other values are the kit's own classes. size: width and height
+    that it must have. target: the value that means "target", whatever the others mean. instances: each value above 0 is
+    an object, and a target. Raises ValueError for an image of another kind or size, and for values that no class has.
     """
     mask = read_image("mask", path, np.uint8)
     require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
     values = np.unique(mask)
-    if len(values[values > 0]) <= 1:
-        return np.where(mask > 0, TARGET, 0).astype(np.uint8)
+    if instances or target is not None or len(values[values > 0]) <= 1:
+        chosen = mask > 0 if target is None else mask == target
+        return np.where(chosen, TARGET, 0).astype(np.uint8), mask if instances else None
     if not np.isin(values, [*range(len(CLASSES)), IGNORE]).all():
         raise ValueError(
             f"mask: expected 0 and one other value, or labels 0 to {len(CLASSES) - 1} and 255, "
-            f"got {values[:6].tolist()}{' ...' if len(values) > 6 else ''}"
+            f"got {values[:6].tolist()}{' ...' if len(values) > 6 else ''}; --instances takes each for an object, "
+            "--target N one for the target"
         )
-    return mask
+    return mask, None
 
 
 def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None = None) -> RGBDFrame:
@@ -196,30 +230,46 @@ def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A frame in the base frame, what was perceived in it, what looks wrong, and the table's plane if it was fitted."""
+    """A frame in the base frame, what was perceived in it, what looks wrong, and the table's plane if it was fitted.
+
+    gripper: the hand that was planned for.
+    """
 
     frame: RGBDFrame
     perception: Perception
     notices: tuple[str, ...] = ()
     plane: Plane | None = None
+    gripper: Gripper = field(default_factory=Gripper)
 
 
-def perceive(frame: RGBDFrame, model=None, labels=None, T_base_cam=None, table_z: float = 0.0, distortion=()) -> Seen:
+def perceive(
+    frame: RGBDFrame,
+    model=None,
+    labels=None,
+    T_base_cam=None,
+    table_z: float = 0.0,
+    distortion=(),
+    instances=None,
+    gripper: Gripper | None = None,
+    workspace=WORKSPACE,
+    target_class: int = TARGET,
+) -> Seen:
     """Run the chain on a frame that is given in the camera's own frame.
 
-    model: a network, or None with `labels`, somebody else's. T_base_cam: the camera's pose; without it the largest
-    plane of the depth picture is taken for the table, and `table_z` for 0. All that was seen over the table is the
-    workspace. distortion: the lens's coefficients, which are not undone, but noticed. Raises ValueError if no plane can
-    be found. Topics 06 and 07.
+    model: what a `Pipeline` takes, or None with somebody else's `labels`, and the `instances` among them if known.
+    T_base_cam: the camera's pose; without it the largest plane of the depth picture is taken for the table, and
+    `table_z` for 0. distortion: the lens's coefficients, which are not undone, but noticed. gripper, workspace,
+    target_class: as in `Pipeline`; all that was seen over the table is the workspace, if none is given. Raises
+    ValueError if no plane can be found, or for an argument that does not fit. Topics 06 and 07.
     """
     plane = None
     if T_base_cam is None:
         frame, plane = on_table(frame)
     else:
         frame = replace(frame, T_base_cam=T_base_cam, table_z=table_z)
-    pipeline = Pipeline(model, workspace=WORKSPACE)
-    perception = pipeline.run(frame) if labels is None else pipeline.locate(frame, labels)
-    return Seen(frame, perception, notices(frame, perception, distortion), plane)
+    pipeline = Pipeline(model, target_class=target_class, workspace=workspace, gripper=gripper)
+    perception = pipeline.run(frame) if labels is None else pipeline.locate(frame, labels, instances=instances)
+    return Seen(frame, perception, notices(frame, perception, distortion), plane, gripper or Gripper())
 
 
 def describe(seen: Seen) -> str:
@@ -283,7 +333,7 @@ def view(seen: Seen) -> View:
     shown = np.concatenate(p.clouds or [P[others]] if others.any() else [np.zeros((1, 3))])
     low, high = np.percentile(shown, [1, 99], axis=0)
     middle, half = (low + high) / 2, (high - low) / 2 + AROUND
-    others &= (p.labels.ravel() != TARGET) & (np.abs(P - middle) < half).all(axis=1)
+    others &= (p.labels.ravel() != p.target_class) & (np.abs(P - middle) < half).all(axis=1)
     others = np.flatnonzero(others)
     others = others[:: max(1, len(others) // MOST_POINTS)]
     shown = View(eye=tuple((seen.frame.T_base_cam[:3, 3] - middle).tolist()), height=560)
@@ -291,18 +341,26 @@ def view(seen: Seen) -> View:
     for number, cloud in enumerate(p.clouds, start=1):
         some = cloud[:: max(1, len(cloud) // 3000)]
         shown.points(some, f"target {number}", to_hex(PALETTE[TARGET] / 255), 2.5)
-    hand = Gripper()
+    hand = seen.gripper
     return shown.jaws(p.plan.grasps[:1], hand, "best grasp").jaws(
         p.plan.grasps[1:SHOWN], hand, "other grasps", "#bbbbbb"
     )
 
 
-def picture(rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
-    """The colour picture with its labels laid over it, and the targets outlined in white."""
+def picture(
+    rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"], targets=()
+) -> UInt8[np.ndarray, "H W 3"]:
+    """The colour picture with its labels laid over it, and the targets outlined in white.
+
+    targets: the pixels of each, indices v * W + u; without any, those labelled target are outlined together.
+    """
     painted = overlay(rgb, np.where(labels == SURFACE, 0, labels))
-    target = (labels == TARGET).astype(np.uint8)
-    outlines, _ = cv2.findContours(target, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    return cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+    for pixels in targets or [np.flatnonzero(labels == TARGET)]:
+        target = np.zeros(labels.shape, np.uint8)
+        target.ravel()[pixels] = 1
+        outlines, _ = cv2.findContours(target, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(painted, outlines, -1, (255, 255, 255), 1)
+    return painted
 
 
 def with_grasps(frame: RGBDFrame, grasps, gripper: Gripper | None = None) -> UInt8[np.ndarray, "H W 3"]:
@@ -322,11 +380,19 @@ def with_grasps(frame: RGBDFrame, grasps, gripper: Gripper | None = None) -> UIn
 
 
 def save(seen: Seen, out) -> list[Path]:
-    """Write overlay.png, target_N.ply, grasps.json and report.html into the folder `out`; returns their paths."""
+    """Write what was seen into the folder `out`: pictures, clouds, grasps.json and report.html; returns their paths.
+
+    targets.png holds the number of the target at each pixel, 0 for none.
+    """
     out = Path(out)
-    painted = picture(seen.frame.rgb, seen.perception.labels)
-    files = {"overlay.png": _png(painted), "grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
-    for number, (cloud, pixels) in enumerate(zip(seen.perception.clouds, seen.perception.pixels, strict=True), start=1):
+    p = seen.perception
+    targets = np.zeros(p.labels.shape, np.uint8)
+    for number, pixels in enumerate(p.pixels[:255], start=1):
+        targets.ravel()[pixels] = number
+    painted = picture(seen.frame.rgb, p.labels, p.pixels)
+    files = {"overlay.png": _png(painted), "targets.png": cv2.imencode(".png", targets)[1].tobytes()}
+    files |= {"grasps.json": json.dumps(grasps_json(seen), indent=1).encode()}
+    for number, (cloud, pixels) in enumerate(zip(p.clouds, p.pixels, strict=True), start=1):
         colours = seen.frame.rgb.reshape(-1, 3)[pixels]
         files[f"target_{number}.ply"] = trimesh.PointCloud(cloud, colours).export(file_type="ply")
     files["report.html"] = report(seen).encode()
@@ -340,7 +406,7 @@ def save(seen: Seen, out) -> list[Path]:
 
 def report(seen: Seen) -> str:
     """One HTML page that needs no network: the pictures, what was found, the grasps, and a view to turn."""
-    depth = seen.frame.depth
+    p, depth = seen.perception, seen.frame.depth
     known = np.isfinite(depth) & (depth > 0.0)
     low, high = np.percentile(depth[known], [2, 98]) if known.any() else (0.0, 1.0)
     grey = np.clip((high - depth) / max(high - low, 1e-6), 0.0, 1.0)
@@ -348,10 +414,10 @@ def report(seen: Seen) -> str:
     coloured[~known] = 0
     pictures = {
         "what the camera saw, and the jaws: of the best grasp blue, of others white": with_grasps(
-            seen.frame, seen.perception.plan.grasps
+            seen.frame, p.plan.grasps, seen.gripper
         ),
         f"depth: {low:.2f} m (yellow) to {high:.2f} m (violet), black without a reading": coloured[..., ::-1],
-        "labels: targets orange, obstacles green": picture(seen.frame.rgb, seen.perception.labels),
+        "labels: targets orange, obstacles green": picture(seen.frame.rgb, p.labels, p.pixels),
     }
     rows = "".join(
         f"<tr><td>{number}</td><td>{grasp.target + 1}</td>"

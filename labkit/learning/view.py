@@ -35,14 +35,14 @@ class View:
     turns: int
     M: Float[np.ndarray, "2 3"]
 
-    def back(self, image: Float32[np.ndarray, "h w C"]) -> Float32[np.ndarray, "H W C"]:
-        """Bring numbers of the view's pixels, such as probabilities, to the picture's own pixels, bilinearly."""
+    def back(self, image: Float32[np.ndarray, "h w C"], how: int = cv2.INTER_LINEAR) -> Float32[np.ndarray, "H W C"]:
+        """Bring numbers of the view's pixels to the picture's own: bilinearly, or as OpenCV's flag `how` says."""
         size = self.size if self.turns % 2 == 0 else self.size[::-1]
         to_view = cv2.invertAffineTransform(self.M)
         out = np.empty((*size[::-1], image.shape[2]), np.float32)
         for first in range(0, image.shape[2], 4):  # as many channels as OpenCV warps at a time
             part = np.ascontiguousarray(image[..., first : first + 4])
-            out[..., first : first + 4] = warped(part, to_view, size, cv2.INTER_LINEAR).reshape(*size[::-1], -1)
+            out[..., first : first + 4] = warped(part, to_view, size, how).reshape(*size[::-1], -1)
         return rot90(out, -self.turns)
 
 

@@ -17,6 +17,7 @@ from labkit.apps import perceive
 from labkit.apps.cli import app
 from labkit.apps.own_data import PictureFolder
 from labkit.geometry import back_project_to_base, project, transform_points
+from labkit.grasp import Gripper
 from labkit.labels import SURFACE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
@@ -106,16 +107,63 @@ def test_a_network_labels_the_picture_and_no_target_is_an_answer_with_a_reason(s
     assert json.loads((tmp_path / "grasps.json").read_text())["reason"] == "no target points"
 
 
+def targets_of(folder):
+    """The pixels of each target that a run wrote down, largest first."""
+    numbers = cv2.imread(str(folder / "targets.png"), cv2.IMREAD_UNCHANGED)
+    return [numbers == n for n in range(1, numbers.max() + 1)]
+
+
+def test_without_a_network_whatever_stands_on_the_table_is_a_target(shot, tmp_path):
+    done = run(shot, tmp_path, "--anything")
+    assert "best grasp" in done.output
+    found = targets_of(tmp_path)
+    large = [shot.frame.instances == n for n in np.unique(shot.frame.instances) if n]
+    large = [mask for mask in large if mask.sum() > 200]
+    hits = [max(np.sum(f & true) / np.sum(f | true) for f in found) > 0.5 for true in large]
+    assert sum(hits) >= len(large) - 1
+
+
+def test_a_mask_of_instances_gives_a_target_each_for_the_hand_and_the_workspace_that_are_given(shot, tmp_path):
+    mask = str(shot.folder / "instances.png")
+    cv2.imwrite(mask, shot.frame.instances)
+    run(shot, tmp_path, "--mask", mask, "--instances", "--gripper", "max_opening=0.03")
+    found = targets_of(tmp_path)
+    assert len(found) == len(np.unique(shot.frame.instances[shot.frame.instances > 0]))
+    assert all(len(np.unique(shot.frame.instances[target])) == 1 for target in found), "one object each"
+    said = json.loads((tmp_path / "grasps.json").read_text())
+    assert all(grasp["width"] <= 0.03 for grasp in said["grasps"])
+    run(shot, tmp_path, "--mask", mask, "--target", "2", "--workspace", "-9 9 -9 9 0.02 0.5")
+    (target,) = targets_of(tmp_path)
+    assert np.all(shot.frame.instances[target] == 2)
+    height = trimesh.load(tmp_path / "target_1.ply").vertices[:, 2]
+    assert height.min() > 0.02, "nothing below the workspace"
+
+
+def test_a_gripper_is_words_or_a_file(tmp_path):
+    file = tmp_path / "hand.json"
+    file.write_text('{"max_opening": 0.14, "palm_length": 0.22}')
+    assert perceive.read_gripper(str(file)) == perceive.read_gripper("max_opening=0.14, palm_length=0.22")
+    assert perceive.read_gripper("") == Gripper()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"options": ["--gripper", "wide"]}, 'gripper: expected "NAME=METRES ..." or a JSON file'),
+        ({"options": ["--gripper", "opening=0.1"]}, "gripper: expected measures of max_opening, pad_width"),
+        ({"options": ["--gripper", "max_opening=140"]}, "max_opening: expected metres above 0 and below 1"),
+        ({"options": ["--workspace", "0 1 0 1"]}, "workspace: expected six numbers"),
+        ({"options": ["--workspace", "1 0 0 1 0 1"]}, "workspace: expected from < to"),
+        ({"options": ["--instances"]}, "instances: expected --mask FILE"),
+        ({"options": ["--anything", "--target", "3"]}, "anything: expected neither --mask nor --target"),
+        ({"options": ["--target", "9"]}, "target_class: expected"),
         ({"color": "depth.png", "depth": "color.png"}, "swapped"),
         ({"depth": "mask.png"}, "depth: expected uint16"),
         ({"options": ["--depth-scale", "1.0"]}, "depth_scale: with 1 metres per unit the median depth"),
         ({"options": ["--depth-scale", "1e-6"]}, "0.001 is right for millimetres"),
         ({"color": "small.png"}, "align depth to colour"),
         ({"options": ["--mask", "small_mask.png"]}, "mask: expected the colour picture's size, 424 x 240, got"),
-        ({"options": ["--mask", "grey_mask.png"]}, "mask: expected 0 and one other value"),
+        ({"options": ["--mask", "grey_mask.png"]}, "--instances takes each for an object"),
         ({"K": "600 600 320"}, "intrinsics: expected"),
         ({"options": ["--camera-pose", "1 2 3"]}, "camera_pose: expected seven numbers"),
         ({"options": ["--plane", "auto", "--camera-pose", "0 0 1 1 0 0 0"]}, "plane: expected either"),
@@ -178,6 +226,9 @@ def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own):
     assert np.array_equal(frame.labels, shot.frame.labels) and np.array_equal(frame.rgb, shot.frame.rgb)
     z = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[frame.labels == SURFACE, 2]
     assert abs(np.nanmedian(z) - frame.table_z) < 0.002
+    shutil.copy(shot.folder / "mask.png", own / "mask" / "a.png")
+    labels, _ = perceive.read_mask(own / "mask" / "a.png", SIZE)
+    assert np.array_equal(PictureFolder(own)[0].labels, labels), "0 and 255 mean the same as in `labkit perceive`"
     cv2.imwrite(str(own / "mask" / "a.png"), np.where(shot.frame.labels == TARGET, 200, 0).astype(np.uint8))
     with pytest.raises(ValueError, match=r"mask: expected classes 0 to 3, or 255, in .*a\.png"):
         PictureFolder(own)[0]
