@@ -76,6 +76,7 @@ clean:
 # Training: what the shipped weights were made with. EPOCHS is each model's own number if it is not given.
 TRAIN_SCENES ?= 3000
 WIDE_SCENES ?= 1500
+ANY_SCENES ?= 1000
 VAL_SCENES ?= 120
 SIZE ?= 320x240
 WORKERS ?= 2
@@ -86,16 +87,16 @@ DEVICE ?= auto
 train: .venv/installed
 	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)
-	for config in wide any; do
-	    $(BIN)/python -m data_gen data/$$config --scenes $(WIDE_SCENES) --first-seed 0 --config $$config --size $(SIZE) --workers $(WORKERS)
-	done
+	$(BIN)/python -m data_gen data/wide --scenes $(WIDE_SCENES) --first-seed 0 --config wide --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/python -m data_gen data/any --scenes $(ANY_SCENES) --first-seed 0 --config any --size $(SIZE) --workers $(WORKERS)
 	for model in smallsegnet unet; do
 	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	done
 	rgbd="$(BIN)/labkit train --scenes $(WIDE_SCENES) --val data/val --device $(DEVICE) data/train"
 	$$rgbd data/wide --model unet_rgbd --epochs $(or $(EPOCHS),24)
 	$$rgbd data/wide --init data/runs/unet_rgbd.pt --epochs $(or $(EPOCHS),24) --lr 2e-3 --seed 1 --out data/runs/again
-	$$rgbd data/any --init data/runs/again/unet_rgbd.pt --epochs $(or $(EPOCHS),4) --lr 1e-3 --seed 2 --out data/runs/any
+	$(BIN)/labkit train data/any data/train --scenes $(ANY_SCENES) --init data/runs/again/unet_rgbd.pt --epochs $(or $(EPOCHS),40) \
+	    --lr 1.5e-3 --seed 2 --device $(DEVICE) --out data/runs/any
 	cp data/runs/{smallsegnet,unet}.pt data/runs/any/unet_rgbd.pt labkit/weights/
 	for model in smallsegnet unet; do $(BIN)/labkit export --model $$model --onnx labkit/weights/$$model.onnx; done
 

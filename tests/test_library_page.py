@@ -40,6 +40,7 @@ def own_files(tmp_path_factory):
             r"Plane\(.* mm\) at .*\nPerception\(.* grasps\)\nGraspPlan\(\d+ grasps, the best G",
         ),
         ("A model of your own", r"\(240, 320, 2\) \[0 1\]\nPerception\(.*\n\(240, 320, 21\) .*\nPerception\("),
+        ("An exported network in a program of your own", r"equal labels: (100.00|99.99)%"),
         ("A gripper of your own", r"GraspPlan\(no grasp: too wide .*\nGraspPlan\(10 grasps, the best Grasp\("),
         ("A loss of your own", r"\{'epoch': 2, 'steps': 4, 'loss': 0\.\d+, 'mean_iou': 0\.\d+, .*\}"),
         ("Data of your own", r"\{.*'loss': .*\}\n\[.*\]\nPerception\("),

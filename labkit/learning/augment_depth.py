@@ -15,23 +15,22 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
-from labkit.labels import IGNORE, OBSTACLE, TARGET
+from labkit.labels import OBSTACLE, TARGET
 from labkit.learning.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
 from labkit.learning.channels import geometry_channels, mirrored
+from labkit.learning.view import held
 
 
 def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generator) -> RGBDFrame:
     """The labelled frame of a camera that is zoomed, rolled about its axis and cut to a window of (h, w) pixels.
 
-    Rolling and zooming a camera that stays where it is moves pixels and changes no depth: pixel x of the new image
-    shows what K R K_new^-1 x of the old one did. Three windows in four lie round a place on an object: there is most to
-    learn. What lies outside the old image is labelled 255 and has no depth.
+    Three windows in four lie round a place on an object: there is most to learn. What lies outside the old image is
+    labelled 255 and has no depth.
     """
     h, w = size
     H, W = frame.labels.shape
     zoom = np.exp(rng.uniform(np.log(0.75), np.log(1.35)))
     roll = rng.uniform(-0.35, 0.35) if rng.random() < 0.5 else 0.0
-    R = Rotation.from_euler("z", roll).as_matrix()
     spare = np.maximum(0.0, np.array([W - w / zoom, H - h / zoom]) / 2.0)
     shift = spare * rng.uniform(-1.0, 1.0, 2)
     objects = np.flatnonzero((frame.labels == TARGET) | (frame.labels == OBSTACLE))
@@ -42,23 +41,9 @@ def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generato
     # The place that the middle of the window shows, such that the window stays inside the image if it fits.
     middle = np.array([W - 1, H - 1]) / 2.0 + np.clip(shift, -spare, spare)
     K_new = frame.K * np.array([[zoom, zoom, 1.0], [zoom, zoom, 1.0], [1.0, 1.0, 1.0]])
-    ray = R.T @ np.linalg.solve(frame.K, [*middle, 1.0])
+    ray = Rotation.from_euler("z", -roll).apply(np.linalg.solve(frame.K, [*middle, 1.0]))
     K_new[:2, 2] = np.array([w - 1, h - 1]) / 2.0 - K_new[:2, :2] @ ray[:2]
-    M = (frame.K @ R @ np.linalg.inv(K_new))[:2]
-
-    def warp(image, how: int, border: int, value: int = 0):
-        return cv2.warpAffine(image, M, (w, h), None, how | cv2.WARP_INVERSE_MAP, border, value)
-
-    T_new = frame.T_base_cam.copy()
-    T_new[:3, :3] = T_new[:3, :3] @ R
-    return replace(
-        frame,
-        rgb=warp(frame.rgb, cv2.INTER_LINEAR, cv2.BORDER_REPLICATE),
-        depth=warp(frame.depth, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT),
-        labels=warp(frame.labels, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT, IGNORE),
-        K=K_new,
-        T_base_cam=T_new,
-    )
+    return held(frame, roll, K_new, (w, h))
 
 
 def random_sensor(depth: Float[np.ndarray, "H W"], rng: np.random.Generator) -> Float[np.ndarray, "H W"]:
@@ -158,14 +143,16 @@ def augment_frames(
 ) -> tuple[Float[torch.Tensor, "N 3 h w"], Float[torch.Tensor, "N 7 h w"], UInt8[torch.Tensor, "N h w"]]:
     """Make a training batch of labelled frames: colours and geometry channels in 0..1, and labels.
 
+    One frame in four keeps its depth and calibration: a simulated camera is exact in both.
     first, whole: as for `labkit.learning.augment.augment`.
     """
     seed = int(torch.randint(2**62, (), generator=generator))
     rgb, geometry, y = [], [], []
     for i, frame in enumerate(frames, start=first):
         rng = np.random.default_rng([seed, i])
-        seen = random_size(random_calibration(random_view(frame, size, rng), rng), rng)
-        depth = random_sensor(seen.depth, rng)
+        seen, measured = random_view(frame, size, rng), rng.random() < 0.75
+        seen = random_size(random_calibration(seen, rng) if measured else seen, rng)
+        depth = random_sensor(seen.depth, rng) if measured else seen.depth
         images = seen.rgb, geometry_channels(depth, seen.K, seen.T_base_cam, 0.0), seen.labels[..., None]
         if rng.random() < 0.5:
             images = [mirrored(image) for image in images]

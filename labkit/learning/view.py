@@ -87,16 +87,10 @@ def canonical_view(frame: RGBDFrame, pixel: float = PIXEL) -> View | None:
     T = frame.T_base_cam.copy()
     T[:3, :3] = np.column_stack([R[:, :2] @ turn, R[:, 2]])
     size = tuple(size.astype(int).tolist())
-    view = RGBDFrame(
-        warped(smoothed(rgb, scale), M, size, cv2.INTER_LINEAR),
-        warped(depth, M, size, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT),
-        K=np.array([[f_view, 0.0, c_view[0]], [0.0, f_view, c_view[1]], [0.0, 0.0, 1.0]]),
-        T_base_cam=T,
-        labels=None
-        if frame.labels is None
-        else warped(rot90(frame.labels, turns), M, size, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT, IGNORE),
-        table_z=frame.table_z,
-    )
+    labels = None if frame.labels is None else rot90(frame.labels, turns)
+    rgb, depth, labels = resampled(rgb, depth, labels, M, size, scale)
+    K = np.array([[f_view, 0.0, c_view[0]], [0.0, f_view, c_view[1]], [0.0, 0.0, 1.0]])
+    view = RGBDFrame(rgb, depth, K, T, labels, table_z=frame.table_z)
     return View(view, frame.size, turns, M)
 
 
@@ -135,6 +129,32 @@ def table_pixel(depth: Float[np.ndarray, "H W"], A, c, down, height: float) -> f
     chosen = d[near if near.any() else known]
     middle = np.median(chosen) if chosen.size else np.nanmedian(np.where(depth > 0.0, depth, np.nan))
     return float(middle / np.sqrt(A[0, 0] * A[1, 1]))
+
+
+def held(frame: RGBDFrame, roll: float, K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> RGBDFrame:
+    """What the camera would see if it were rolled about its axis (radians), with another K and (width, height) `size`.
+
+    It stays where it is, so depth does not change: pixel x of the new picture shows what K R K_new^-1 x of the old one
+    did. Depth, and labels if known, are the nearest pixel's; beyond the old picture there is no depth, and labels are
+    255. Instances are left out.
+    """
+    turn = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
+    M = (frame.K @ turn @ np.linalg.inv(K))[:2]
+    scale = 1.0 / np.sqrt(np.linalg.det(M[:, :2]))
+    rgb, depth, labels = resampled(frame.rgb, frame.depth, frame.labels, M, size, scale)
+    T = frame.T_base_cam.copy()
+    T[:3, :3] = T[:3, :3] @ turn
+    return RGBDFrame(rgb, depth, K, T, labels, table_z=frame.table_z)
+
+
+def resampled(rgb, depth, labels, M, size: tuple[int, int], scale: float):
+    """Colours, depth and labels (or None) of another picture: `warped` as suits each. scale: its, to the old one's."""
+    nearest = cv2.INTER_NEAREST, cv2.BORDER_CONSTANT
+    return (
+        warped(smoothed(rgb, scale), M, size, cv2.INTER_LINEAR),
+        warped(depth, M, size, *nearest),
+        None if labels is None else warped(labels, M, size, *nearest, IGNORE),
+    )
 
 
 def smoothed(rgb, scale: float):

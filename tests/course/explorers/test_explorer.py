@@ -11,6 +11,7 @@ from scenes import random_frame
 
 from labkit.course.explorers import back_projection, class_weights, crf, gradient, grasp, iou, labels, node, stacks
 from labkit.course.explorers.explorer import Explorer
+from labkit.learning.network import UNetRGBD
 
 
 def probabilities(seed: int, shape: tuple[int, int] = (24, 32)) -> np.ndarray:
@@ -57,6 +58,7 @@ EXPLORERS = {
         lambda: stacks.colour_range(FRAME.rgb, FRAME.labels == 1),
         {"first": 30, "last": 90, "saturation": 120, "value": (40, 200)},
     ),
+    "camera_held": (lambda: stacks.camera_held(FRAME, UNetRGBD().eval()), {"roll": 45, "width": 640}),
     "memory": (lambda: stacks.memory(np.arange(12.0).reshape(2, 2, 3)), {"v": 1, "u": 2, "layout": "NCHW"}),
 }
 
