@@ -47,7 +47,9 @@ def main() -> str:
     draw(scores)
     tables = []
     for what, values in (("roll", ROLLS), ("width", WIDTHS)):
-        rows = [(name, *(f"{scores.get((name, what, x), np.nan):.3f}" for x in values)) for name in ways]
+        rows = [
+            (name, *(f"{scores.get((name, what, x), np.nan):.3f}".replace("nan", "") for x in values)) for name in ways
+        ]
         tables.append(table(f"target IoU, {what} | " + " | ".join(map(str, values)), rows))
     return "\n\n".join([*tables, clock(ways[IN_VIEW])])
 
