@@ -1,6 +1,7 @@
-"""Explorers of topic 06: clouds bent by the usual bugs, and what noise of pixel and depth does to a point."""
+"""Explorers of topic 06: clouds bent by the usual bugs, a point under noise, and a camera that is held otherwise."""
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import ipywidgets
 import numpy as np
@@ -8,10 +9,13 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from labkit.course.explorers.explorer import Explorer
+from labkit.course.explorers.explorer import Explorer, show
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_projection_noise, invert_transform, transform_points
-from labkit.labels import PALETTE
+from labkit.labels import CLASSES, PALETTE, TARGET, overlay
+from labkit.learning.network import TorchEngine
+from labkit.learning.view import held
+from labkit.metrics import confusion_matrix, iou
 
 BUGS = {
     "swapped": "u taken for the row",
@@ -152,3 +156,33 @@ def depth_noise(K: Float[np.ndarray, "3 3"], height: int, width: int) -> Explore
         "sigma_depth": ipywidgets.FloatSlider(10.0, min=0.0, max=25.0, step=1.0, description="noise (mm)"),
     }
     return Explorer(draw, controls, size=(8.0, 3.4), stills=({"u": width // 2}, {"u": width - 20}))
+
+
+def camera_held(frame: RGBDFrame, network) -> Explorer:
+    """Hold a frame's camera otherwise: what a network labels in the picture as it is, and in the canonical view.
+
+    network: states the size of a view's pixel. Controls: the camera's roll in degrees, the picture's width in pixels
+    (its field of view stays). The titles give the IoU of the target.
+    """
+    seeing = TorchEngine(network)
+    engines = {"as it is": TorchEngine(network, replace(seeing.takes, pixel=None)), "in the canonical view": seeing}
+
+    def draw(figure: Figure, roll: int, width: int) -> None:
+        scale = width / frame.size[0]
+        size = width, round(scale * frame.size[1])
+        K = np.diag([scale, scale, 1.0]) @ frame.K
+        K[:2, 2] += (scale - 1.0) / 2.0  # pixel centres lie at whole numbers
+        seen = held(frame, np.radians(roll), K, size)
+        picture, *others = figure.subplots(1, 3)
+        show(picture, seen.rgb, f"{size[0]} x {size[1]} pixels")
+        for axes, (name, engine) in zip(others, engines.items(), strict=True):
+            labels = engine.logits(seen).argmax(axis=0)
+            score = iou(confusion_matrix(seen.labels, labels, len(CLASSES)))[TARGET]
+            show(axes, overlay(seen.rgb, labels.astype(np.uint8), 0.65), f"{name}: {score:.2f}")
+
+    controls = {
+        "roll": ipywidgets.IntSlider(180, min=-180, max=180, step=15, description="roll (°)"),
+        "width": ipywidgets.SelectionSlider(options=[160, 320, 640, 1280], value=320, description="width"),
+    }
+    stills = ({"roll": 0, "width": 320}, {"roll": 180, "width": 320}, {"roll": 0, "width": 1280})
+    return Explorer(draw, controls, size=(8.5, 2.6), stills=stills)

@@ -1,7 +1,6 @@
-"""Explorers of topic 09: two stacks' masks, an HSV range by hand, one memory read twice, a camera held otherwise."""
+"""Explorers of topic 09: a wipe between two stacks' masks, an HSV range by hand, and one memory read in two ways."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import cv2
 import ipywidgets
@@ -11,10 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from labkit.course.explorers.explorer import Explorer, show
-from labkit.frame import RGBDFrame
-from labkit.labels import CLASSES, PALETTE, TARGET, overlay
-from labkit.learning.network import TorchEngine
-from labkit.learning.view import held
+from labkit.labels import CLASSES, PALETTE, overlay
 from labkit.metrics import confusion_matrix, iou
 from labkit.stacks.threshold import HSVRange, hsv_mask
 
@@ -127,33 +123,3 @@ def memory(scores: Float[np.ndarray, "C H W"]) -> Explorer:
         "layout": ipywidgets.ToggleButtons(options=["NCHW", "NHWC"], value="NHWC", description="read as"),
     }
     return Explorer(draw, controls, size=(8.5, 2.2))
-
-
-def camera_held(frame: RGBDFrame, network) -> Explorer:
-    """Hold a frame's camera otherwise: what a network labels in the picture as it is, and in the canonical view.
-
-    network: states the size of a view's pixel. Controls: the camera's roll in degrees, the picture's width in pixels
-    (its field of view stays). The titles give the IoU of the target.
-    """
-    seeing = TorchEngine(network)
-    engines = {"as it is": TorchEngine(network, replace(seeing.takes, pixel=None)), "in the canonical view": seeing}
-
-    def draw(figure: Figure, roll: int, width: int) -> None:
-        scale = width / frame.size[0]
-        size = width, round(scale * frame.size[1])
-        K = np.diag([scale, scale, 1.0]) @ frame.K
-        K[:2, 2] += (scale - 1.0) / 2.0  # pixel centres lie at whole numbers
-        seen = held(frame, np.radians(roll), K, size)
-        picture, *others = figure.subplots(1, 3)
-        show(picture, seen.rgb, f"{size[0]} x {size[1]} pixels")
-        for axes, (name, engine) in zip(others, engines.items(), strict=True):
-            labels = engine.logits(seen).argmax(axis=0)
-            score = iou(confusion_matrix(seen.labels, labels, len(CLASSES)))[TARGET]
-            show(axes, overlay(seen.rgb, labels.astype(np.uint8), 0.65), f"{name}: {score:.2f}")
-
-    controls = {
-        "roll": ipywidgets.IntSlider(180, min=-180, max=180, step=15, description="roll (°)"),
-        "width": ipywidgets.SelectionSlider(options=[160, 320, 640, 1280], value=320, description="width"),
-    }
-    stills = ({"roll": 0, "width": 320}, {"roll": 180, "width": 320}, {"roll": 0, "width": 1280})
-    return Explorer(draw, controls, size=(8.5, 2.6), stills=stills)

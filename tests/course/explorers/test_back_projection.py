@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from data_gen import render, sample_scene
 from labkit.course.explorers import back_projection as widgets
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, back_projection_noise, transform_points
+from labkit.learning.network import load_model, weights_path
 
 K = np.array([[60.0, 0.0, 33.0], [0.0, 66.0, 20.0], [0.0, 0.0, 1.0]])
 # The camera stands at (1, 0.2, 0.8) and looks at the base, tilted down.
@@ -93,3 +95,16 @@ def test_the_ellipse_lies_two_standard_deviations_out():
     widgets.draw_ellipse(axes, np.array([5.0, -1.0]), Sigma)
     off = axes.lines[0].get_xydata() - (5.0, -1.0)
     np.testing.assert_allclose(np.einsum("ni,ij,nj->n", off, np.linalg.inv(Sigma), off), 4.0)
+
+
+def test_the_canonical_view_holds_its_score_when_the_camera_is_turned_over():
+    frame = render(sample_scene(600006, "test"), (160, 120))
+    explorer = widgets.camera_held(frame, load_model(weights_path("unet_rgbd")))
+    scores = {}
+    for roll in (0, 180):
+        picture, *others = explorer.figure(roll=roll, width=160).axes
+        assert picture.get_title() == "160 x 120 pixels"
+        scores[roll] = [float(axes.get_title().split(": ")[1]) for axes in others]
+    as_it_is, in_view = zip(*(scores[roll] for roll in (0, 180)), strict=True)
+    assert as_it_is[1] < as_it_is[0] - 0.3 and in_view[1] == pytest.approx(in_view[0], abs=0.03)
+    assert np.array_equal(explorer.figure(roll=0, width=160).axes[0].images[0].get_array(), frame.rgb)

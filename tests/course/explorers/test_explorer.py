@@ -58,7 +58,7 @@ EXPLORERS = {
         lambda: stacks.colour_range(FRAME.rgb, FRAME.labels == 1),
         {"first": 30, "last": 90, "saturation": 120, "value": (40, 200)},
     ),
-    "camera_held": (lambda: stacks.camera_held(FRAME, UNetRGBD().eval()), {"roll": 45, "width": 640}),
+    "camera_held": (lambda: back_projection.camera_held(FRAME, UNetRGBD().eval()), {"roll": 45, "width": 640}),
     "memory": (lambda: stacks.memory(np.arange(12.0).reshape(2, 2, 3)), {"v": 1, "u": 2, "layout": "NCHW"}),
 }
 

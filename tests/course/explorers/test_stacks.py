@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from scenes import random_frame
 
-from data_gen import render, sample_scene
 from labkit.course.explorers import stacks
 from labkit.labels import overlay
 from labkit.learning.engines import labels_of_scores
-from labkit.learning.network import load_model, weights_path
 from labkit.stacks.threshold import HSVRange, hsv_mask
 
 
@@ -62,16 +60,3 @@ def test_the_right_layout_gives_the_right_label_and_the_other_does_not():
             wrong += not axes.get_title().endswith(f"label {labels[v, u]}")
             assert sum(patch.get_linewidth() == 3 for patch in axes.patches) == 3
     assert wrong >= 3
-
-
-def test_the_canonical_view_holds_its_score_when_the_camera_is_turned_over():
-    frame = render(sample_scene(600006, "test"), (160, 120))
-    explorer = stacks.camera_held(frame, load_model(weights_path("unet_rgbd")))
-    scores = {}
-    for roll in (0, 180):
-        picture, *others = explorer.figure(roll=roll, width=160).axes
-        assert picture.get_title() == "160 x 120 pixels"
-        scores[roll] = [float(axes.get_title().split(": ")[1]) for axes in others]
-    as_it_is, in_view = zip(*(scores[roll] for roll in (0, 180)), strict=True)
-    assert as_it_is[1] < as_it_is[0] - 0.3 and in_view[1] == pytest.approx(in_view[0], abs=0.03)
-    assert np.array_equal(explorer.figure(roll=0, width=160).axes[0].images[0].get_array(), frame.rgb)
