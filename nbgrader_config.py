@@ -1,9 +1,5 @@
 """nbgrader's configuration: this checkout is the course. What is graded goes to folders that git ignores."""
 
-from importlib.util import find_spec
-
-from nbconvert.exporters import HTMLExporter
-
 c = get_config()  # nbgrader defines it
 
 c.CourseDirectory.course_id = "labkit"
@@ -16,8 +12,3 @@ c.ZipCollectApp.collector_plugin = "labkit.course.grading.collect.LmsCollector"
 c.Autograde.exporter_class = "labkit.course.grading.refusal.GradedByLabkit"
 # Copies have rubrics for formgrader; nbgrader's feedback leaves them out.
 c.GenerateFeedback.exporter_class = "labkit.course.grading.refusal.FeedbackPages"
-# With `pip install jupyter-server-mathjax` formgrader's formulas need no network; feedback is read elsewhere.
-if find_spec("jupyter_server_mathjax"):
-    c.FeedbackPages.mathjax_url = HTMLExporter.mathjax_url.default_value
-    mathjax = "../../../static/jupyter_server_mathjax/MathJax.js"
-    c.HTMLExporter.mathjax_url = f"{mathjax}?config=TeX-AMS-MML_HTMLorMML-full,Safe"

@@ -14,6 +14,7 @@ from nbconvert.filters import markdown2html
 
 from labkit.course.grading import gradebook
 from labkit.course.grading.markdown import harmless_markdown
+from labkit.course.grading.refusal import SAYS
 from labkit.course.grading.run import grade_course
 
 ROOT = Path(__file__).parents[3]
@@ -144,15 +145,20 @@ def test_nothing_that_a_student_wrote_runs_in_formgrader(course, page, tmp_path)
     with gradebook.opened(course) as book:
         ids = {s: book.find_submission_notebook(TOPIC, TOPIC, s).id for s in ("eve", "raw")}
     with serving.jupyterlab(course, tmp_path / "jupyter") as url:
-        token = f"token={serving.TOKEN}"
-        attacked, asked = visit(page, f"{url}/formgrader/submissions/{ids['eve']}/?index=0&{token}")
+        page.set_extra_http_headers(
+            {"Authorization": f"token {serving.TOKEN}"}
+        )  # what pages ask for later needs it, too
+        attacked, asked = visit(page, f"{url}/formgrader/submissions/{ids['eve']}/?index=0")
         assert page.locator("#check_iou").count() == 1 and page.locator("text=onerror").count() > 0
         assert not attacked and not asked
         assert page.locator("text=one for the union").count() == 1 and page.locator("text=A model").count() == 0
         assert page.locator(".name-shown", has_text="Adams, Eve").count() > 0
-        for table in ("manage_submissions/04_iou", "gradebook/04_iou/04_iou", "manage_students"):
-            assert visit(page, f"{url}/formgrader/{table}?{token}") == (False, [])
-        visit(page, f"{url}/formgrader/submissions/{ids['raw']}/?index=0&{token}")
+        for table in ("gradebook/04_iou/04_iou", "manage_students", "manage_submissions/04_iou"):
+            assert visit(page, f"{url}/formgrader/{table}") == (False, [])
+            page.wait_for_selector("tbody tr:has-text('Adams, Eve'), tbody tr:has-text('Submission #')")
+        page.locator("tr", has_text="Adams, Eve").locator(".autograde a").click()  # the bolt
+        page.wait_for_selector(f".modal :text({SAYS.partition(';')[0]!r})")
+        visit(page, f"{url}/formgrader/submissions/{ids['raw']}/?index=0")
         page.wait_for_function("window.attacked === 1")  # so this test can fail
 
 
