@@ -10,14 +10,22 @@ from jaxtyping import Float, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, fit_plane
-from labkit.labels import CLASSES, SURFACE
+from labkit.labels import CLASSES, SURFACE, TARGET
 
 NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
 RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
 FLAT = 0.3  # share of the points near the table's height that lie on it, at least
-FAR = 1.6  # metres at which depth cameras do not see small things any more
+NEAREST, FAR = 0.15, 1.6  # metres from which, and up to which, depth cameras see small things
+TOP = 0.25  # metres: of a plane that is smaller, and over much else, nobody knows whether it is the table
+LONG = 0.12  # metres: longer things are seldom one thing to grasp
 SHIFT = 3  # pixels between colour and depth that go unnoticed
 REACH = 16  # pixels within which a shift is looked for
+USUAL = {  # from least to most, of 200 scenes of the kinds train, any, test and hard
+    "millimetres of the table per pixel": (1.1, 5.5),
+    "millimetres of noise on the table's depth": (0.0, 4.0),
+    "mean of the colours": (39, 190),
+    "mean saturation": (27, 232),
+}
 
 
 def notices(frame: RGBDFrame, perception=None, distortion=()) -> tuple[str, ...]:
@@ -40,8 +48,10 @@ def notices(frame: RGBDFrame, perception=None, distortion=()) -> tuple[str, ...]
         said += [*_table(frame, perception), _shifted(frame.rgb, frame.depth)]
     else:
         said += ["there is no depth: the picture is taken as it is, and nothing can be placed in space"]
+    if perception is not None or frame.labels is not None:
+        said += [_blind(frame, perception)]
     if perception is not None:
-        said += _targets(frame, perception)
+        said += _targets(perception)
     return tuple(sentence for sentence in said if sentence)
 
 
@@ -85,18 +95,43 @@ def _table(frame: RGBDFrame, perception) -> list[str]:
             f"the table that depth shows lies {1000.0 * rise:+.0f} mm off table_z = {table_z:.3f} m and leans by "
             f"{lean:.1f} degrees: {likely}"
         )
+    sides = np.sqrt(12.0 * np.linalg.eigvalsh(np.cov(P[plane.inliers, :2].T)))  # of a rectangle that spreads so
+    under = np.mean(P[:, 2] < table_z + rise - 0.02)
+    if sides[1] < TOP and under > 0.1:
+        said.append(
+            f"the plane taken for the table is {100.0 * sides[1]:.0f} x {100.0 * sides[0]:.0f} cm large, and "
+            f"{under:.0%} of the points around lie under it: is it the top of a box?"
+        )
     away = float(np.median(frame.depth[::step, ::step].reshape(-1)[near][plane.inliers]))
-    if away > FAR:
-        said.append(f"the table is {away:.2f} m away: is depth in another unit (depth_scale)?")
+    if not NEAREST < away < FAR:
+        said.append(
+            f"the table is {away:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
+        )
     if perception is not None and perception.probabilities is not None:
         labels = perception.labels[::step, ::step].reshape(-1)[near][plane.inliers]
         surface = np.mean(labels == SURFACE)
         if perception.probabilities.shape[2] == len(CLASSES) and surface < 0.5:
             said.append(
-                f"this picture is unlike the training's: {surface:.0%} of the table's pixels are called surface; depth "
-                f"is {1000.0 * plane.residual:.1f} mm off its plane (root mean square)"
+                f"this picture is unlike the training's: {surface:.0%} of the table's pixels are called surface; "
+                + _unusual(frame.rgb, 1000.0 * away / frame.K[0, 0], 1000.0 * plane.residual)
             )
     return said
+
+
+def _unusual(rgb: UInt8[np.ndarray, "H W 3"], pixel: float, noise: float) -> str:
+    """Say which of a picture's facts lie outside what the training's pictures have."""
+    facts = {
+        "millimetres of the table per pixel": pixel,
+        "millimetres of noise on the table's depth": noise,
+        "mean of the colours": rgb.mean(),
+        "mean saturation": cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[..., 1].mean(),
+    }
+    outside = [
+        f"{value:.1f} {what} (training's are {USUAL[what][0]} to {USUAL[what][1]})"
+        for what, value in facts.items()
+        if not USUAL[what][0] <= value <= USUAL[what][1]
+    ]
+    return ", ".join(outside) or "size of pixels, noise, brightness and saturation are as the training's"
 
 
 def _shifted(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"]) -> str:
@@ -122,15 +157,21 @@ def _shifted(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"]) -
     return f"depth lies ({-dx * step}, {-dy * step}) pixels off the colours: is it aligned to colour, of one moment?"
 
 
-def _targets(frame: RGBDFrame, perception) -> list[str]:
-    said = []
-    labelled = perception.labels == perception.target_class
-    blind = np.count_nonzero(labelled & ~(frame.depth > 0.0))
-    if blind > 0.5 * np.count_nonzero(labelled):
-        said.append(f"{blind} of {np.count_nonzero(labelled)} pixels labelled target have no depth")
-    w, h = frame.size
-    for number, pixels in enumerate(perception.pixels, start=1):
+def _blind(frame: RGBDFrame, perception) -> str:
+    labelled = frame.labels == TARGET if perception is None else perception.labels == perception.target_class
+    blind, count = np.count_nonzero(labelled & ~(frame.depth > 0.0)), np.count_nonzero(labelled)
+    return f"{blind} of {count} pixels labelled target have no depth" if blind > 0.5 * count else ""
+
+
+def _targets(perception) -> list[str]:
+    said, (w, h) = [], perception.frame.size
+    ways = np.radians(np.arange(0.0, 180.0, 10.0))
+    ways = np.stack([np.cos(ways), np.sin(ways)])
+    for number, (pixels, cloud) in enumerate(zip(perception.pixels, perception.clouds, strict=True), start=1):
         v, u = np.divmod(pixels, w)
         if u.min() == 0 or v.min() == 0 or u.max() == w - 1 or v.max() == h - 1:
             said.append(f"target {number} touches the picture's border: a part of it is unseen")
+        length = np.ptp(np.percentile(cloud[:, :2] @ ways, [1, 99], axis=0), axis=0).max()
+        if length > LONG:
+            said.append(f"target {number} is {100.0 * length:.0f} cm long: is it two things that touch?")
     return said

@@ -82,7 +82,18 @@ def test_noise_is_no_table(frame):
 
 def test_a_unit_that_puts_the_camera_far_over_its_own_table_is_noticed(frame):
     far, _ = perceive.on_table(replace(frame, depth=3.0 * frame.depth))
-    assert any("m away: is depth in another unit (depth_scale)?" in sentence for sentence in notices(far))
+    assert any("m away: is depth in another unit (depth_scale)" in sentence for sentence in notices(far))
+
+
+def test_the_top_of_a_box_that_fills_the_picture_is_not_taken_for_a_table_in_silence():
+    with World(scene(box("box", 0.5, 0.0, (0.18, 0.14, 0.06)))) as world:
+        seen = world.render()
+    v, u = np.nonzero(seen.instances == 1)
+    left, top = u.min() - 4, v.min() - 4
+    cut = np.s_[top : v.max() + 4, left : u.max() + 4]
+    K = seen.K - np.array([[0.0, 0.0, left], [0.0, 0.0, top], [0.0, 0.0, 0.0]])
+    part, _ = perceive.on_table(RGBDFrame(seen.rgb[cut], seen.depth[cut], K, np.eye(4)))
+    assert any(re.search(r"is \d+ x \d+ cm large, .*top of a box", sentence) for sentence in notices(part))
 
 
 def test_a_picture_unlike_the_trainings_is_told_by_its_table(frame):
@@ -93,18 +104,39 @@ def test_a_picture_unlike_the_trainings_is_told_by_its_table(frame):
 
     (said,) = Pipeline(model).run(frame).notices
     assert said.startswith("this picture is unlike the training's: 0% of the table's pixels are called surface")
+    assert said.endswith("are as the training's")
+    bright = replace(frame, rgb=np.full_like(frame.rgb, 250))
+    assert any(
+        "250.0 mean of the colours (training's are 39 to 190), 0.0 mean saturation" in sentence
+        for sentence in Pipeline(model).run(bright).notices
+    )
+    few = RGBDFrame(
+        frame.rgb[::8, ::8], frame.depth[::8, ::8], np.diag([0.125, 0.125, 1.0]) @ frame.K, frame.T_base_cam
+    )
+    assert any("millimetres of the table per pixel" in sentence for sentence in Pipeline(model).run(few).notices)
 
 
 def test_targets_without_depth_and_targets_at_the_border_are_noticed(frame):
     blind = replace(frame, depth=np.where(frame.labels == TARGET, np.float32(0.0), frame.depth))
     n = np.count_nonzero(frame.labels == TARGET)
     assert f"{n} of {n} pixels labelled target have no depth" in Pipeline().locate(blind, frame.labels).notices
+    assert f"{n} of {n} pixels labelled target have no depth" in notices(blind)
     columns = np.nonzero(frame.labels == TARGET)[1]
     for last, touches in ((columns.max(), True), (columns.max() + 2, False)):
         cut = np.s_[:, : last + 1]
         part = RGBDFrame(frame.rgb[cut], frame.depth[cut], frame.K, frame.T_base_cam, table_z=frame.table_z)
         found = Pipeline().locate(part, frame.labels[cut]).notices
         assert any("touches the picture's border: a part of it is unseen" in each for each in found) == touches
+
+
+def test_two_boxes_that_touch_and_were_one_target_are_noticed():
+    with World(
+        scene(box("left", 0.5, 0.05, (0.04, 0.08, 0.06)), box("right", 0.5, -0.031, (0.04, 0.08, 0.06)))
+    ) as world:
+        frame = world.render()
+    found = Pipeline().locate(frame, frame.labels)
+    assert len(found.clouds) == 1
+    assert any(re.search(r"target 1 is 1\d cm long: is it two things", sentence) for sentence in found.notices)
 
 
 def test_the_same_sentence_comes_from_the_pipeline_perceive_training_and_the_node(frame, tmp_path, capsys):

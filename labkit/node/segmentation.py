@@ -32,6 +32,7 @@ from labkit.node.messages import (
 )
 from labkit.node.sync import Synchronizer
 from labkit.node.transforms import TransformTree
+from labkit.notices import notices
 from labkit.pipeline import Perception, Pipeline
 from labkit.support.validation import check_T, require
 
@@ -147,7 +148,6 @@ class SegmentationNode:
         self._trouble, self._troubled_since = "", None
         self._requests: list[tuple[float, Callable[[bool, str], None]]] = []
         transport.on_restart(self.restart)
-        self._distortion_said = False
         self._notices, self._noticed = (), -np.inf  # of the last frame that was looked at twice, and when
         for output, kind in OUTPUTS.items():
             transport.advertise(getattr(topics, output), kind)
@@ -157,7 +157,7 @@ class SegmentationNode:
             else:
                 kind, check = Image, partial(convert.check_image, encodings=encodings)
             self._listen(stream, kind, partial(self._take, stream, check))
-        self._listen("info", CameraInfo, partial(self._take, "info", self._check_info))
+        self._listen("info", CameraInfo, partial(self._take, "info", convert.camera_matrix))
         for stream in ("tf", "tf_static") if self.T_base_cam is None else ():
             self._listen(stream, Transforms, partial(self._take_transforms, stream))
         transport.serve(topics.answer, self.request)
@@ -195,12 +195,6 @@ class SegmentationNode:
                     self._recent.append("dropped")
                 self._pending = (together, time.monotonic())
                 self._news.notify_all()
-
-    def _check_info(self, message: CameraInfo) -> None:
-        convert.camera_matrix(message)
-        if any(message.D) and not self._distortion_said:
-            self._distortion_said = True
-            logger.warning("%s: distortion is not undone; publish rectified images", self.topics.info)
 
     def _take_transforms(self, stream: str, message: Transforms) -> None:
         require("message", isinstance(message, Transforms), "Transforms", type(message).__name__)
@@ -284,7 +278,10 @@ class SegmentationNode:
             self._trouble, self._troubled_since = "", None
         plan, now = perception.plan, time.monotonic()
         if now - self._noticed > HEARTBEAT:  # what looks wrong seldom changes from frame to frame, and takes its time
-            self._notices, self._noticed = perception.notices, now
+            before, self._noticed = self._notices, now
+            self._notices = notices(perception.frame, perception, together["info"].D)
+            if self._notices and not before:
+                logger.warning("%s", "; ".join(self._notices))
         values = {
             "milliseconds": f"{1000.0 * (time.monotonic() - arrived):.2f}",
             "of these in the pipeline": f"{1000.0 * sum(perception.seconds.values()):.2f}",
