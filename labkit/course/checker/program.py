@@ -296,6 +296,7 @@ def is_check(node: ast.stmt) -> bool:
 # -------------------------------------------------------------------------------------------------- several cells
 
 
+@dataclass
 class Slice:
     """The slice of a notebook for one answer: the statements that give values to the names that it needs.
 
@@ -304,18 +305,15 @@ class Slice:
     are, but not for this task. Raises Refused where the answer cannot be graded.
     """
 
-    def __init__(
-        self,
-        cells: list[Parsed],
-        name: str,
-        blanks: Collection[str],
-        given: Mapping[str, str],
-        modules: Collection[str],
-        forbidden: Collection[str],
-        latest: bool,
-    ):
-        self.cells, self.name, self.blanks, self.given, self.latest = cells, name, blanks, given, latest
-        self.modules, self.forbidden = modules, forbidden
+    cells: list[Parsed]
+    name: str
+    blanks: Collection[str]
+    given: Mapping[str, str]
+    modules: Collection[str]
+    forbidden: Collection[str]
+    latest: bool
+
+    def __post_init__(self):
         self.home = self.home_of_answer()
         self.chosen: dict[int, set[int]] = {}  # positions of statements, by cell
         self.calls: dict[str, None] = {}  # other blanks, in the order in which they are met

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.checker.comparison import Case, Problem, canonical, differences, parts
+from labkit.course.checker.comparison import Case, Problem, canonical, differences, different, parts
 from labkit.course.checker.question import Question
 
 LONGEST = 100  # characters of a line
@@ -83,13 +83,7 @@ def first_difference(question: Question, expected: object, got: object) -> list[
             return [f"{name} has shape {g.shape}, expected {e.shape}"]
         (wrong,) = differences(question, *((e, g) if isinstance(expected, tuple) else canonical(question, e, g)))[:1]
         if wrong.shape != np.atleast_1d(e).shape:
-            wrong = ~np.isclose(
-                np.atleast_1d(g).astype(float),
-                np.atleast_1d(e).astype(float),
-                question.rtol,
-                question.atol,
-                equal_nan=True,
-            )
+            wrong = different(question, np.atleast_1d(e), np.atleast_1d(g))
         if wrong.any():
             at = tuple(int(i) for i in np.argwhere(wrong)[0])
             came, right = np.atleast_1d(g)[at], np.atleast_1d(e)[at]

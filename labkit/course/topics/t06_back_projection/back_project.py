@@ -3,7 +3,7 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, wrong
-from labkit.course.topics.t06_back_projection import K_of, camera
+from labkit.course.topics.t06_back_projection import K_SMALL, K_of, camera
 
 
 def back_project(depth, K):
@@ -27,12 +27,9 @@ QUESTION = Question(
     reference=back_project,
     inputs=_depth_image,
     by_hand=(
-        (np.array([[0.5, 0.0, 0.5]]), np.array([[2.0, 0.0, 1.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]])),
-        (
-            np.array([[2.0, np.nan], [1.0, 4.0], [0.0, 2.0]]),
-            np.array([[4.0, 0.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]),
-        ),
-        (np.array([[1.0, 2.0], [2.0, 4.0]]), np.array([[2.0, 0.0, 1.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]])),  # no holes
+        (np.array([[0.5, 0.0, 0.5]]), K_SMALL),
+        (np.array([[2.0, np.nan], [1.0, 4.0], [0.0, 2.0]]), K_of(4.0, 2.0, 0.0, 1.0)),
+        (np.array([[1.0, 2.0], [2.0, 4.0]]), K_SMALL),  # no holes
     ),
 )
 
