@@ -42,6 +42,11 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
+def steps(y):
+    """By how much the labels of pairs differ, in the type that labels have."""
+    return np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
+
+
 @wrong("What does agreement cost in the Potts model? Label everything alike: only unary costs may remain.")
 def spins(y, psi, weights):
     """Agreement is rewarded by w, disagreement costs w, as for spins of +1 and -1."""
@@ -51,9 +56,7 @@ def spins(y, psi, weights):
 @wrong("Classes have names, not sizes: a pair (0, 2) disagrees no more than a pair (0, 1).")
 def label_steps(y, psi, weights):
     """Labels subtracted as if they were numbers."""
-    y_as_numbers = y.astype(int)
-    steps = [np.abs(y_as_numbers - np.roll(y_as_numbers, (-down, -right), (0, 1))) for down, right in PAIRS]
-    return unary_part(y, psi) + (weights * np.stack(steps)).sum()
+    return unary_part(y, psi) + (weights * steps(y.astype(int))).sum()
 
 
 @wrong("The weight is paid where neighbours differ: what does an image of one label cost?")
@@ -116,8 +119,7 @@ def cheapest_classes(y, psi, weights):
 
 @wrong("A difference of bytes wraps round, 0 - 1 is 255; and only whether two labels differ counts.")
 def byte_steps(y, psi, weights):
-    steps = np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
-    return unary_part(y, psi) + (weights * steps).sum()
+    return unary_part(y, psi) + (weights * steps(y)).sum()
 
 
 @wrong("The last row and the last column have costs and pairs as well: how far do your loops go?")

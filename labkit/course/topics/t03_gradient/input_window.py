@@ -108,10 +108,8 @@ def outputs_of_a_pixel(kernels, strides, paddings, u):
 
 @wrong("A layer may have more or less padding than half its kernel: which argument says how much?")
 def padded_by_half_a_kernel(kernels, strides, paddings, u):
-    first = last = int(u)
-    for kernel, stride in np.transpose([kernels, strides])[::-1].tolist():
-        first, last = first * stride - kernel // 2, last * stride + kernel // 2
-    return first, last
+    half = kernels // 2
+    return input_window(2 * half + 1, strides, half, u)
 
 
 @wrong("Is your second number the place of the last pixel, or how many there are?")

@@ -73,8 +73,7 @@ def middle_of_three(Sigma):
 
 @wrong("For a cloud long in x the answer is 90 degrees, and yours is 0: which argument comes first in arctan2?")
 def yaw_with_x_and_y_swapped(Sigma):
-    x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, 0]
-    return np.arctan2(x, y)
+    return np.pi / 2 - closing_yaw(Sigma)
 
 
 @wrong("Turn the object by 10 degrees: your yaw turns by 20. The formula gives twice the angle.")

@@ -54,8 +54,7 @@ QUESTION = Question(
 
 
 def in_boxes(x, y, z, width, half, thickness, tips):
-    out = np.abs(y) - width / 2
-    return int(np.count_nonzero((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)))
+    return points_in_fingers(np.stack([x, y, z], axis=1), np.eye(4), width, half, thickness, tips)
 
 
 def moved(P, T):

@@ -86,11 +86,8 @@ def resize_tiled(labels, size):
 
 @wrong("The blob may have other proportions than the image: a factor for each side.")
 def resize_one_factor(labels, size):
-    W, H = size
-    h, w = labels.shape
-    factor = max(W // w, 1)
-    rows = np.minimum(np.arange(H) // factor, h - 1)
-    return labels[rows[:, None], np.minimum(np.arange(W) // factor, w - 1)]
+    factor = max(size[0] // labels.shape[1], 1)
+    return copied(labels, size[::-1], lambda i, n, old: np.minimum(i // factor, old - 1))
 
 
 @wrong("A centre exactly between two old pixels belongs to the second; np.round and np.rint take the even one.")
@@ -116,9 +113,8 @@ def resize_by_whole_factors(labels, size):
 
 @wrong("Rows have a factor of their own, h / H: yours go by that of the columns.")
 def resize_rows_as_columns(labels, size):
-    (W, H), (h, w) = size, labels.shape
-    rows, columns = ((2 * np.arange(n) + 1) * w // (2 * W) for n in (H, W))
-    return labels[np.minimum(rows, h - 1)[:, None], columns]
+    W, w = size[0], labels.shape[1]
+    return copied(labels, size[::-1], lambda i, n, old: np.minimum((2 * i + 1) * w // (2 * W), old - 1))
 
 
 @wrong("From 2 rows to 4, a new row takes half an old one: which of h and H multiplies, and which divides?")
