@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -43,15 +44,13 @@ class Story:
 
 def tell(spec: SceneSpec, model, size: tuple[int, int] = (320, 240), crf: bool | None = None) -> Story:
     """Run the chain on a scene with a network: look once, perceive, grasp, lift; film the arm meanwhile."""
-    seconds, film = {}, []
+    seconds, film, steps = {}, [], count()
     camera = Camera.looking_at((0.44, 0.0, spec.table.z + 0.13), 1.4, 0.75, 0.5, fov_y=0.52)
 
-    def record(world: World, every: int = round(1.0 / TIME_STEP / FILM_RATE)) -> None:
-        record.steps += 1
-        if record.steps % every == 0:
+    def record(world: World) -> None:
+        if next(steps) % round(1.0 / TIME_STEP / FILM_RATE) == 0:
             film.append(world.render(FILM_SIZE, camera, shadow=False).rgb)
 
-    record.steps = -1
     with timed(seconds, "scene"):
         world = World(spec)
     with world:

@@ -4,6 +4,7 @@ Besides the explorers: jaws seen from above, and a lift as a row of pictures.
 """
 
 from functools import lru_cache
+from itertools import count
 
 import ipywidgets
 import numpy as np
@@ -47,13 +48,11 @@ def film(world, camera: Camera, seconds: float = 0.4, size: tuple[int, int] = (2
     >>> len(pictures), pictures[0].shape
     (2, (6, 8, 3))
     """
-    pictures, due = [], [round(240 * seconds)]
+    pictures, steps = [], count(1)
 
     def look(world) -> None:
-        due[0] -= 1
-        if due[0] == 0:
+        if next(steps) % round(240 * seconds) == 0:
             pictures.append(world.render(size, camera).rgb)
-            due[0] = round(240 * seconds)
 
     world.observers.append(look)
     return pictures
