@@ -15,7 +15,7 @@ from labkit.labels import CLASSES, SURFACE, TARGET
 NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
 RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
 FLAT = 0.3  # share of the points near the table's height that lie on it, at least
-NEAREST, FAR = 0.15, 1.6  # metres from which, and up to which, depth cameras see small things
+NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see small things
 TOP = 0.25  # metres: of a plane that is smaller, and over much else, nobody knows whether it is the table
 LONG = 0.12  # metres: longer things are seldom one thing to grasp
 SHIFT = 3  # pixels between colour and depth that go unnoticed
@@ -149,7 +149,7 @@ def _shifted(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"]) -
     score = cv2.matchTemplate(colour, jumps, cv2.TM_CCORR)  # [REACH, REACH] is no shift
     score -= np.median(score)
     dy, dx = np.array(np.unravel_index(score.argmax(), score.shape)) - REACH
-    if max(abs(dx), abs(dy)) == REACH:  # no peak, but a slope
+    if max(abs(dx), abs(dy)) == REACH or score.max() < 4.0 * score.std():  # a slope, or noise, and no peak
         return ""
     here = score[REACH - 2 : REACH + 3, REACH - 2 : REACH + 3].max()
     if max(abs(dx), abs(dy)) * step <= SHIFT or score.max() < 1.15 * here:

@@ -74,15 +74,23 @@ def test_what_looks_wrong_is_said_with_its_numbers(frame, change, said):
     assert any(re.search(said, sentence) for sentence in found), found
 
 
+def test_noise_has_no_edges_that_could_be_shifted(frame):
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        rgb = rng.integers(0, 256, frame.rgb.shape, dtype=np.uint8)
+        assert notices(replace(frame, rgb=rgb)) == ()
+
+
 def test_noise_is_no_table(frame):
     rng = np.random.default_rng(0)
     noise = replace(frame, depth=(frame.depth + rng.uniform(-0.15, 0.15, frame.depth.shape)).astype(np.float32))
     assert any("lie on one plane: is it noise, or no table?" in sentence for sentence in notices(noise))
 
 
-def test_a_unit_that_puts_the_camera_far_over_its_own_table_is_noticed(frame):
-    far, _ = perceive.on_table(replace(frame, depth=3.0 * frame.depth))
-    assert any("m away: is depth in another unit (depth_scale)" in sentence for sentence in notices(far))
+def test_a_unit_that_puts_the_camera_far_from_its_own_table_or_close_to_it_is_noticed(frame):
+    for factor in (3.0, 0.2):
+        seen, _ = perceive.on_table(replace(frame, depth=factor * frame.depth))
+        assert any("m away: is depth in another unit (depth_scale)" in sentence for sentence in notices(seen))
 
 
 def test_the_top_of_a_box_that_fills_the_picture_is_not_taken_for_a_table_in_silence():
