@@ -114,7 +114,7 @@ def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     """A student's page."""
     title = escape(f"{lab.topic}: {record.student}")
     total = f"{record.points:g} of {sum(lab.points.values()):g} points for the functions"
-    by_hand = " What you wrote in words is graded by a person." if lab.written else ""
+    by_hand = " Answers in words stand at the end, once a person has graded them." if lab.written else ""
     parts = [f"<h1>{title}</h1>\n<p>{total}.{by_hand}</p>", warning_of([record])]
     if record.reason:
         parts.append(f'<p class="warning">This submission could not be graded: {escape(record.reason)}.</p>')

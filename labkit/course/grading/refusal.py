@@ -1,7 +1,8 @@
 """nbgrader's Autograde refuses: it would run students' code unprotected, and write its scores over the kit's.
 
 `nbgrader_config.py` names `GradedByLabkit`, so that the command and formgrader's button stop before they touch
-anything. For a course with another configuration the gradebook names `KERNEL`, which no machine has.
+anything. For a course with another configuration the gradebook names `KERNEL`, which no machine has. It names
+`FeedbackPages`, too, which keep rubrics from students.
 """
 
 from nbconvert.exporters import HTMLExporter
