@@ -99,10 +99,18 @@ def write(path: Path, content: dict) -> None:
     path.write_text(json.dumps(content))
 
 
+def other_answers(topic: str) -> dict[str, list[str]]:
+    """The alternatives of each question that need nothing that is forbidden, or not there where answers are graded."""
+    cells = {}
+    for name, question in of_topic(topic).items():
+        written = [as_cell(answer, name) for answer in alternatives(question)]
+        cells[name] = [cell for cell in written if not any(no in cell for no in ("cv2", *question.forbidden))]
+    return cells
+
+
 @functools.cache
 def _right_answers(topic: str) -> dict[str, str]:
-    cells = {name: [as_cell(a, name) for a in alternatives(q)] for name, q in of_topic(topic).items()}
-    return {name: next(cell for cell in written if "torch" not in cell) for name, written in cells.items()}
+    return {name: next(c for c in cells if "torch" not in c) for name, cells in other_answers(topic).items()}
 
 
 def right_answers(topic: str) -> dict[str, str]:
@@ -132,6 +140,8 @@ def descendants(pid: int) -> set[int]:
 
 def as_cell(function: Callable, name: str) -> str:
     """The source of a cell that defines a function under a name, with all that it needs of its own module."""
+    if text := getattr(function, "source", None):
+        return text
     done: dict[int, tuple[str, str]] = {}
     define(function, name, name, done)
     return "\n\n".join(dict.fromkeys(source for _, source in done.values())) + "\n"
@@ -253,7 +263,7 @@ def synthetic_class(topic: str) -> dict[str, tuple[dict[str, str], dict[str, boo
     questions = of_topic(topic)
     right = right_answers(topic)
     wrong = {name: [as_cell(m.answer, name) for m in q.misconceptions] for name, q in questions.items()}
-    other = {name: [as_cell(a, name) for a in alternatives(q)] for name, q in questions.items()}
+    other = other_answers(topic)
     for cells in other.values():
         cells.sort(key=lambda cell: "torch" not in cell)  # torch takes a second to load: all of it in one submission
     students = {"reference": (copied_answers(topic), dict.fromkeys(right, True))}

@@ -91,8 +91,8 @@ def grade(question: Question, extra: tuple[Callable, ...] = ()) -> Trial:
     """Grade the right and the wrong answers to a question under several seeds; extra: right ones beside its own."""
     cases = [expected_cases(question, seed) for seed in SEEDS]
     rng = np.random.default_rng(7)
-    right = {function.__name__: function for function in (question.reference, *extra)}
-    rejected = [said for title, answer in right.items() for said in objections(question, title, answer)]
+    right = (question.reference, *extra)
+    rejected = [said for answer in right for said in objections(question, answer)]
     accepted = [m.name for m in question.misconceptions if any(judge(question, m.answer, s).passed for s in SEEDS)]
     all_mutants = mutants(question.reference)
     survivors = [m for m in all_mutants if any(passes(question, m, of_seed) for of_seed in cases)]
@@ -104,8 +104,9 @@ def grade(question: Question, extra: tuple[Callable, ...] = ()) -> Trial:
     return Trial(len(right), wrong, tuple(rejected), tuple(accepted), tuple(equivalent))
 
 
-def objections(question: Question, title: str, answer) -> list[str]:
+def objections(question: Question, answer: Callable) -> list[str]:
     """What the judge has against an answer, under each seed."""
+    title = getattr(answer, "source", answer.__name__)
     verdicts = {seed: judge(question, answer, seed) for seed in SEEDS}
     return [f"{title}, seed {seed}: {v.problem} in {v.where}" for seed, v in verdicts.items() if not v.passed]
 

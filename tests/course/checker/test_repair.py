@@ -1,7 +1,7 @@
-"""Answers that readers of the labs gave: right ones pass; of wrong ones the marked place is where a change mends them.
+"""Wrong answers that readers of the labs gave: the marked place is where a change mends them.
 
-tests/data/right.json has right ones in unusual ways; tests/data/answers.json wrong ones, each with its question, what
-the reader thought, and what a good reply is: the kind of the sentence, and the marked parts with their lines' numbers.
+tests/data/answers.json has them, each with its question, what the reader thought, and what a good reply is: the kind of
+the sentence, and the marked parts with their lines' numbers.
 tests/data/refused.json has wrong ones that were right by mistake once, or whose hint, some words of which it has, came
 without a look at their program; of a question's listed mistakes none is among them.
 """
@@ -22,9 +22,8 @@ from labkit.course.checker.run import define, judge
 from labkit.course.topics import find
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
-ANSWERS, RIGHT, REFUSED = (
-    json.loads((Path(__file__).parents[2] / "data" / f"{name}.json").read_text())
-    for name in ("answers", "right", "refused")
+ANSWERS, REFUSED = (
+    json.loads((Path(__file__).parents[2] / "data" / f"{name}.json").read_text()) for name in ("answers", "refused")
 )
 UNSEEN = (101, 102, 103)  # seeds that repair does not try
 
@@ -80,11 +79,3 @@ def test_what_was_accepted_by_mistake_is_refused_and_what_was_only_counted_is_na
     first, *others = (judge(question, function, seed) for seed in (0, 1, 2, 16))
     assert not first.passed and not any(verdict.passed for verdict in others)
     assert answer["hint"] in (first.hint or "")
-
-
-@pytest.mark.parametrize("name", sorted({answer["question"] for answer in RIGHT}))
-def test_right_answers_pass_however_they_are_written(name):
-    for answer in RIGHT:
-        if answer["question"] == name:
-            function = define(Program(pieces_of(answer)), find(name).function)
-            assert judge(find(name), function, PUBLIC_SEED).passed, answer["how"]
