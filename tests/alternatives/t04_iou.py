@@ -11,21 +11,6 @@ def confusion_matrix__one_hot(y_true, y_pred, num_classes, ignore):
     return np.einsum("pi,pj->ij", Y[rows], Y[columns]).astype(np.int64)
 
 
-def confusion_matrix__loops(y_true, y_pred, num_classes, ignore):
-    n = np.zeros((num_classes, num_classes), np.int64)
-    for i, j in zip(y_true.ravel().tolist(), y_pred.ravel().tolist(), strict=True):
-        if i != ignore:
-            n[i, j] += 1
-    return n
-
-
-def iou__torch(n):
-    import torch
-
-    n = torch.as_tensor(n, dtype=torch.float32)
-    return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).numpy()
-
-
 def iou__loops(n):
     scores = []
     for c in range(len(n)):
@@ -34,13 +19,6 @@ def iou__loops(n):
         union = int(n[c, c]) + false_positive + false_negative
         scores.append(int(n[c, c]) / union if union else float("nan"))
     return np.array(scores)
-
-
-def mean_iou__torch(n_frames):
-    import torch
-
-    n = torch.as_tensor(n_frames).sum(0).to(torch.float32)
-    return (n.diag() / (n.sum(0) + n.sum(1) - n.diag())).nanmean().item()
 
 
 def mean_iou__loops(n_frames):
@@ -60,12 +38,6 @@ def merge_classes__blocks(n, group):
     return np.array([[n[np.ix_(rows, columns)].sum() for columns in classes] for rows in classes])
 
 
-def merge_classes__add_at(n, group):
-    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
-    np.add.at(merged, (group[:, None], group[None, :]), n)
-    return merged
-
-
 def trimap_band__one_class_at_a_time(y, width):
     window = (2 * width + 1, 2 * width + 1)
     near = []
@@ -73,11 +45,3 @@ def trimap_band__one_class_at_a_time(y, width):
         is_near = np.lib.stride_tricks.sliding_window_view(np.pad(y == c, width), window).any(axis=(-2, -1))
         near.append(is_near.astype(int))
     return (np.sum(near, axis=0) > 1) * (y != 255)
-
-
-def trimap_band__loops(y, width):
-    band = np.zeros(y.shape, bool)
-    for v, u in np.argwhere(y != 255):
-        window = y[max(v - width, 0) : v + width + 1, max(u - width, 0) : u + width + 1]
-        band[v, u] = len(set(window.ravel().tolist()) - {255}) > 1
-    return band

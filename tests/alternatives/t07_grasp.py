@@ -26,18 +26,6 @@ def grasp_pose__other_way_round(position, approach, closing):
     return grasp_pose__crossed(position, approach, -closing)
 
 
-def grasp_pose__torch(position, approach, closing):
-    import torch
-
-    z, y = (torch.from_numpy(np.ascontiguousarray(v)) for v in (approach, closing))
-    z = z / z.norm()
-    y = y - torch.dot(y, z) * z
-    y = y / y.norm()
-    T = torch.eye(4, dtype=torch.float64)
-    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = torch.linalg.cross(y, z), y, z, torch.as_tensor(position)
-    return T
-
-
 def slip_across__torch(T_base_grasp, middle):
     import torch
 

@@ -15,18 +15,6 @@ def pack_cloud__torch(P):
     return numbers.contiguous().view(torch.uint8).reshape(-1)
 
 
-def pair_stamps__torch(a, b, slop):
-    import torch
-
-    if len(b) == 0:
-        return torch.full((len(a),), -1)
-    apart = (torch.from_numpy(a.copy())[:, None] - torch.from_numpy(b.copy())[None, :]).abs()
-    of_a = (apart == apart.amin(dim=1, keepdim=True)).to(torch.int8).argmax(dim=1)
-    of_b = (apart == apart.amin(dim=0, keepdim=True)).to(torch.int8).argmax(dim=0)
-    kept = (of_b[of_a] == torch.arange(len(a))) & (apart.amin(dim=1) <= slop)
-    return torch.where(kept, of_a, -1)
-
-
 def pose_at__by_a_frame(stamps, positions, quaternions, t):
     """Go round the circle that a and the part of b at right angles to it span."""
     i, share = neighbours(stamps, t)

@@ -21,11 +21,6 @@ def engine_contract__without_the_best(reference, other, tolerance):
     return kept, 1.0 - same, np.count_nonzero(margin <= 2 * tolerance) / margin.size
 
 
-def enlarge__torch(labels, size):
-    image = torch.from_numpy(labels.astype(np.float64))[None, None]
-    return torch.nn.functional.interpolate(image, size[::-1], mode="nearest-exact")[0, 0].long()
-
-
 def hsv_mask__torch(hsv, lower, upper):
     x = torch.from_numpy(hsv.astype(np.int32))
     low, high = (torch.from_numpy(np.asarray(b).astype(np.int32)) for b in (lower, upper))
