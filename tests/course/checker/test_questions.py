@@ -216,15 +216,6 @@ def test_weak_cases_let_mutants_through_and_are_found_out():
     assert any("1 -> 0" in name for name in grade(rarely).false_accepts)
 
 
-def test_mutants_are_those_of_the_text_and_are_compiled():
-    found = {mutant.name: mutant.function for mutant in mutants(shares)}
-    assert {"line 3: 1 -> 0", "line 3: True -> False", "line 3: n.sum(axis=1, keepdims=True) -> n.sum(axis=1)"} <= set(
-        found
-    )
-    product = found["line 3: n / n.sum(axis=1, keepdims=True) -> n * n.sum(axis=1, keepdims=True)"]
-    assert product(np.array([[1.0, 3.0]])).tolist() == [[4.0, 12.0]]
-
-
 def test_error_rates_over_all_questions(capsys):
     """The two rates that a grade stands on, printed and bounded."""
     trials = {name: trial(name) for name in names()}
