@@ -124,7 +124,11 @@ def read_gripper(text: str) -> Gripper:
     """
     names = [measure.name for measure in fields(Gripper)]
     try:
-        words = json.loads(Path(text).read_text()) if Path(text).is_file() else text.replace(",", " ").split()
+        words = (
+            json.loads(Path(text).read_text(encoding="utf-8"))
+            if Path(text).is_file()
+            else text.replace(",", " ").split()
+        )
         given = words if isinstance(words, dict) else dict(word.split("=") for word in words)
         measures = {name: float(metres) for name, metres in given.items()}
     except (TypeError, ValueError):
