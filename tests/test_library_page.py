@@ -41,6 +41,10 @@ def own_files(tmp_path_factory):
         ),
         ("A model of your own", r"\(240, 320, 2\) \[0 1\]\nPerception\(.*\n\(240, 320, 21\) .*\nPerception\("),
         ("An exported network in a program of your own", r"equal labels: (100.00|99.99)%"),
+        (
+            "Things of your own",
+            r"Perception\(.* grasps\)\n(\d+) objects in truth, \d+ found\n(Perception\(.* grasps\)\n){2}",
+        ),
         ("A gripper of your own", r"GraspPlan\(no grasp: too wide .*\nGraspPlan\(10 grasps, the best Grasp\("),
         ("A loss of your own", r"\{'epoch': 2, 'steps': 4, 'loss': 0\.\d+, 'mean_iou': 0\.\d+, .*\}"),
         ("Data of your own", r"\{.*'loss': .*\}\n\[.*\]\nPerception\("),
