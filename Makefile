@@ -9,6 +9,8 @@
 #   make test-ros2  the tests of ROS 2, there
 #   make site    set up .venv-site, then a static site of lessons, labs, guides and reference in out/site
 #   make test-site  its links, its words for figures, and what axe-core says of it
+#   make hub     set up .venv-hub, then a JupyterHub for trying on this machine alone (docs/hub.md)
+#   make test-hub  three users through lab 04 on it, in Chromium
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make evidence write docs/evidence.md, README's promises and what shows them, from results that are there
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
@@ -20,7 +22,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site test-site
+.PHONY: demo test lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site test-site hub test-hub
 
 BIN := .venv/bin
 ARGS ?=
@@ -66,6 +68,12 @@ site: .venv-site/installed
 test-site: .venv-site/installed
 	.venv-site/bin/python -m pytest tests/test_site.py $(ARGS)
 
+hub: .venv-hub/installed
+	.venv-hub/bin/python -m jupyterhub -f deploy/try_hub.py $(ARGS)
+
+test-hub: .venv-hub/installed
+	.venv-hub/bin/python -m pytest tests/course/test_hub.py $(ARGS)
+
 everywhere: .venv/installed
 	$(BIN)/python tests/fresh/run --suite bookworm trixie $(ARGS)
 
@@ -103,8 +111,11 @@ train: .venv/installed
 # Environments, and the extras of pyproject.toml that each holds.
 .venv/installed: EXTRAS := course,instructor,stacks,cluster,test
 .venv/installed-lab: EXTRAS := course,stacks
+# What a laptop does not import is not compiled: half a minute and 300 MB less. A shared installation needs it all.
+.venv/installed-lab: MORE := --no-compile
 .venv-bench/installed: EXTRAS := course,instructor,stacks,cluster,test,bench
 .venv-site/installed: EXTRAS := course,instructor,stacks,cluster,test,site
+.venv-hub/installed: EXTRAS := course,instructor,stacks,test,hub
 .venv-ros2/installed: EXTRAS := stacks,test
 .venv-ros2/installed: MORE := -r constraints-ros2.txt
 .venv-ros2/installed: constraints-ros2.txt
@@ -112,7 +123,7 @@ train: .venv/installed
 # A file `installing` is there while an installation runs and becomes `installed` when it ends. One that was killed leaves
 # `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
 # A changed pyproject.toml or constraints.txt only installs the difference.
-.venv/installed .venv/installed-lab .venv-bench/installed .venv-site/installed .venv-ros2/installed: pyproject.toml constraints.txt
+.venv/installed .venv/installed-lab .venv-bench/installed .venv-site/installed .venv-ros2/installed .venv-hub/installed: pyproject.toml constraints.txt
 	@is_right='import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))'
 	for python in $(or $(PYTHON),python3.13 python3.12 python3.11 python3 python) ""; do
 	    if "$$python" -c "$$is_right" 2>/dev/null; then break; fi

@@ -1,4 +1,4 @@
-"""JupyterLab as a server on a free port, at nobody's home, for tests that look at its pages."""
+"""JupyterLab as a server on a free port, at nobody's home, and what tests do on its pages."""
 
 import os
 import socket
@@ -57,3 +57,31 @@ def wait_for(url: str, server: subprocess.Popen, log: Path) -> None:
         except (urllib.error.URLError, ConnectionError, TimeoutError):
             assert server.poll() is None and monotonic() < end, log.read_text()[-2000:]
             sleep(0.2)
+
+
+def open_page(page, url: str) -> None:
+    """Open a notebook without the side bar, and wait for its kernel."""
+    page.goto(url)
+    page.wait_for_selector(".jp-Notebook .jp-CodeCell")
+    page.wait_for_selector("#jp-main-statusbar :text('| Idle')")  # what is run earlier JupyterLab forgets
+    page.keyboard.press("Control+b")  # the side bar
+    page.wait_for_timeout(500)
+
+
+def menu(page, *entries: str) -> None:
+    """Choose an entry of JupyterLab's menus."""
+    page.click(f".lm-MenuBar-itemLabel:text-is('{entries[0]}')")
+    page.click(f".lm-Menu-itemLabel:text-is('{entries[1]}')")
+
+
+def cell_with(page, text: str):
+    """The code cell whose own text (not its output) holds a text."""
+    return page.locator(".jp-CodeCell").filter(has=page.locator(".jp-InputArea .cm-content", has_text=text)).first
+
+
+def wait_until_idle(page) -> None:
+    """Wait until no cell waits to be run."""
+    page.wait_for_function(
+        "() => ![...document.querySelectorAll('.jp-InputPrompt')].some(prompt => prompt.textContent.includes('*'))"
+        " && document.querySelector('.jp-Notebook-ExecutionIndicator').dataset.status === 'idle'"
+    )

@@ -10,7 +10,7 @@ from pathlib import Path
 import nbformat
 import pytest
 import serving
-from serving import TOKEN
+from serving import TOKEN, cell_with, menu, open_page, wait_until_idle
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,31 +30,8 @@ def jupyterlab(tmp_path_factory):
 
 
 def open_notebook(page, url: str, path: str) -> None:
-    """Open a notebook alone, without the side bar, and wait for its kernel."""
-    page.goto(f"{url}/lab/tree/{path}?token={TOKEN}&reset")
-    page.wait_for_selector(".jp-Notebook .jp-CodeCell")
-    page.wait_for_selector("#jp-main-statusbar :text('| Idle')")  # what is run earlier JupyterLab forgets
-    page.keyboard.press("Control+b")  # the side bar
-    page.wait_for_timeout(500)
-
-
-def menu(page, *entries: str) -> None:
-    """Choose an entry of JupyterLab's menus."""
-    page.click(f".lm-MenuBar-itemLabel:text-is('{entries[0]}')")
-    page.click(f".lm-Menu-itemLabel:text-is('{entries[1]}')")
-
-
-def cell_with(page, text: str):
-    """The code cell whose own text (not its output) holds a text."""
-    return page.locator(".jp-CodeCell").filter(has=page.locator(".jp-InputArea .cm-content", has_text=text)).first
-
-
-def wait_until_idle(page) -> None:
-    """Wait until no cell waits to be run."""
-    page.wait_for_function(
-        "() => ![...document.querySelectorAll('.jp-InputPrompt')].some(prompt => prompt.textContent.includes('*'))"
-        " && document.querySelector('.jp-Notebook-ExecutionIndicator').dataset.status === 'idle'"
-    )
+    """Open a notebook of the course alone, and wait for its kernel."""
+    open_page(page, f"{url}/lab/tree/{path}?token={TOKEN}&reset")
 
 
 @pytest.mark.parametrize("path, cell", [("lessons/04_iou.ipynb", "import"), ("labs/04_iou/04_iou.ipynb", "def iou(")])

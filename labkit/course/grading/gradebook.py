@@ -74,6 +74,11 @@ def write_gradebook(
                         continue
                     write_scores(gradebook, lab, record, submission, comments)
                     write_atomically(target, copied)
+                    # `nbgrader generate_feedback` copies them to the feedback, and release_feedback reads them there.
+                    files = {"timestamp.txt": submission.timestamp, "submission_secret.txt": submission.secret}
+                    for name, text in files.items():
+                        if text:
+                            write_atomically(target.with_name(name), text.encode())
                 gradebook.db.commit()
             except Exception as error:  # of one student: the others' scores are written all the same
                 gradebook.db.rollback()

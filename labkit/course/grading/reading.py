@@ -49,7 +49,8 @@ class Submission:
     """What a student handed in. code: all code cells; cells: source by grade id, of the answers and the written ones.
 
     reason: why it cannot be graded; "" if it can. outdated: tasks that were other ones in the lab that the student had,
-    with the version of the kit that released it. timestamp: what nbgrader's timestamp.txt beside the notebook says.
+    with the version of the kit that released it. timestamp and secret: what nbgrader's timestamp.txt and
+    submission_secret.txt beside the notebook say; nbgrader gives feedback back by them.
     """
 
     student: str
@@ -59,6 +60,7 @@ class Submission:
     digest: str = "unreadable"
     outdated: dict[str, str] = field(default_factory=dict)
     timestamp: str = ""
+    secret: str = ""
 
 
 class Unreadable(Exception):
@@ -138,7 +140,8 @@ def read_submission(place: Path, lab: Lab) -> Submission | None:
         return Submission(student, reason=str(reason), digest=digest)
     except OSError as error:
         return Submission(student, reason=f"it cannot be opened: {error.strerror}", digest=digest)
-    return Submission(student, code, cells, "", digest, outdated(content, lab), timestamp_beside(notebook))
+    beside = text_of(notebook.with_name("timestamp.txt")), text_of(notebook.with_name("submission_secret.txt"))
+    return Submission(student, code, cells, "", digest, outdated(content, lab), *beside)
 
 
 def outdated(notebook: dict, lab: Lab) -> dict[str, str]:
@@ -147,10 +150,10 @@ def outdated(notebook: dict, lab: Lab) -> dict[str, str]:
     return {name: version for name in lab.answers if name in tasks and tasks[name] != lab.tasks.get(name)}
 
 
-def timestamp_beside(notebook: Path) -> str:
-    """The text of timestamp.txt beside a notebook, "" if there is none that can be read."""
+def text_of(path: Path) -> str:
+    """The text of a small file beside a notebook, "" if there is none that can be read."""
     try:
-        return read_bytes(notebook.with_name("timestamp.txt"), 100).decode().strip()
+        return read_bytes(path, 200).decode().strip()
     except (OSError, UnicodeDecodeError, Unreadable):
         return ""
 

@@ -350,8 +350,11 @@ def test_what_can_not_be_read_any_more_loses_its_scores(course):
 def test_a_time_of_submission_is_kept(course):
     folder = course / "submitted" / "ada" / TOPIC
     (folder / "timestamp.txt").write_text("2026-03-01 12:00:00 UTC")
+    (folder / "submission_secret.txt").write_text("5c0e")
     (course / "submitted" / "ben" / TOPIC / "timestamp.txt").write_text("yesterday")
     grade(course)
+    copies = {path.name: path.read_text() for path in (course / "autograded" / "ada" / TOPIC).glob("*.txt")}
+    assert copies == {"timestamp.txt": "2026-03-01 12:00:00 UTC", "submission_secret.txt": "5c0e"}
     with gradebook.opened(course) as book:
         assert book.find_submission(TOPIC, "ada").timestamp.isoformat() == "2026-03-01T12:00:00"
         assert book.find_submission(TOPIC, "ben").timestamp is None
