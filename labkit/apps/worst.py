@@ -16,7 +16,7 @@ def worst(trials: Sequence[Trial], count: int) -> list[int]:
     >>> def trial(hit, missed, lifted):
     ...     counts = np.zeros((4, 4), int)
     ...     counts[2, 2], counts[2, 3] = hit, missed
-    ...     return Trial(1, counts, (), lifted, "", "mug")
+    ...     return Trial(1, counts, (counts[0], counts[1]), lifted, "", "mug")
     >>> worst([trial(3, 1, True), trial(9, 1, False), trial(1, 3, True), trial(1, 9, False)], 3)
     [3, 1, 2]
     """
