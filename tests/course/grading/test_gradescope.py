@@ -81,7 +81,7 @@ def in_their_image(place: Path) -> None:
         place,
         "/autograder",
     ]
-    command += ["--ro-bind", sysconfig.get_path("purelib"), "/site"]
+    command += ["--ro-bind", sysconfig.get_path("purelib"), "/site", "--tmpfs", "/usr/local"]
     command += [
         "--ro-bind",
         place / "python",
