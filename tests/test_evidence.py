@@ -48,6 +48,6 @@ def test_notebooks_quote_the_target_iou_that_was_measured():
     without, with_depth, trained = (
         f"{json.loads((ROOT / 'docs' / 'results' / f'{file}.json').read_text())['iou']['target']:.2f}" for file in files
     )
-    quoted = f"IoU is {without} without depth. With it, and the CRF of topic 02, it is {with_depth};"
-    assert quoted in (ROOT / "lessons" / "03_gradient.ipynb").read_text()
+    quoted = f"target's IoU is {without} for the U-Net, and {with_depth} for `unet_rgbd` with the CRF of topic 02"
+    assert quoted in (ROOT / "lessons" / "03_gradient_network.ipynb").read_text()
     assert f"target IoU is {trained}" in (ROOT / "labs" / "04_iou" / "04_iou.ipynb").read_text()
