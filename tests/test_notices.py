@@ -152,9 +152,8 @@ def test_the_same_sentence_comes_from_the_pipeline_perceive_training_and_the_nod
     sentence = "depth lies (12, 0) pixels off the colours: is it aligned to colour, of one moment?"
     assert sentence in Pipeline().locate(wrong, frame.labels).notices
 
-    seen = perceive.perceive(wrong, labels=frame.labels, T_base_cam=frame.T_base_cam, distortion=(0.1, 0.0))
+    seen = perceive.perceive(wrong, labels=frame.labels, T_base_cam=frame.T_base_cam)
     assert f"notice: {sentence}" in perceive.describe(seen).splitlines()
-    assert "notice: the lens's distortion, 0.1, 0, is not undone: rectify first" in perceive.describe(seen)
     assert sentence in perceive.grasps_json(seen)["notices"]
 
     depth = np.round(1000.0 * wrong.depth).astype(np.uint16)
@@ -191,3 +190,32 @@ def test_a_calibration_of_another_size_is_refused(frame, tmp_path):
     )
     camera = perceive.read_intrinsics(str(tmp_path / "ros.yaml"))
     assert camera.size == (320, 240) and camera.distortion[0] == 0.25 and camera.K[0, 2] == 160.0
+
+
+def test_a_lens_is_undone_before_anything_else(frame, tmp_path):
+    """Pictures bent by the lens's formula come back; labels of what the lens did not see are unknown."""
+    K, (k1, k2) = frame.K, (-0.3, 0.1)
+    v, u = np.indices(frame.depth.shape)
+    bent = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]])
+    straight = bent.copy()
+    for _ in range(100):  # the pinhole's ray of each pixel of the bent picture
+        r2 = (straight**2).sum(axis=0)
+        straight = bent / (1 + k1 * r2 + k2 * r2**2)
+    at = [(K[i, i] * straight[i] + K[i, 2]).astype(np.float32) for i in range(2)]
+    depth = np.round(1000 * frame.depth).astype(np.uint16)
+    for kind, image in {"color": frame.rgb[..., ::-1], "depth": depth, "mask": frame.labels}.items():
+        (tmp_path / kind).mkdir()
+        cv2.imwrite(str(tmp_path / kind / "a.png"), cv2.remap(image, *at, cv2.INTER_NEAREST))
+    facts = {"fx": K[0, 0], "fy": K[1, 1], "ppx": K[0, 2], "ppy": K[1, 2], "coeffs": [k1, k2, 0, 0, 0]}
+    (tmp_path / "camera.json").write_text(json.dumps(facts))
+
+    read = own_data.PictureFolder(tmp_path)[0]
+    inner = np.s_[20:-20, 20:-20]
+    assert (np.abs(read.depth - frame.depth)[inner] < 0.01).mean() > 0.97
+    assert (read.labels == frame.labels)[inner].mean() > 0.98
+    unbent = RGBDFrame(frame.rgb, frame.depth, K, np.eye(4))
+    assert np.abs(read.rgb.astype(float) - unbent.rgb)[inner].mean() < 4
+
+    (tmp_path / "camera.json").write_text(json.dumps(facts | {"model": "inverse_brown_conrady"}))
+    with pytest.raises(ValueError, match="got 5 of inverse_brown_conrady; rectify the pictures first"):
+        perceive.read_intrinsics(str(tmp_path / "camera.json"))

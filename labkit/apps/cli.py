@@ -275,10 +275,12 @@ def perceive(
     T_base_cam = Settings(camera_pose=camera_pose).T_base_cam()
     camera = own.read_intrinsics(intrinsics)
     frame = own.read_frame(color, depth, camera, depth_scale)
-    known = {"T_base_cam": T_base_cam, "table_z": table_z, "distortion": camera.distortion}
+    if camera.distortion:
+        typer.echo("the lens's distortion is undone first: what is written is of the rectified picture")
+    known = {"T_base_cam": T_base_cam, "table_z": table_z}
     known |= {"gripper": own.read_gripper(gripper), "workspace": own.read_workspace(workspace)}
     if mask is not None:
-        labels, numbers = own.read_mask(mask, frame.size, target, instances)
+        labels, numbers = own.read_mask(mask, frame.size, target, instances, camera)
         seen = own.perceive(frame, labels=labels, instances=numbers, **known)
     elif anything:
         seen = own.perceive(frame, on_the_table, **known)

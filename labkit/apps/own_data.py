@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from tqdm.auto import tqdm
 
-from labkit.apps.perceive import Intrinsics, on_table, read_frame, read_intrinsics
+from labkit.apps.perceive import Intrinsics, on_table, read_frame, read_intrinsics, rectify
 from labkit.frame import RGBDFrame, read_image
 from labkit.labels import CLASSES, IGNORE, TARGET
 from labkit.learning import ranks
@@ -48,7 +48,7 @@ class PictureFolder(Sequence):
                 why = f"{color} is left out: {error}"
                 _say(why)
                 continue
-            for sentence in notices(frame, distortion=self.camera.distortion):
+            for sentence in notices(frame):
                 _say(f"{color}: {sentence}")
             self.pictures.append(color)
             self.poses.append(frame.T_base_cam)
@@ -83,7 +83,7 @@ class PictureFolder(Sequence):
             )
         if values == [IGNORE]:
             raise ValueError(f"mask: expected a labelled pixel in {mask}, got {IGNORE} alone")
-        return replace(frame, labels=labels)
+        return replace(frame, labels=rectify(labels, self.camera, outside=IGNORE))
 
 
 def _say(sentence: str) -> None:

@@ -7,6 +7,7 @@ import base64
 import html
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
@@ -69,25 +70,26 @@ def read_intrinsics(text: str) -> Intrinsics:
     if not path.is_file():
         raise FileNotFoundError(f'intrinsics: expected "fx fy cx cy" or a file, got {text!r}')
     content = path.read_text(encoding="utf-8", errors="replace")
+    camera = None
     try:
-        return _from_json(json.loads(content))
+        camera = _from_json(json.loads(content))
     except json.JSONDecodeError:
         yaml = re.search(r"camera_matrix:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
         numbers = numbers_of(yaml[1] if yaml else content)
-        distortion = re.search(r"distortion_coefficients:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
+        lens = re.search(r"distortion_coefficients:.*?data:\s*\[(.*?)\]", content, re.DOTALL)
         sides = dict(re.findall(r"^image_(width|height):\s*(\d+)", content, re.MULTILINE))
-        facts = {
-            "size": (int(sides["width"]), int(sides["height"])) if len(sides) == 2 else None,
-            "distortion": tuple(numbers_of(distortion[1])) if distortion else (),
-        }
+        size = (int(sides["width"]), int(sides["height"])) if len(sides) == 2 else None
+        if len(numbers) in (4, 9):
+            camera = Intrinsics(_matrix(numbers), None, size, tuple(numbers_of(lens[1])) if lens else ())
     except (AttributeError, KeyError, TypeError, ValueError):
-        numbers = []
-    if len(numbers) not in (4, 9):
+        pass
+    if camera is None:
         raise ValueError(
             f"intrinsics: found no camera matrix in {path}; expected fx, fy, cx, cy (or ppx, ppy), cam_K, "
             "intrinsic_matrix, camera_matrix, or four or nine numbers"
         )
-    return Intrinsics(_matrix(numbers), **facts)
+    model = re.search(r'model"?:\s*"?([\w.]+)', content)
+    return replace(camera, distortion=_lens(camera.distortion, model[1] if model else ""))
 
 
 def _matrix(numbers: list[float]) -> Float[np.ndarray, "3 3"]:
@@ -112,6 +114,32 @@ def _from_json(facts: dict) -> Intrinsics:
     size = (int(facts["width"]), int(facts["height"])) if {"width", "height"} <= facts.keys() else None
     distortion = tuple(float(k) for k in facts.get("coeffs", ()))
     return Intrinsics(K, None if scale is None else 0.001 * float(scale), size, distortion)
+
+
+def _lens(coefficients: Sequence[float], model: str) -> tuple[float, ...]:
+    """Coefficients that `rectify` can undo; of a lens that does nothing, none."""
+    if not any(coefficients):
+        return ()
+    known = not re.search("inverse|equidistant|fisheye|kannala|theta", model, re.IGNORECASE)
+    if not known or len(coefficients) not in (4, 5, 8, 12, 14):
+        raise ValueError(
+            f"intrinsics: expected a lens of 4, 5, 8, 12 or 14 coefficients k1, k2, p1, p2, ... (plumb_bob), got "
+            f"{len(coefficients)} of {model or 'no named model'}; rectify the pictures first"
+        )
+    return tuple(coefficients)
+
+
+def rectify(image: np.ndarray, camera: Intrinsics, smooth: bool = False, outside: int = 0) -> np.ndarray:
+    """Undo the camera's lens: the picture, (H, W) or (H, W, 3), that a pinhole with the same K would have taken.
+
+    smooth: mix neighbours, for colours; depth and labels take the nearest pixel. outside: what stands where the lens
+    saw nothing. A picture of a lens without distortion is given back as it is. Topic 06.
+    """
+    if not camera.distortion:
+        return image
+    lens, size = np.array(camera.distortion), image.shape[1::-1]
+    maps = cv2.initUndistortRectifyMap(camera.K, lens, None, camera.K, size, cv2.CV_32FC1)
+    return cv2.remap(image, *maps, cv2.INTER_LINEAR if smooth else cv2.INTER_NEAREST, borderValue=(outside,) * 3)
 
 
 def read_gripper(text: str) -> Gripper:
@@ -148,15 +176,17 @@ def read_workspace(text: str) -> tuple[tuple[float, float], ...]:
     return tuple(zip(numbers[::2], numbers[1::2], strict=True))
 
 
-def read_mask(path, size: tuple[int, int], target: int | None = None, instances: bool = False):
+def read_mask(path, size: tuple[int, int], target: int | None = None, instances: bool = False, camera=None):
     """Read somebody's mask: labels, uint8 (H, W), and the numbers of the objects if it holds them, else None.
 
     0 and one other value, such as 255, mean "target"; other values are the kit's own classes. size: width and height
     that it must have. target: the value that means "target", whatever the others mean. instances: each value above 0 is
-    an object, and a target. Raises ValueError for an image of another kind or size, and for values that no class has.
+    an object, and a target. camera: whose lens is undone, as `read_frame` does. Raises ValueError for an image of
+    another kind or size, and for values that no class has.
     """
     mask = read_image("mask", path, np.uint8)
     require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
+    mask = mask if camera is None else rectify(mask, camera)
     values = np.unique(mask)
     if instances or target is not None or len(values[values > 0]) <= 1:
         chosen = mask > 0 if target is None else mask == target
@@ -171,7 +201,7 @@ def read_mask(path, size: tuple[int, int], target: int | None = None, instances:
 
 
 def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None = None) -> RGBDFrame:
-    """Read the two pictures as one frame, in the camera's own frame (T_base_cam is the identity).
+    """Read the two pictures as one frame, in the camera's own frame (T_base_cam is the identity), the lens undone.
 
     depth_scale: metres per unit of the depth file; if None, what the intrinsics' file says, or else 0.001. Raises
     ValueError with the likely cause if the files are swapped, their sizes differ, or the depths cannot be metres.
@@ -198,7 +228,8 @@ def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None =
             f"depth_scale: with {scale:g} metres per unit the median depth is {middle:.3g} m; the file's values are "
             f"around {np.median(raw[raw > 0]):.0f}: 0.001 is right for millimetres, 0.0001 for tenths of them"
         )
-    return RGBDFrame(rgb, metres, intrinsics.K, np.eye(4))
+    pictures = rectify(rgb, intrinsics, smooth=True), rectify(metres, intrinsics)
+    return RGBDFrame(*pictures, intrinsics.K, np.eye(4))
 
 
 def on_table(frame: RGBDFrame) -> tuple[RGBDFrame, Plane]:
@@ -252,7 +283,6 @@ def perceive(
     labels=None,
     T_base_cam=None,
     table_z: float = 0.0,
-    distortion=(),
     instances=None,
     gripper: Gripper | None = None,
     workspace=WORKSPACE,
@@ -262,9 +292,9 @@ def perceive(
 
     model: what a `Pipeline` takes, or None with somebody else's `labels`, and the `instances` among them if known.
     T_base_cam: the camera's pose; without it the largest plane of the depth picture is taken for the table, and
-    `table_z` for 0. distortion: the lens's coefficients, which are not undone, but noticed. gripper, workspace,
-    target_class: as in `Pipeline`; all that was seen over the table is the workspace, if none is given. Raises
-    ValueError if no plane can be found, or for an argument that does not fit. Topics 06 and 07.
+    `table_z` for 0. gripper, workspace, target_class: as in `Pipeline`; all that was seen over the table is the
+    workspace, if none is given. Raises ValueError if no plane can be found, or for an argument that does not fit.
+    Topics 06 and 07.
     """
     plane = None
     if T_base_cam is None:
@@ -273,7 +303,7 @@ def perceive(
         frame = replace(frame, T_base_cam=T_base_cam, table_z=table_z)
     pipeline = Pipeline(model, target_class=target_class, workspace=workspace, gripper=gripper)
     perception = pipeline.run(frame) if labels is None else pipeline.locate(frame, labels, instances=instances)
-    return Seen(frame, perception, notices(frame, perception, distortion), plane, gripper or Gripper())
+    return Seen(frame, perception, notices(frame, perception), plane, gripper or Gripper())
 
 
 def describe(seen: Seen) -> str:
