@@ -64,6 +64,7 @@ def test_a_missing_package_is_wrong_unless_only_an_extra_needs_it():
 def test_this_environment_has_every_package_at_its_pin():
     assert doctor.USERS.keys() == set(packages.metadata.metadata("labkit").get_all("Provides-Extra")) - {
         "bench",
+        "hub",
         "site",
     }
     findings = {finding.name: finding for finding in doctor.check_packages()}
