@@ -10,7 +10,7 @@ from tqdm.auto import tqdm
 
 from labkit.apps.perceive import Intrinsics, on_table, read_frame, read_intrinsics, rectify
 from labkit.frame import RGBDFrame, read_image
-from labkit.labels import CLASSES, IGNORE, TARGET
+from labkit.labels import CLASSES, IGNORE, SURFACE, TARGET
 from labkit.learning import ranks
 from labkit.notices import notices
 
@@ -59,6 +59,8 @@ class PictureFolder(Sequence):
         shares = zip(CLASSES, counts / max(1, counts[: len(CLASSES)].sum()), strict=False)
         shares = ", ".join(f"{name} {share:.1%}" for name, share in shares)
         _say(f"{self.folder}: {len(self.pictures)} of {len(found)} pictures; of the labelled pixels {shares}")
+        if not counts[SURFACE]:
+            _say(f"{self.folder}: no mask has a pixel of surface, 1: a table labelled 0 is learnt as background")
 
     def __len__(self) -> int:
         return len(self.pictures)

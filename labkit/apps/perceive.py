@@ -364,14 +364,16 @@ def view(seen: Seen) -> View:
     p, table_z = seen.perception, seen.frame.table_z or 0.0
     P, rgb = p.points.reshape(-1, 3), seen.frame.rgb.reshape(-1, 3)
     others = (P[:, 2] > table_z - TABLE_MARGIN) & (P[:, 2] < table_z + ROOM)
+    others = others if others.any() else np.isfinite(P[:, 2])  # a wrong unit or pose: nothing is near the table
     shown = np.concatenate(p.clouds or [P[others]] if others.any() else [np.zeros((1, 3))])
     low, high = np.percentile(shown, [1, 99], axis=0)
     middle, half = (low + high) / 2, (high - low) / 2 + AROUND
     others &= (p.labels.ravel() != p.target_class) & (np.abs(P - middle) < half).all(axis=1)
     others = np.flatnonzero(others)
     others = others[:: max(1, len(others) // MOST_POINTS)]
+    around = (P[others], rgb[others]) if len(others) else (middle[None], rgb[:1])  # a view is of one point at least
     shown = View(eye=tuple((seen.frame.T_base_cam[:3, 3] - middle).tolist()), height=560)
-    shown.points(P[others], "what the camera saw", rgb[others], 1.5)
+    shown.points(around[0], "what the camera saw", around[1], 1.5)
     for number, cloud in enumerate(p.clouds, start=1):
         some = cloud[:: max(1, len(cloud) // 3000)]
         shown.points(some, f"target {number}", to_hex(PALETTE[TARGET] / 255), 2.5)

@@ -107,6 +107,14 @@ def test_a_network_labels_the_picture_and_no_target_is_an_answer_with_a_reason(s
     assert json.loads((tmp_path / "grasps.json").read_text())["reason"] == "no target points"
 
 
+def test_where_nothing_is_near_the_table_a_report_says_so(shot, tmp_path):
+    """As with a depth unit that is four times too large: the picture and the notice are what its user needs."""
+    pose = "0.5 0 0.8 1 0 0 0"
+    done = run(shot, tmp_path, "--anything", "--camera-pose", pose, "--table-z", "2.5")
+    assert done.exit_code == 0 and "notice: only 0% of the picture has depth within 0.25 m" in done.output
+    assert json.loads((tmp_path / "grasps.json").read_text())["grasps"] == [] and (tmp_path / "report.html").is_file()
+
+
 def targets_of(folder):
     """The pixels of each target that a run wrote down, largest first."""
     numbers = cv2.imread(str(folder / "targets.png"), cv2.IMREAD_UNCHANGED)
@@ -220,7 +228,7 @@ def own(shot, tmp_path):
     return tmp_path
 
 
-def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own):
+def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own, capsys):
     """Frames with labels, on a table that was found where it is."""
     (frame,) = PictureFolder(own)[:]
     assert np.array_equal(frame.labels, shot.frame.labels) and np.array_equal(frame.rgb, shot.frame.rgb)
@@ -228,7 +236,9 @@ def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own):
     assert abs(np.nanmedian(z) - frame.table_z) < 0.002
     shutil.copy(shot.folder / "mask.png", own / "mask" / "a.png")
     labels, _ = perceive.read_mask(own / "mask" / "a.png", SIZE)
+    assert "no mask has a pixel of surface" not in capsys.readouterr().err
     assert np.array_equal(PictureFolder(own)[0].labels, labels), "0 and 255 mean the same as in `labkit perceive`"
+    assert "no mask has a pixel of surface, 1: a table labelled 0 is learnt as background" in capsys.readouterr().err
     cv2.imwrite(str(own / "mask" / "a.png"), np.where(shot.frame.labels == TARGET, 200, 0).astype(np.uint8))
     with pytest.raises(ValueError, match=r"mask: expected classes 0 to 3, or 255, in .*a\.png"):
         PictureFolder(own)[0]
