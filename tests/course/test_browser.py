@@ -150,7 +150,7 @@ def test_every_explorers_labels_are_read_in_full_and_pressed_pixels_have_the_thi
 
 def test_the_view_in_lesson_08_turns_when_it_is_dragged(jupyterlab, page, tmp_path):
     """Without a kernel: a still picture, until the mouse is over it."""
-    open_notebook(page, jupyterlab, "lessons/08_node.ipynb")
+    open_notebook(page, jupyterlab, "lessons/08_node_time.ipynb")
     view = page.locator(".jp-RenderedPlotly")
     view.locator("img").hover(force=True)
     view.locator("canvas").first.wait_for(state="attached")
