@@ -14,7 +14,9 @@ from labkit.labels import CLASSES, SURFACE, TARGET
 
 NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
 RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
+UNITS = (0.001, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 1000.0)  # by which depth is often wrong
 FLAT = 0.3  # share of the points near the table's height that lie on it, at least
+OFF = 0.2  # of half the picture's width or height: where the principal point of a calibrated camera may lie
 NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see small things
 TOP = 0.25  # metres: of a plane that is smaller, and over much else, nobody knows whether it is the table
 LONG = 0.12  # metres: longer things are seldom one thing to grasp
@@ -60,7 +62,7 @@ def _principal_point(K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> str:
     where = f"the principal point ({cx:.1f}, {cy:.1f}) lies"
     if not (0.0 <= cx <= w - 1 and 0.0 <= cy <= h - 1):
         return f"{where} outside the picture of {w} x {h}: is the calibration another picture's?"
-    if abs(2.0 * cx / w - 1.0) > 0.4 or abs(2.0 * cy / h - 1.0) > 0.4:
+    if abs(2.0 * cx / w - 1.0) > OFF or abs(2.0 * cy / h - 1.0) > OFF:
         return (
             f"{where} far from the middle of the picture of {w} x {h}: is the calibration one of "
             f"{round(2.0 * cx)} x {round(2.0 * cy)}?"
@@ -79,7 +81,8 @@ def _table(frame: RGBDFrame, perception) -> list[str]:
     near = np.abs(points[:, 2] - table_z) < NEAR  # NaN is not near
     P = points[near]
     if len(P) < 100:
-        return [f"only {len(P) / len(points):.0%} of the picture has depth within {NEAR} m of the table's height"]
+        said = f"only {len(P) / len(points):.0%} of the picture has depth within {NEAR} m of the table's height"
+        return [said + _unit(points[np.isfinite(points[:, 2])], frame.T_base_cam[:3, 3], table_z)]
     try:
         plane = fit_plane(P, tries=100, viewer=(0.0, 0.0, 1e3))
     except ValueError:  # points on a line
@@ -107,7 +110,7 @@ def _table(frame: RGBDFrame, perception) -> list[str]:
         said.append(
             f"the table is {away:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
         )
-    if perception is not None and perception.probabilities is not None:
+    if not said and perception is not None and perception.probabilities is not None:
         labels = perception.labels[::step, ::step].reshape(-1)[near][plane.inliers]
         surface = np.mean(labels == SURFACE)
         if perception.probabilities.shape[2] == len(CLASSES) and surface < 0.5:
@@ -116,6 +119,15 @@ def _table(frame: RGBDFrame, perception) -> list[str]:
                 + _unusual(frame.rgb, 1000.0 * away / frame.K[0, 0], 1000.0 * plane.residual)
             )
     return said
+
+
+def _unit(points: Float[np.ndarray, "N 3"], camera: Float[np.ndarray, "3"], table_z: float) -> str:
+    """Say by which usual factor depth is wrong, if most points then lie on the table."""
+    for factor in UNITS:
+        z = camera[2] + factor * (points[:, 2] - camera[2])
+        if np.mean(np.abs(z - table_z) < RISE) > 0.5:
+            return f"; of depth times {factor:g} most lies on the table: is depth_scale wrong?"
+    return ""
 
 
 def _unusual(rgb: UInt8[np.ndarray, "H W 3"], pixel: float, noise: float) -> str:

@@ -18,6 +18,8 @@ from labkit.node.messages import (
     ROS_TOPICS,
     CameraInfo,
     CompressedImage,
+    Detection,
+    Detections,
     Diagnostics,
     Header,
     Image,
@@ -34,13 +36,15 @@ ROOT = Path(__file__).parents[1]
 PATIENCE = 120.0  # seconds: a node that starts beside a whole suite compiles slowly
 MS = 1_000_000
 KINDS = {"mask": Image, "cloud": PointCloud2, "grasp": Pose, "diagnostics": Diagnostics}
+GRASP = Pose(Header(5, "base_link"), (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))
 MESSAGES = [
     convert.encode_image(np.arange(24, dtype=np.uint8).reshape(2, 4, 3), "rgb8", Header(10**18 + 1, "camera")),
     CameraInfo(Header(5, "camera"), 2, 4, (9.0, 0.0, 2.0, 0.0, 8.0, 1.0, 0.0, 0.0, 1.0), (0.1,) * 5),
     convert.encode_cloud(np.eye(3), Header(5, "base_link")),
     CompressedImage(Header(5, "camera"), "rgb8; jpeg compressed bgr8", b"bytes of a file"),
-    Pose(Header(5, "base_link"), (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8)),
-    PoseArray(Header(5, "base_link"), (Pose(Header(5, "base_link"), (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8)),) * 2),
+    GRASP,
+    PoseArray(GRASP.header, (GRASP,) * 2),
+    Detections(GRASP.header, (Detection("target 1", 0.5, GRASP, (0.1, 0.2, 0.3), (0.04, 0.05, 0.06)),)),
     Transforms((Transform(Header(5, "base_link"), "camera", (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8)),)),
     JointState(Header(5, "base_link"), ("left", "right"), (0.02, 0.02)),
     Diagnostics(Header(5), "node", 1, "words", {"answered": "3"}),

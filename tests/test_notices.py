@@ -60,14 +60,30 @@ def test_nothing_is_said_of_a_calibrated_picture(frame, sensor):
         (lambda f: moved(f, up=-0.02), r"lies -20 mm off table_z .* table_z is likely -0\.020 m"),
         (lambda f: moved(f, degrees=10.0), r"leans by (9\.9|10\.0) degrees: T_base_cam is likely wrong"),
         (lambda f: replace(f, table_z=0.05), r"lies -50 mm off table_z = 0\.050 m .* table_z is likely 0\.000 m"),
-        (lambda f: replace(f, depth=4.0 * f.depth), r"only \d+% of the picture has depth within 0\.25 m"),
+        (
+            lambda f: replace(f, depth=4.0 * f.depth),
+            r"only \d+% of the picture has depth within 0\.25 m .* of depth times 0\.25 most lies on the table",
+        ),
         (lambda f: shifted(f, 12, 0), r"depth lies \(12, 0\) pixels off the colours"),
         (lambda f: shifted(f, 0, -5), r"depth lies \(0, -5\) pixels off the colours"),
         (lambda f: replace(f, K=f.K + np.outer([1, 0, 0], [0, 0, 200.0])), r"outside the picture of 320 x 240"),
         (lambda f: replace(f, K=np.diag([0.5, 0.5, 1.0]) @ f.K), r"\(80\.0, 59\.5\) lies far .*one of 160 x 119\?"),
+        (lambda f: replace(f, K=np.diag([0.75, 0.75, 1.0]) @ f.K), r"\(120\.0, 89\.2\) lies far .*one of 240 x 178\?"),
         (lambda f: replace(f, depth=np.zeros_like(f.depth)), r"there is no depth: the picture is taken as it is"),
     ],
-    ids=["up", "down", "leaning", "table_z", "unit", "shift", "shift_up", "outside", "half_size", "no_depth"],
+    ids=[
+        "up",
+        "down",
+        "leaning",
+        "table_z",
+        "unit",
+        "shift",
+        "shift_up",
+        "outside",
+        "half_size",
+        "three_quarters",
+        "no_depth",
+    ],
 )
 def test_what_looks_wrong_is_said_with_its_numbers(frame, change, said):
     found = notices(change(frame))
@@ -113,6 +129,8 @@ def test_a_picture_unlike_the_trainings_is_told_by_its_table(frame):
     (said,) = Pipeline(model).run(frame).notices
     assert said.startswith("this picture is unlike the training's: 0% of the table's pixels are called surface")
     assert said.endswith("are as the training's")
+    (said,) = Pipeline(model).run(moved(frame, up=0.02)).notices  # which alone can be why
+    assert "table_z is likely 0.020 m" in said
     bright = replace(frame, rgb=np.full_like(frame.rgb, 250))
     assert any(
         "250.0 mean of the colours (training's are 39 to 190), 0.0 mean saturation" in sentence

@@ -55,7 +55,7 @@ class BagWriter(Transport):
 
     def advertise(self, topic: str, kind: type) -> None:
         """Prepare a topic, so that it is in the bag even without messages."""
-        if topic not in self._connections:
+        if topic not in self._connections and self._wire.knows(kind):
             # What `ros2 bag play` shall offer: static transforms also to those who come late.
             durability = QosDurability.TRANSIENT_LOCAL if topic.endswith("/tf_static") else QosDurability.VOLATILE
             qos = {} if self._wire.ros1 else {"offered_qos_profiles": [Qos(*KEPT, durability, *ALWAYS)]}

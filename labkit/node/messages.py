@@ -97,6 +97,28 @@ class PoseArray:
 
 
 @dataclass(frozen=True)
+class Detection:
+    """A grasp of one thing: the thing's name, how good the grasp is, its pose, and the thing's box.
+
+    score: 0 to 1. centre, size: of a box along the header's axes, metres.
+    """
+
+    name: str
+    score: float
+    grasp: Pose
+    centre: tuple[float, ...]
+    size: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Detections:
+    """Grasps with what they hold, in the header's frame. ROS 2: vision_msgs/Detection3DArray; ROS 1's is another."""
+
+    header: Header
+    detections: tuple[Detection, ...]
+
+
+@dataclass(frozen=True)
 class Transform:
     """Where the frame child_frame_id stands in the header's frame: it maps the child's coordinates to the parent's.
 
@@ -136,7 +158,18 @@ class Diagnostics:
     values: dict[str, str] = field(default_factory=dict)
 
 
-Message = Image | CompressedImage | CameraInfo | PointCloud2 | Pose | PoseArray | Transforms | JointState | Diagnostics
+Message = (
+    Image
+    | CompressedImage
+    | CameraInfo
+    | PointCloud2
+    | Pose
+    | PoseArray
+    | Detections
+    | Transforms
+    | JointState
+    | Diagnostics
+)
 
 
 @dataclass(frozen=True)
@@ -158,6 +191,7 @@ class Topics:
     grasp: str = "/segmentation/grasp"
     grasps: str = "/segmentation/grasps"
     scores: str = "/segmentation/grasp_scores"
+    detections: str = "/segmentation/grasp_detections"
     gripper: str = "/segmentation/gripper"
     scene: str = "/segmentation/scene_cloud"
     answer: str = "/segmentation/answer"

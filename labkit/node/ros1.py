@@ -77,7 +77,8 @@ class Ros1Transport(Transport):
 
     def advertise(self, topic: str, kind: type) -> None:
         """Tell the master that messages of the class `kind` come from here."""
-        self._publishers[topic] = self._rospy.Publisher(topic, self._message_class(TYPES[kind]), queue_size=QUEUE)
+        if self._wire.knows(kind):
+            self._publishers[topic] = self._rospy.Publisher(topic, self._message_class(TYPES[kind]), queue_size=QUEUE)
 
     def publish(self, topic: str, message: Message) -> None:
         """Send a message to all who listen; they get it from a thread of rospy's, so this does not wait for them."""
@@ -99,7 +100,7 @@ class Ros1Transport(Transport):
 
     def wanted(self, topic: str) -> bool:
         """Whether any node listens."""
-        return self._publishers[topic].get_num_connections() > 0
+        return topic in self._publishers and self._publishers[topic].get_num_connections() > 0
 
     def resolve(self, topic: str) -> str:
         """Give the name that a topic has after remapping."""

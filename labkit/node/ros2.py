@@ -5,7 +5,7 @@ which `Wire` reads and writes: that is faster than rclpy's own classes, and a me
 one message and not of a thread.
 """
 
-import importlib
+import importlib.util
 import logging
 import os
 import threading
@@ -122,7 +122,9 @@ class Ros2Transport(Transport):
         self._inputs, self._outputs, self._depth = inputs, outputs, depth
 
     def advertise(self, topic: str, kind: type) -> None:
-        """Offer messages of the class `kind`."""
+        """Offer messages of the class `kind`; those of vision_msgs only where it is installed, since few have it."""
+        if TYPES[kind].startswith("vision_msgs") and importlib.util.find_spec("vision_msgs") is None:
+            return
         events = ros("rclpy.event_handler").PublisherEventCallbacks(incompatible_qos=self._refuse(topic, "listener"))
         self._publishers[topic] = self.node.create_publisher(
             self._class(kind), topic, event_callbacks=events, **self._qos(topic, self._outputs)
@@ -159,7 +161,8 @@ class Ros2Transport(Transport):
 
     def wanted(self, topic: str) -> bool:
         """Whether any node listens."""
-        return self._context.ok() and self._publishers[topic].get_subscription_count() > 0
+        offered = self._context.ok() and topic in self._publishers
+        return offered and self._publishers[topic].get_subscription_count() > 0
 
     def _class(self, kind: type) -> type:
         return ros2_types.message_class(TYPES[kind], self._wire.store.hash_rihs01(TYPES[kind]))

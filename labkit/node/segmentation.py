@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from labkit.grasp import Grasp
 from labkit.labels import overlay
 from labkit.node import convert
 from labkit.node.messages import (
@@ -19,6 +20,8 @@ from labkit.node.messages import (
     NANOSECONDS,
     CameraInfo,
     CompressedImage,
+    Detection,
+    Detections,
     Diagnostics,
     Header,
     Image,
@@ -47,6 +50,7 @@ OUTPUTS = {
     "grasp": Pose,
     "grasps": PoseArray,
     "scores": PointCloud2,
+    "detections": Detections,
     "diagnostics": Diagnostics,
 }
 INPUTS = ("rgb", "depth", "info")
@@ -104,8 +108,9 @@ class SegmentationNode:
     malformed or does not fit together is logged with the reason and skipped; a transport delivers a ValueError in place
     of a message that it cannot read. Every result carries the colour image's stamp. Probabilities, an overlay for
     people to look at, the planner's scene and the gripper's opening are published if anybody wants them. All grasps
-    come as poses, the best first, and as a cloud of the same order that holds their scores, widths and targets. While
-    `active` is False frames are let go, and nobody counts them.
+    come as poses, the best first, as a cloud of the same order that holds their scores, widths and targets, and, where
+    ROS 2 has vision_msgs, as detections with the box of what they hold. While `active` is False frames are let go, and
+    nobody counts them.
 
     Diagnostics say WARN from the first frame or message that cannot be used, and STALE after some seconds, until a
     frame is answered; WARN, too, where a topic of the camera is silent while others are not, and where most frames are
@@ -399,6 +404,9 @@ class SegmentationNode:
         at = np.reshape([pose.position for pose in poses], (-1, 3))
         more = {name: np.array([getattr(grasp, name) for grasp in grasps]) for name in ("score", "width", "target")}
         publish(topics.scores, convert.encode_cloud(at, base, **more))
+        if wanted(topics.detections):
+            found = (_detection(pose, grasp, perception) for pose, grasp in zip(poses, grasps, strict=True))
+            publish(topics.detections, Detections(base, tuple(found)))
         if grasps:
             grasp = grasps[0]
             if wanted(topics.gripper):
@@ -415,6 +423,13 @@ class SegmentationNode:
             values |= {reason: str(n) for reason, n in reversed(self.counts.reasons.items())}
         values |= self.transport.troubles()
         self.transport.publish(self.topics.diagnostics, Diagnostics(header, "segmentation", level, message, values))
+
+
+def _detection(pose: Pose, grasp: Grasp, perception: Perception) -> Detection:
+    cloud = perception.clouds[grasp.target].astype(float)
+    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    box = tuple(0.5 * (low + high)), tuple(high - low)
+    return Detection(f"target {grasp.target + 1}", float(grasp.score), pose, *box)
 
 
 def _stamp(message: Message) -> int:

@@ -14,6 +14,8 @@ from labkit.node.messages import (
     NANOSECONDS,
     CameraInfo,
     CompressedImage,
+    Detection,
+    Detections,
     Diagnostics,
     Header,
     Image,
@@ -35,11 +37,19 @@ TYPES = {
     PointCloud2: "sensor_msgs/msg/PointCloud2",
     Pose: "geometry_msgs/msg/PoseStamped",
     PoseArray: "geometry_msgs/msg/PoseArray",
+    Detections: "vision_msgs/msg/Detection3DArray",
     Transforms: "tf2_msgs/msg/TFMessage",
     JointState: "sensor_msgs/msg/JointState",
     Diagnostics: "diagnostic_msgs/msg/DiagnosticArray",
 }
 KINDS = {name: kind for kind, name in TYPES.items()}
+VISION = {  # the types of vision_msgs 4 that rosbags lacks; ROS 1 has others of these names
+    "ObjectHypothesis": "string class_id\nfloat64 score",
+    "ObjectHypothesisWithPose": "ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose",
+    "BoundingBox3D": "geometry_msgs/Pose center\ngeometry_msgs/Vector3 size",
+    "Detection3D": "std_msgs/Header header\nObjectHypothesisWithPose[] results\nBoundingBox3D bbox\nstring id",
+    "Detection3DArray": "std_msgs/Header header\nDetection3D[] detections",
+}
 DIAGNOSED_BY = "labkit"  # the hardware_id of diagnostics: who says it
 
 
@@ -58,6 +68,13 @@ class Wire:
         if ros1:  # the one type that rosbags' store of ROS 1 lacks
             definition = "geometry_msgs/TransformStamped[] transforms"
             self.store.register(get_types_from_msg(definition, TYPES[Transforms]))
+        else:
+            for kind, definition in VISION.items():
+                self.store.register(get_types_from_msg(definition, f"vision_msgs/msg/{kind}"))
+
+    def knows(self, kind: type) -> bool:
+        """Whether this generation of ROS has messages of a class of the kit's."""
+        return TYPES[kind] in self.store.fielddefs
 
     def encode(self, message: Message) -> memoryview:
         """Write a message as the bytes of its ROS type."""
@@ -122,6 +139,8 @@ def _by_ros_names(message: Message) -> dict:
             return vars(message) | {"distortion_model": "plumb_bob", "R": np.eye(3).ravel(), "P": P}
         case Pose():
             return {"header": message.header, "pose": vars(message)}
+        case Detections():
+            return vars(message) | {"detections": [_detection(message.header, one) for one in message.detections]}
         case Transforms():
             return {"transforms": [vars(one) | {"transform": vars(one)} for one in message.transforms]}
         case Diagnostics():
@@ -130,6 +149,13 @@ def _by_ros_names(message: Message) -> dict:
             return {"header": message.header, "status": [status | {"hardware_id": DIAGNOSED_BY}]}
         case _:
             return vars(message)
+
+
+def _detection(header: Header, one: Detection) -> dict:
+    hypothesis = {"class_id": one.name, "score": one.score}
+    box = {"center": {"position": one.centre, "orientation": (0.0, 0.0, 0.0, 1.0)}, "size": one.size}
+    results = [{"hypothesis": hypothesis, "pose": {"pose": vars(one.grasp)}}]
+    return {"header": header, "results": results, "bbox": box, "id": one.name}
 
 
 def _read(kind: type, raw):
@@ -141,6 +167,9 @@ def _read(kind: type, raw):
     if kind is PoseArray:
         header = _plain(raw.header)
         return PoseArray(header, tuple(_read_pose(header, one) for one in raw.poses))
+    if kind is Detections:
+        header = _plain(raw.header)
+        return Detections(header, tuple(_read_detection(header, one) for one in raw.detections))
     if kind is Diagnostics:
         require("status", len(raw.status) == 1, "the diagnostics of one node", len(raw.status))
         status = raw.status[0]
@@ -151,6 +180,12 @@ def _read(kind: type, raw):
 
 def _read_pose(header: Header, raw) -> Pose:
     return Pose(header, _plain(raw.position), _plain(raw.orientation))
+
+
+def _read_detection(header: Header, raw) -> Detection:
+    (best, *_), box = raw.results, raw.bbox
+    grasp = _read_pose(header, best.pose.pose)
+    return Detection(raw.id, best.hypothesis.score, grasp, _plain(box.center.position), _plain(box.size))
 
 
 def _read_transform(raw) -> Transform:

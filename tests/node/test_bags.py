@@ -57,11 +57,14 @@ def contents(path) -> dict[str, list]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_message_comes_back_from_a_bag_as_it_was(tmp_path, name):
-    sent = {f"/{type(message).__name__}": message for message in MESSAGES}
+    known = Wire(ros1=name.endswith(".bag")).knows
+    sent = {f"/{type(message).__name__}": message for message in MESSAGES if known(type(message))}
     with BagWriter(tmp_path / name) as bag:
         for topic, message in sent.items():
             bag.publish(topic, message)
-    for topic, ((stamp, found),) in contents(tmp_path / name).items():
+    came = contents(tmp_path / name)
+    assert came.keys() == sent.keys()
+    for topic, ((stamp, found),) in came.items():
         message = sent[topic]
         assert stamp == (message.transforms[0] if isinstance(message, Transforms) else message).header.stamp
         if hasattr(message, "data"):

@@ -15,9 +15,10 @@ from labkit.labels import SURFACE, one_hot, overlay
 from labkit.node import convert
 from labkit.node.actors import Arm, Camera
 from labkit.node.bus import Bus
-from labkit.node.messages import CompressedImage, Header, Image, Topics
+from labkit.node.messages import CompressedImage, Detections, Header, Image, Topics
 from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import SegmentationNode
+from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
 
@@ -89,7 +90,7 @@ def spinning(node):
 
 
 def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
-    more = ("probabilities", "overlay", "scene", "gripper", "grasps", "scores")
+    more = ("probabilities", "overlay", "scene", "gripper", "grasps", "scores", "detections")
     node, camera, out, _ = system(frame, *more, base_frame="base_link")
     camera.publish(frame, stamp=123456789)
     assert node.spin_once()
@@ -111,6 +112,13 @@ def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
     assert poses.poses[0] == grasp and len(poses.poses) == len(p.plan.grasps) > 1
     numbers = [[g.T_base_grasp[2, 3], g.score, g.width, g.target] for g in p.plan.grasps]
     assert np.allclose(convert.decode_cloud(scores, ["z", "score", "width", "target"]), numbers)
+    found = out.detections[0].detections
+    assert [one.grasp for one in found] == list(poses.poses)
+    assert [one.score for one in found] == [g.score for g in p.plan.grasps]
+    cloud = p.clouds[p.plan.grasps[0].target]
+    assert np.allclose(np.subtract(found[0].centre, np.divide(found[0].size, 2)), cloud.min(axis=0))
+    wire = Wire(ros1=False)
+    assert wire.decode(TYPES[Detections], wire.encode(out.detections[0])) == out.detections[0]
 
 
 def test_what_nobody_wants_is_not_made(frame):
