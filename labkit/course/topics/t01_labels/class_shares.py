@@ -64,7 +64,7 @@ def only_what_occurs(y, C):
     return n[n > 0] / n.sum()
 
 
-@wrong("That is one over the share (a weight, topic 05): rare is small here.")
+@wrong("Yours gives a rare class a large number: that is one over its share (a weight, topic 05).")
 def inverse_shares(y, C):
     n = counts(y, C)
     return n.sum() / np.maximum(n, 1)
@@ -88,12 +88,12 @@ def counted_in_bytes(y, C):
     return n / n.sum()
 
 
-@wrong("Clipping 255 to the largest class makes votes for that class of pixels that nobody judged.")
+@wrong("Clipping makes the largest class of 255: pixels that nobody judged are then counted for that class.")
 def unjudged_as_the_last_class(y, C):
     return np.bincount(np.minimum(y, C - 1).ravel(), minlength=C) / y.size
 
 
-@wrong("np.bincount counts 255 like any other number: leave the pixels that nobody judged out before.")
+@wrong("np.bincount counts 255 like any other number: leave out the pixels that nobody judged before you count.")
 def unjudged_as_a_class(y, C):
     return np.bincount(y.ravel(), minlength=C) / y.size
 

@@ -78,7 +78,7 @@ def last_of(same):
     return np.where(same.any(axis=-1), same.shape[-1] - 1 - same[..., ::-1].argmax(axis=-1), 255)
 
 
-ALL_THREE = "Two colours are the same if all three channels are: is one of them enough in yours?"
+ALL_THREE = "Two colours are the same only if all three channels are equal: is one equal channel enough in yours?"
 NOT_THE_SUM = "Different colours can be equally bright: compare the channels, not their sum."
 
 
@@ -117,7 +117,7 @@ def squares_of_bytes(rgb, palette):
     return last_of((((rgb[:, :, None].astype(int) - palette) ** 2) % 256 == 0).all(axis=-1))
 
 
-@wrong("Each turn of your loop undoes the one before: a pixel without this class's colour keeps what it has.")
+@wrong("Each turn of your loop overwrites the one before: without this class's colour a pixel keeps its label.")
 def last_class_alone(rgb, palette):
     return np.where((rgb == palette[-1]).all(axis=-1), len(palette) - 1, 255)
 

@@ -58,7 +58,7 @@ def links_alone(segmentation, class_of_body, links):
     return labels_from_segmentation(np.where(np.isin((segmentation >> 24) - 1, links), segmentation, -1), class_of_body)
 
 
-@wrong("The robot has holes: values in the millions are body + ((link + 1) << 24). How do you get the body back?")
+@wrong("Values in the millions are body + ((link + 1) << 24), and yours skips them: which bits hold the body?")
 def base_links_only(segmentation, class_of_body):
     """Compare the raw values with body numbers: whatever has link bits matches none."""
     return links_alone(segmentation, class_of_body, [-1])
@@ -76,7 +76,7 @@ def link_for_body(segmentation, class_of_body):
     return np.where(segmentation >= 0, class_of_body[link], 0)
 
 
-@wrong("These are body numbers: one more step leads to the class, and class_of_body knows it.")
+@wrong("Yours returns the numbers of bodies: look up each body's class in class_of_body.")
 def body_for_class(segmentation, class_of_body):
     body, seen = numbers_and_seen(segmentation)
     return np.where(seen, body, 0)
@@ -104,6 +104,6 @@ def first_link_alone(segmentation, class_of_body):
     return links_alone(segmentation, class_of_body, [-1, 0])
 
 
-@wrong("These are body numbers: one more step leads to the class, and class_of_body knows it.")
+@wrong("Yours returns the numbers of bodies: look up each body's class in class_of_body.")
 def body_in_a_byte_for_class(segmentation, class_of_body):
     return body_for_class(segmentation, class_of_body).astype(np.uint8)

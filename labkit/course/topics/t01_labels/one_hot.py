@@ -29,7 +29,7 @@ def sums_to_1(y, C, Y):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("255 was pressed into the range of classes: what should the C entries of such a pixel be?")
+@wrong("A pixel of 255 gets a 1 in the last class of yours: what should its C entries be?")
 def ignored_as_last_class(y, C):
     return np.eye(C, dtype=np.uint8)[np.minimum(y, C - 1)]
 
@@ -46,7 +46,7 @@ def ignored_is_shared_out(y, C):
     return Y
 
 
-@wrong("The course has four classes, and the function gets C: how many does yours mark?")
+@wrong("The function gets C, which need not be 4: how many of the C planes does yours fill?")
 def four_classes(y, C):
     Y = one_hot(y, C)
     Y[..., 4:] = 0

@@ -67,19 +67,19 @@ def copied(y, size, index):
     return y[rows[:, None], columns]
 
 
-@wrong("np.unique before and after? The mean of classes 1 and 3 is not class 2: labels cannot be averaged.")
+@wrong("The mean of classes 1 and 3 is not class 2: labels are copied, not averaged.")
 def bilinear(y, height, width):
     import cv2
 
     return np.round(cv2.resize(y.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)).astype(np.uint8)
 
 
-@wrong("All is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner.")
+@wrong("Yours is shifted by up to half a pixel: take the old pixel under the new pixel's centre, not its corner.")
 def from_the_corner(y, height, width):
     return copied(y, (height, width), lambda i, n, old: i * old // n)
 
 
-@wrong("You lay the first and last centres on each other; here the images' edges lie on each other.")
+@wrong("Yours lays the corner pixels' centres on each other. Here the images' edges lie on each other.")
 def corner_to_corner(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round(np.linspace(0, old - 1, n)))
 
