@@ -23,10 +23,10 @@ def factor_graph(axes) -> None:
     node(axes, (left, 5.4), "$y$", radius=0.45)
     word(axes, (left + 0.8, 5.4), "a pixel's label: what we look for", ha="left")
     node(axes, (left, 3.9), radius=0.24, square=True, colour=COLD)
-    word(axes, (left + 0.8, 4.1), r"unary factor $\psi_p(y_p)$:", ha="left", colour=COLD)
+    word(axes, (left + 0.8, 4.1), r"unary factor $\psi_i(y_i)$:", ha="left", colour=COLD)
     word(axes, (left + 0.8, 3.55), "one line, one label", ha="left")
     node(axes, (left, 2.3), radius=0.24, square=True)
-    word(axes, (left + 0.8, 2.5), r"pairwise factor $w_{pq}\,[y_p \neq y_q]$:", ha="left")
+    word(axes, (left + 0.8, 2.5), r"pairwise factor $w_{ij}\,[y_i \neq y_j]$:", ha="left")
     word(axes, (left + 0.8, 1.95), "two lines, two labels", ha="left")
     word(axes, (left - 0.45, 0.8), "energy $E(y)$ = the sum of all squares", ha="left", colour=SOFT)
 
@@ -35,18 +35,18 @@ def factor_graph(axes) -> None:
 def cut(axes) -> None:
     """Two pixels between source and sink: each arc with its capacity, and the cut of the labels 0, 1."""
     s, t, p, q = (4.0, 6.5), (4.0, 0.9), (1.8, 3.7), (6.2, 3.7)
-    arrow(axes, s, p, r"$\psi_p(1)$", gap=0.6)
-    arrow(axes, s, q, r"$\psi_q(1)$", gap=0.6, colour=HOT, dashed=True, width=2.2)
-    arrow(axes, p, t, r"$\psi_p(0)$", gap=0.6, colour=HOT, dashed=True, width=2.2)
-    arrow(axes, q, t, r"$\psi_q(0)$", gap=0.6)
+    arrow(axes, s, p, r"$\psi_i(1)$", gap=0.6)
+    arrow(axes, s, q, r"$\psi_j(1)$", gap=0.6, colour=HOT, dashed=True, width=2.2)
+    arrow(axes, p, t, r"$\psi_i(0)$", gap=0.6, colour=HOT, dashed=True, width=2.2)
+    arrow(axes, q, t, r"$\psi_j(0)$", gap=0.6)
     arrow(axes, p, q, "$w$", gap=0.6, bend=-0.3, colour=HOT, dashed=True, width=2.2)
     arrow(axes, q, p, "$w$", gap=0.6, bend=-0.3)
     node(axes, s, "s", colour=COLD)
     node(axes, t, "t", colour=HOT)
     node(axes, p, "0", colour=COLD)
     node(axes, q, "1", colour=HOT)
-    word(axes, (0.75, 3.7), "p")
-    word(axes, (7.25, 3.7), "q")
+    word(axes, (0.75, 3.7), "i")
+    word(axes, (7.25, 3.7), "j")
     left = 8.6
     word(axes, (left, 6.6), "s, the source: its side means label 0", ha="left", colour=COLD)
     word(axes, (left, 0.9), "t, the sink: its side means label 1", ha="left", colour=HOT)
@@ -55,7 +55,7 @@ def cut(axes) -> None:
     arrow(axes, (left, 4.5), (left + 1.1, 4.5), colour=HOT, dashed=True, width=2.2)
     word(axes, (left + 1.4, 4.5), "an arc that is cut: it leads", ha="left")
     word(axes, (left + 1.4, 3.95), "from s's side to t's side", ha="left")
-    word(axes, (left, 2.9), r"this cut: $\psi_p(0) + \psi_q(1) + w$", ha="left")
+    word(axes, (left, 2.9), r"this cut: $\psi_i(0) + \psi_j(1) + w$", ha="left")
     word(axes, (left, 2.25), "the energy of the labels 0, 1", ha="left", colour=SOFT)
 
 

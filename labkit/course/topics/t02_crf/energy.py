@@ -47,7 +47,7 @@ def steps(y):
     return np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
 
 
-@wrong("What does agreement cost in the Potts model? Label everything alike: only unary costs may remain.")
+@wrong("Pairs that agree change your energy: with one label everywhere only the unary costs may remain.")
 def spins(y, psi, weights):
     """Agreement is rewarded by w, disagreement costs w, as for spins of +1 and -1."""
     return unary_part(y, psi) + (weights * np.where(disagreeing(y), 1, -1)).sum()
@@ -59,7 +59,7 @@ def label_steps(y, psi, weights):
     return unary_part(y, psi) + (weights * steps(y.astype(int))).sum()
 
 
-@wrong("The weight is paid where neighbours differ: what does an image of one label cost?")
+@wrong("Yours charges neighbours that agree. The weight is paid where two labels differ.")
 def agreement_charged(y, psi, weights):
     """The weight paid where neighbours agree."""
     return unary_part(y, psi) + (weights * ~disagreeing(y)).sum()

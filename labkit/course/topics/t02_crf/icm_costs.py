@@ -59,7 +59,7 @@ def charged(pairs, y, psi, v, u):
     return psi[v, u] + sum((w * (np.arange(psi.shape[2]) != y[b, a]) for w, b, a in pairs), np.zeros(psi.shape[2]))
 
 
-@wrong("A class pays for each neighbour that has another label: which class should eight like neighbours favour?")
+@wrong("A class pays for each neighbour of another class: if all eight are of class 2, which class is cheapest?")
 def charged_for_agreeing(y, psi, weights, v, u):
     """Every class pays for the neighbours that have it."""
     own, owned = pairs_of(weights, v, u)
@@ -75,7 +75,7 @@ def own_weights(y, psi, weights, v, u):
     return charged(pairs_of(weights, v, u)[0] + back, y, psi, v, u)
 
 
-@wrong("In the energy each pair counts once, but a pixel in the middle belongs to eight pairs.")
+@wrong("A pixel in the middle belongs to eight pairs, and owns four: where do the weights of the others stand?")
 def ahead_only(y, psi, weights, v, u):
     """Only the pairs that the energy's loop visits at this pixel."""
     return charged(pairs_of(weights, v, u)[0], y, psi, v, u)

@@ -87,9 +87,7 @@ def pixel_by_pixel(psi, w):
     return psi.argmin(axis=1)
 
 
-@wrong(
-    "The cheapest class so far need not lie on the cheapest way: walk back, and let a pixel keep its class for free."
-)
+@wrong("The cheapest class so far need not be on the cheapest way: trace that back. Keeping a class costs no w.")
 def never_walked_back(psi, w):
     """The minimum at each pixel of the forward walk."""
     return walk(psi, w).argmin(axis=1)
@@ -133,7 +131,7 @@ def traced_one_pixel_off(psi, w):
     return traced(came[:-1], best[-1].argmin())
 
 
-@wrong("A pixel comes from the cheapest class of `best` before psi[u] is added: does yours ask too late?")
+@wrong("Decide where a pixel comes from while `best` ends at pixel u - 1: does yours add psi[u] before?")
 def asked_too_late(psi, w):
     best, came = walk_with_origins(psi, w, late=1)
     return traced(came[1:], best[-1].argmin())
@@ -161,7 +159,7 @@ def least_cost(psi, w):
     return walk(psi, w)[-1].min()
 
 
-@wrong("Each of your steps changes one pixel, and can end where two pixels would have to change at once.")
+@wrong("Each of your steps changes one pixel. It stops where two pixels would have to change together.")
 def pixel_after_pixel_again(psi, w):
     """ICM on the row."""
     y = psi.argmin(axis=1)

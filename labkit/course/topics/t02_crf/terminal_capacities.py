@@ -56,13 +56,13 @@ def negative_costs_clipped(psi):
     return terminal_capacities(np.maximum(psi, 0.0))
 
 
-@wrong("What goes into the constant leaves both arcs: the one that stays carries the costs' difference.")
+@wrong("The smaller cost leaves both arcs: what remains on the other arc is the difference of the two costs.")
 def whole_costs_kept(psi):
     dearer = np.where(psi > psi.min(axis=2, keepdims=True), psi, 0.0)
     return dearer[..., 1], dearer[..., 0], psi.min(axis=2).sum()
 
 
-@wrong("Each pixel has one arc of capacity 0: which label cuts the arc from the source, the dearer one?")
+@wrong("One arc of each pixel has capacity 0: if label 1 costs more, which of its two arcs stays?")
 def difference_in_both_arcs(psi):
     difference = np.abs(psi[..., 1] - psi[..., 0])
     return difference, difference, psi.min(axis=2).sum()

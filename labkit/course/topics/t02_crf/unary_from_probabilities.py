@@ -50,13 +50,13 @@ def clipped_at_both_ends(p, floor):
     return -np.log(np.clip(p, floor, 1.0 - floor))
 
 
-@wrong("Must yours sum to 1 after the floor? What is not below it stays as it is, and 1 still costs 0.")
+@wrong("Do not scale after the floor: what is not below it stays as it is, and a probability of 1 costs 0.")
 def made_to_sum_to_1_again(p, floor):
     lifted = np.maximum(p, floor)
     return -np.log(lifted / lifted.sum(axis=-1, keepdims=True))
 
 
-@wrong("Not 0 alone counts as the floor: every probability below the floor does.")
+@wrong("Yours lifts only zeros: every probability below the floor counts as the floor.")
 def zeros_lifted(p, floor):
     return -np.log(np.where(p == 0.0, floor, p))
 
@@ -71,7 +71,7 @@ def entropies(p, floor):
     return -np.maximum(p, floor) * np.log(np.maximum(p, floor))
 
 
-@wrong("Does the cheapest class of a pixel have to cost 0? -log p is asked for as it is.")
+@wrong("Nothing is subtracted here: the cheapest class of a pixel costs -log p, which need not be 0.")
 def cheapest_made_free(p, floor):
     psi = -np.log(np.maximum(p, floor))
     return psi - psi.min(axis=-1, keepdims=True)
