@@ -5,16 +5,17 @@ import numpy as np
 from labkit.course.topics.t07_grasp.grasp_pose import pose, unit
 
 
-def closing_yaw__across_the_long_axis(Sigma):
+def closing_yaw__across_the_long_axis(Sigma, now):
     x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, -1]
-    return np.arctan2(y, x) - np.pi / 2
+    across = np.arctan2(y, x) - np.pi / 2
+    return min((across + k * np.pi for k in range(-5, 6)), key=lambda yaw: abs(yaw - now))
 
 
-def closing_yaw__torch(Sigma):
+def closing_yaw__torch(Sigma, now):
     import torch
 
     _, axes = torch.linalg.eigh(torch.as_tensor(Sigma[:2, :2]))
-    return torch.atan2(axes[1, 0], axes[0, 0])
+    return now + torch.atan(torch.tan(torch.atan2(axes[1, 0], axes[0, 0]) - now))
 
 
 def grasp_pose__crossed(position, approach, closing):

@@ -26,9 +26,20 @@ def pair_weights(image, *settings):
     return PottsCRF.from_image(np.zeros((*image.shape[:2], 2)), image, *settings, connectivity=8).weights
 
 
-def height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth):
-    R = T_base_cam[:3, :3]
-    return np.sqrt((R @ geometry.back_projection_noise(u, v, d, K, sigma_pixel, sigma_depth) @ R.T)[2, 2])
+def back_project(depth, K, along_ray):
+    P = geometry.back_project(depth, K)
+    return P / np.linalg.norm(geometry.pixel_rays(depth.shape, K), axis=-1, keepdims=True) if along_ray else P
+
+
+def height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
+    """The kit's noise of a point, and what a turn by a ten-thousandth of a radian changes."""
+    c, s = np.cos(1e-4), np.sin(1e-4)
+    P, tilt = d * np.linalg.inv(K) @ (u, v, 1.0), np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    moved = (tilt @ P - tilt.T @ P) / 2e-4
+    Sigma = geometry.back_projection_noise(u, v, d, K, sigma_pixel, sigma_depth) + sigma_tilt**2 * np.outer(
+        moved, moved
+    )
+    return np.sqrt(T_base_cam[2, :3] @ Sigma @ T_base_cam[2, :3])
 
 
 def decode_depth(data, height, width, step, is_bigendian):
@@ -47,7 +58,7 @@ KIT = {
     "04_iou.confusion_matrix": metrics.confusion_matrix,
     "04_iou.iou": metrics.iou,
     "04_iou.mean_iou": lambda n_frames: metrics.mean_iou(n_frames.sum(axis=0)),
-    "06_back_projection.back_project": geometry.back_project,
+    "06_back_projection.back_project": back_project,
     "06_back_projection.height_noise": height_noise,
     "08_node.decode_depth": decode_depth,
     "09_other_stacks.measure_pieces": lambda pieces: regions.measure(pieces).area,
@@ -82,7 +93,7 @@ def test_yaw_height_and_pose_together_are_the_kits_grasp_by_the_principal_axis()
             mu, Sigma = geometry.centroid_and_covariance(P)
             lengths = hand.palm_above_tips - HAND_MARGIN, hand.tips_below_grasp, TIP_CLEARANCE
             z = find("07_grasp.grasp_height").reference(P, table_z, *lengths)
-            yaw = find("07_grasp.closing_yaw").reference(Sigma)
+            yaw = find("07_grasp.closing_yaw").reference(Sigma, 0.0)
             closing, down = np.array([np.cos(yaw), np.sin(yaw), 0.0]), np.array([0.0, 0.0, -1.0])
             T = pose.reference(np.array([mu[0], mu[1], z]), down, closing)
             kits = grasp.principal_axis_grasp(P, table_z).T_base_grasp
