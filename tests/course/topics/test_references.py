@@ -15,7 +15,7 @@ from labkit import geometry, grasp, labels, losses, metrics
 from labkit.course.checker.run import judge
 from labkit.course.topics import find
 from labkit.course.topics.t07_grasp import cloud
-from labkit.crf import PottsCRF, unary_from_probabilities
+from labkit.crf import PottsCRF
 from labkit.grasp.planner import HAND_MARGIN, TIP_CLEARANCE
 from labkit.node import convert
 from labkit.node.messages import Header, Image
@@ -49,7 +49,6 @@ def decode_depth(data, height, width, step, is_bigendian):
 
 KIT = {
     "01_labels.one_hot": labels.one_hot,
-    "02_crf.unary_from_probabilities": unary_from_probabilities,
     "02_crf.pair_weights": pair_weights,
     "02_crf.energy": lambda y, psi, weights: PottsCRF(psi, weights).energy(y),
     "03_gradient.softmax": losses.softmax,
