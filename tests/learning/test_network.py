@@ -3,6 +3,7 @@
 import io
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ import torch
 from scenes import random_image
 from torch.nn import functional as F
 
+import data_gen
 from labkit.frame import RGBDFrame
+from labkit.labels import TARGET
 from labkit.learning.engines import open_engine
 from labkit.learning.view import PIXEL
 from labkit.network import (
@@ -183,3 +186,15 @@ def test_weights_of_ones_own_network_load_into_it(tmp_path):
         load_model(tmp_path / "w.pt")
     with pytest.raises(ValueError, match="path: expected the weights of Conv2d, 2 arrays, got 0 that fit and 7 of"):
         load_model(tmp_path / "w.pt", model=torch.nn.Conv2d(3, 2, 1))
+
+
+def test_lesson_03_says_how_much_probability_the_target_gets():
+    """Its share of probability over its share of pixels, on 12 of the scenes that both networks were trained on."""
+    frames = [data_gen.render(data_gen.sample_scene(seed, "train"), (320, 240)) for seed in range(1000, 1012)]
+    engines = {name: open_engine(load_model(weights_path(name))) for name in ("unet", "smallsegnet")}
+    given = {name: np.mean([answer(frame.rgb)[..., TARGET] for frame in frames]) for name, answer in engines.items()}
+    pixels = np.mean([frame.labels == TARGET for frame in frames])
+    assert given["unet"] == pytest.approx(pixels, rel=0.05) and given["smallsegnet"] > 3.0 * pixels
+    prose = (Path(__file__).parents[2] / "lessons/03_gradient_network.ipynb").read_text()
+    assert "on 12 of its training scenes the target gets its share, within 5 %" in prose
+    assert "on the same scenes the target gets more than three times its share" in prose

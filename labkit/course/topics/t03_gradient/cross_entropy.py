@@ -46,18 +46,18 @@ def cross_entropy_with(z, y, epsilon):
     return float(-np.log(np.exp(true_log_probabilities(z, y)) + epsilon).sum())
 
 
-@wrong("What range enters the loss? Logits are normalised once, inside it.")
+@wrong("z holds logits, and the loss makes probabilities of them itself: does yours do so twice?")
 def cross_entropy_softmax_twice(z, y):
     return cross_entropy(softmax(z), y)
 
 
-@wrong("The other classes' logits have to count as well.")
+@wrong("Yours uses the true class's logit alone: log p depends on the logits of all classes.")
 def cross_entropy_without_softmax(z, y):
     counted = y != 255
     return -float(np.take_along_axis(z[counted], y[counted][:, None], -1).sum())
 
 
-@wrong("The loss is minus the logarithm, not one minus p.")
+@wrong("Yours adds up 1 - p: the loss of a pixel is minus the logarithm of p.")
 def cross_entropy_of_probabilities(z, y):
     return float((1.0 - np.exp(true_log_probabilities(z, y))).sum())
 
@@ -96,7 +96,7 @@ def cross_entropy_of_all_pixels_classes(z, y):
     return float((np.logaddexp.reduce(z, axis=-1) - z[:, y]).sum())
 
 
-@wrong("lse minus a logit: do you take off the largest one, or the true class's?")
+@wrong("The loss is lse minus one logit: which one, the largest or the true class's?")
 def cross_entropy_of_the_surest_class(z, y):
     return cross_entropy(z, np.where(y == 255, 255, z.argmax(axis=-1)))
 

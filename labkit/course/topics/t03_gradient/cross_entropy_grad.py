@@ -52,12 +52,12 @@ def grad_over_pixels(z, y):
     return (softmax_over_pixels(z) - one_hot(z, y)) * (y != 255)[..., None]
 
 
-@wrong("Compare probabilities with the one-hot, not logits.")
+@wrong("The one-hot is subtracted from probabilities: what makes probabilities of your logits?")
 def grad_of_logits(z, y):
     return (z - one_hot(z, y)) * (y != 255)[..., None]
 
 
-@wrong("That is the slope of half the squared error; with the logarithm, the p in front cancels.")
+@wrong("That is the gradient of half the squared error: with the logarithm the factor p in front cancels.")
 def grad_of_squared_error(z, y):
     p = softmax(z)
     error = p - one_hot(z, y)
@@ -89,7 +89,7 @@ def grad_at_the_surest_class(z, y):
     return (softmax(z) - one_hot_of_the_surest(z)) * (y != 255)[..., None]
 
 
-@wrong("All of yours are -1, 0 or 1: is it the class of the largest logit that enters, or the probabilities?")
+@wrong("All of yours are -1, 0 or 1: does the class of the largest logit enter, or do the probabilities?")
 def grad_of_a_perceptron(z, y):
     return (one_hot_of_the_surest(z) - one_hot(z, y)) * (y != 255)[..., None]
 

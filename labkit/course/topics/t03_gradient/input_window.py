@@ -125,7 +125,7 @@ def centred_on_its_first_half(kernels, strides, paddings, u):
     return begin, begin + last - first
 
 
-@wrong("A layer's padding counts pixels of its own input: how many of the image's is one of those?")
+@wrong("A layer's padding counts pixels of its own input: how many pixels of the image is one of them?")
 def paddings_counted_in_image_pixels(kernels, strides, paddings, u):
     first, last = input_window(kernels, strides, np.zeros_like(paddings), u)
     return first - int(np.sum(paddings)), last - int(np.sum(paddings))

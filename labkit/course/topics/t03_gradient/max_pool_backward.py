@@ -165,6 +165,6 @@ def all_windows_of_stride_1(x, g):
     return out
 
 
-@wrong("argmax counts a block row by row: of its number 1, what is the row, and what is the column?")
+@wrong("argmax counts a block row by row: in which row and column of the block is place 1?")
 def rows_and_columns_of_the_block_exchanged(x, g):
     return unblocked(np.eye(4)[[0, 2, 1, 3]][blocks(x).argmax(axis=2)] * g[..., None])

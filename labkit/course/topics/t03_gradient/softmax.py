@@ -41,7 +41,7 @@ def softmax_of_global_maximum(z):
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong("Clipping changes the answer, a shift does not: softmax sees differences.")
+@wrong("Clipping changes differences of logits, and so the answer. Subtracting one number from all does not.")
 def softmax_clipped(z):
     return softmax(np.clip(z, -50.0, 50.0))
 
@@ -56,7 +56,7 @@ def logits_divided_by_their_sum(z):
     return z / z.sum(axis=-1, keepdims=True)
 
 
-@wrong("Which numbers must sum to one: those of one pixel.")
+@wrong("The numbers of one pixel must sum to one: over which axis do yours?")
 def wrong_axis(z):
     return softmax_over_pixels(z)
 
@@ -73,7 +73,7 @@ def divided_by_the_largest(z):
     return e / e.sum(axis=-1, keepdims=True)
 
 
-@wrong("Clipping changes the answer, a shift does not: softmax sees differences.")
+@wrong("Clipping changes differences of logits, and so the answer. Subtracting one number from all does not.")
 def large_logits_clipped(z):
     e = np.exp(np.minimum(z, 700.0))
     return e / e.sum(axis=-1, keepdims=True)

@@ -54,7 +54,7 @@ def without_the_factor(p, g):
     return g - (p * g).sum(axis=-1, keepdims=True)
 
 
-@wrong("The mean that is subtracted is weighted: classes count by their probability.")
+@wrong("You subtract the plain mean of g. In the right one each class counts by its probability.")
 def plain_mean(p, g):
     """An unweighted mean of the gradients."""
     return p * (g - g.mean(axis=-1, keepdims=True))
@@ -79,13 +79,13 @@ def softmax_of_p(p, g):
     return p * (g - (p * g).sum(axis=-1, keepdims=True))
 
 
-@wrong("The sum that is subtracted is one of p g, not of g: classes count by their probability.")
+@wrong("You subtract the sum of g. Each class counts by its probability: it is the sum of p g.")
 def plain_sum(p, g):
     """An unweighted sum of the gradients."""
     return p * (g - g.sum(axis=-1, keepdims=True))
 
 
-@wrong("p g is one part of it. Raise all of g by 1: the loss's slopes must stay, and do yours?")
+@wrong("p g is one part of it. If all of g rises by 1, the answer must stay the same: does yours?")
 def without_the_mean(p, g):
     return p * g
 
