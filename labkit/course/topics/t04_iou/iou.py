@@ -41,7 +41,7 @@ def all_but_the_other_hits(n):
     return divide(np.diagonal(n), n.sum() - np.trace(n) + np.diagonal(n))
 
 
-@wrong("FP is a column, and FN a row, without the cell on the diagonal: how often is it in your union?")
+@wrong("FP is the column without the diagonal cell, FN the row without it: how often is it in your union?")
 def overlap_three_times_in_the_union(n):
     correct, predicted, true = parts(n)
     return divide(correct, predicted + true + correct)

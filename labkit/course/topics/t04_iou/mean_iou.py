@@ -125,6 +125,6 @@ def means_cut_to_whole_numbers(n_frames):
     return np.nanmean(iou_of(n_frames.mean(axis=0).astype(int)))
 
 
-@wrong("A weight does not make one mean of two quotients: add the frames' counts, and divide once.")
+@wrong("Weighting the frames' scores by pixels is not pooling: add the frames' counts, then divide once.")
 def mean_of_frames_by_their_pixels(n_frames):
     return np.average([np.nanmean(iou_of(n)) for n in n_frames], weights=n_frames.sum(axis=(1, 2)))

@@ -65,7 +65,7 @@ def border_is_an_edge(y, width):
     return trimap_band(np.pad(y, width), width)[width:-width, width:-width]
 
 
-@wrong("255 is no class: two pixels are not on an edge because nobody judged the pixel between them.")
+@wrong("255 is no class: a neighbour that nobody judged does not put a pixel into the band.")
 def unjudged_is_a_class(y, width):
     return trimap_band(np.where(y == 255, 9, y), width) & (y != 255)
 
@@ -127,7 +127,7 @@ def slices_from_negative_places(y, width):
     return out
 
 
-@wrong("255 is no class: which two questions does that add to `another label is near`?")
+@wrong("255 is no class: such a pixel is not in the band, and it puts no neighbour into the band.")
 def unjudged_like_any_class(y, width):
     framed = np.pad(y, width, mode="edge")
     H, W = y.shape
