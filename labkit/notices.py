@@ -11,6 +11,7 @@ from jaxtyping import Float, UInt8
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, fit_plane
 from labkit.labels import CLASSES, SURFACE, TARGET
+from labkit.stacks.objects import colour_regions, colour_shares
 
 NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
 RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
@@ -20,6 +21,7 @@ OFF = 0.2  # of half the picture's width or height: where the principal point of
 NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see small things
 TOP = 0.25  # metres: of a plane that is smaller, and over much else, nobody knows whether it is the table
 LONG = 0.12  # metres: longer things are seldom one thing to grasp
+PART = 0.15  # of a target's pixels: less is a label on it, or a shadow
 SHIFT = 3  # pixels between colour and depth that go unnoticed
 REACH = 16  # pixels within which a shift is looked for
 USUAL = {  # from least to most, of 200 scenes of the kinds train, any, test and hard
@@ -177,13 +179,20 @@ def _blind(frame: RGBDFrame, perception) -> str:
 
 def _targets(perception) -> list[str]:
     said, (w, h) = [], perception.frame.size
+    rgb = colour_shares(perception.frame.rgb)
     ways = np.radians(np.arange(0.0, 180.0, 10.0))
     ways = np.stack([np.cos(ways), np.sin(ways)])
     for number, (pixels, cloud) in enumerate(zip(perception.pixels, perception.clouds, strict=True), start=1):
         v, u = np.divmod(pixels, w)
         if u.min() == 0 or v.min() == 0 or u.max() == w - 1 or v.max() == h - 1:
             said.append(f"target {number} touches the picture's border: a part of it is unseen")
+        box = np.s_[v.min() : v.max() + 1, u.min() : u.max() + 1]
+        mask = np.zeros(rgb[box].shape[:2], bool)
+        mask[v - v.min(), u - u.min()] = True
+        parts = [part for part in colour_regions(mask, rgb[box]) if part.sum() > PART * len(pixels)]
         length = np.ptp(np.percentile(cloud[:, :2] @ ways, [1, 99], axis=0), axis=0).max()
         if length > LONG:
             said.append(f"target {number} is {100.0 * length:.0f} cm long: is it two things that touch?")
+        elif len(parts) > 1:
+            said.append(f"target {number} falls into {len(parts)} regions of colour: is it two things that touch?")
     return said

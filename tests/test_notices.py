@@ -163,6 +163,14 @@ def test_two_boxes_that_touch_and_were_one_target_are_noticed():
     found = Pipeline().locate(frame, frame.labels)
     assert len(found.clouds) == 1
     assert any(re.search(r"target 1 is 1\d cm long: is it two things", sentence) for sentence in found.notices)
+    near = box("left", 0.5, 0.025, (0.04, 0.04, 0.06)), box("right", 0.5, -0.016, (0.04, 0.04, 0.06))
+    for twice in (False, True):  # one thing of one colour, and two of which neither is long
+        with World(scene(*near[: 1 + twice])) as world:
+            frame = world.render()
+        rgb = np.where((frame.instances == 2)[..., None], (40, 60, 200), frame.rgb).astype(np.uint8)
+        found = Pipeline().locate(replace(frame, rgb=rgb), frame.labels)
+        said = "target 1 falls into 2 regions of colour: is it two things that touch?"
+        assert len(found.clouds) == 1 and (said in found.notices) == twice
 
 
 def test_the_same_sentence_comes_from_the_pipeline_perceive_training_and_the_node(frame, tmp_path, capsys):

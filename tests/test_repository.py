@@ -26,10 +26,12 @@ EXTRAS = PROJECT["optional-dependencies"]
 PINS = read_pins(ROOT / "constraints.txt")
 # The rooms of labkit from the bottom up: each may import what stands left of it, itself, and `labkit`.
 ROOMS = (
-    "support > labels > frame > geometry losses metrics crf > grasp learning notices > network stacks > pipeline sim > "
+    "support > labels > frame > geometry losses metrics crf > grasp learning > network stacks > notices > "
+    "pipeline sim > views > node > course > apps"
 )
-ROOMS += "views > node > course > apps"
-BELOW = {room: set(re.split(r"\W+", ROOMS.split(layer)[0])) for layer in ROOMS.split(" > ") for room in layer.split()}
+BELOW = {
+    room: set(re.split(r"\W+", ROOMS.partition(layer)[0])) for layer in ROOMS.split(" > ") for room in layer.split()
+}
 # Rooms of the course that judge answers: beside labkit.support each enters only these.
 COURSE = {"checker": {"checker"}, "topics": {"topics", "checker"}, "grading": {"grading", "topics", "checker"}}
 

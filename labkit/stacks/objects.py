@@ -3,8 +3,6 @@
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int32, UInt8
-from scipy import ndimage
-from scipy.sparse.csgraph import connected_components
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, cluster_indices, fit_plane
@@ -37,7 +35,7 @@ def on_the_table(frame: RGBDFrame) -> Int32[np.ndarray, "H W"]:
         return np.zeros(frame.depth.shape, np.int32)
     points, heights, cut, top, area = table
     numbers = np.zeros(heights.shape, np.int32)
-    rgb = _shares(view.frame.rgb)
+    rgb = colour_shares(view.frame.rgb)
     rising = np.flatnonzero((heights > cut) & (heights < LARGEST))  # NaN does not
     for group in cluster_indices(points.reshape(-1, 3)[rising], GAP, LEAST):
         pixels = rising[group]
@@ -51,7 +49,7 @@ def on_the_table(frame: RGBDFrame) -> Int32[np.ndarray, "H W"]:
         box = np.s_[v.min() : v.max() + 1, u.min() : u.max() + 1]
         mask = np.zeros(heights[box].shape, bool)
         mask[v - v.min(), u - u.min()] = True
-        for region in _by_colour(mask, rgb[box]):
+        for region in colour_regions(mask, rgb[box]):
             for part in _by_neck(region):
                 if np.count_nonzero(part) >= LEAST:
                     numbers[box][part] = numbers.max() + 1
@@ -82,13 +80,13 @@ def _table(frame: RGBDFrame):
     return points, points @ plane.normal + plane.offset, cut, top, area
 
 
-def _shares(rgb: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
+def colour_shares(rgb: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
     """Each of red, green and blue as a share of their sum, which light and shade hardly change; dark is grey."""
     light = cv2.medianBlur(rgb, 5).astype(np.float32) + 8.0
     return light / light.sum(axis=-1, keepdims=True)
 
 
-def _by_colour(mask: Bool[np.ndarray, "h w"], rgb: Float[np.ndarray, "h w 3"]) -> list[Bool[np.ndarray, "h w"]]:
+def colour_regions(mask: Bool[np.ndarray, "h w"], rgb: Float[np.ndarray, "h w 3"]) -> list[Bool[np.ndarray, "h w"]]:
     """Cut a mask where its colour steps: regions without a step inside, those of like colours joined again."""
     around = np.ones((3, 3))
     step = (cv2.dilate(rgb, around) - cv2.erode(rgb, around)).sum(axis=-1)
@@ -97,8 +95,10 @@ def _by_colour(mask: Bool[np.ndarray, "h w"], rgb: Float[np.ndarray, "h w 3"]) -
     if len(large) < 2:
         return [mask]
     colours = np.array([np.median(rgb[region == r], axis=0) for r in large])
-    _, group = connected_components(np.abs(colours[:, None] - colours).sum(axis=-1) < ALIKE, directed=False)
-    return _grown(mask, region, large, group + 1)
+    group = np.arange(len(large))
+    for i, j in np.argwhere(np.abs(colours[:, None] - colours).sum(axis=-1) < ALIKE):
+        group[group == group[j]] = group[i]
+    return _grown(mask, region, large, 1 + np.unique(group, return_inverse=True)[1])
 
 
 def _by_neck(mask: Bool[np.ndarray, "h w"]) -> list[Bool[np.ndarray, "h w"]]:
@@ -114,5 +114,8 @@ def _grown(mask: Bool[np.ndarray, "h w"], region, chosen, numbers) -> list[Bool[
     seeds = np.zeros(region.max() + 1, np.int32)
     seeds[chosen] = numbers
     seeds = seeds[region]
-    v, u = ndimage.distance_transform_edt(seeds == 0, return_distances=False, return_indices=True)
-    return [mask & (seeds[v, u] == n) for n in range(1, seeds.max() + 1)]
+    away = (seeds == 0).astype(np.uint8)
+    _, nearest = cv2.distanceTransformWithLabels(away, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    number = np.zeros(nearest.max() + 1, np.int32)
+    number[nearest[seeds > 0]] = seeds[seeds > 0]
+    return [mask & (number[nearest] == n) for n in range(1, seeds.max() + 1)]

@@ -145,7 +145,7 @@ def test_bad_messages_a_killed_camera_and_a_new_master_cost_no_good_frame(tester
 @pytest.mark.debian(*(f"python3-{package}-msgs" for package in ("sensor", "geometry", "tf2", "diagnostic")))
 @pytest.mark.parametrize(
     "message",
-    (message for message in MESSAGES if Wire(ros1=True).knows(type(message))),
+    [message for message in MESSAGES if Wire(ros1=True).knows(type(message))],
     ids=lambda message: type(message).__name__,
 )
 def test_bytes_and_checksum_are_those_of_the_classes_of_ros(message):
