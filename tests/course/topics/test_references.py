@@ -47,13 +47,19 @@ def decode_depth(data, height, width, step, is_bigendian):
     return np.where(depth > 0.0, depth, np.nan)
 
 
+def smoothed(of_labels, z, y, s):
+    """What the kit gives for the labels, and for each class in its turn, in the shares of a smoothed target."""
+    C = z.shape[-1]
+    return (1.0 - s) * of_labels(z, y) + s / C * sum(of_labels(z, np.where(y == 255, y, c)) for c in range(C))
+
+
 KIT = {
     "01_labels.one_hot": lambda y, C: np.stack([np.moveaxis(labels.one_hot(image, C), -1, 0) for image in y]),
     "02_crf.pair_weights": pair_weights,
     "02_crf.energy": lambda y, psi, weights: PottsCRF(psi, weights).energy(y),
     "03_gradient.softmax": losses.softmax,
-    "03_gradient.cross_entropy": losses.cross_entropy,
-    "03_gradient.cross_entropy_grad": losses.cross_entropy_grad,
+    "03_gradient.cross_entropy": lambda z, y, s: smoothed(losses.cross_entropy, z, y, s),
+    "03_gradient.cross_entropy_grad": lambda z, y, s: smoothed(losses.cross_entropy_grad, z, y, s),
     "04_iou.confusion_matrix": metrics.confusion_matrix,
     "04_iou.iou": metrics.iou,
     "04_iou.mean_iou": lambda n_frames: metrics.mean_iou(n_frames.sum(axis=0)),

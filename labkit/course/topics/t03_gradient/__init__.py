@@ -26,6 +26,16 @@ def random_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return z, y
 
 
+def random_smoothed_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
+    """Draw logits and labels, and the share of each pixel that is spread over all classes."""
+    return *random_pixels(rng), float(rng.uniform(0.05, 0.4))
+
+
+def targets(y, C, s):
+    """How much of each pixel belongs to each class, (..., C): a share s is spread evenly over all of them."""
+    return (1.0 - s) * (y[..., None] == np.arange(C)) + s / C
+
+
 TOY = np.array([2.0, 1.0, -1.0])
 
 

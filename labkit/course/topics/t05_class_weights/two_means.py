@@ -4,7 +4,6 @@ import numpy as np
 
 from labkit.course.checker.question import Question, wrong
 from labkit.course.topics.t03_gradient import EPSILONS
-from labkit.course.topics.t03_gradient.cross_entropy import true_log_probabilities
 from labkit.course.topics.t05_class_weights import SURE, TOY, draw_pixels
 
 
@@ -33,7 +32,9 @@ QUESTION = Question(
 
 def losses_and_weights(z, y, w):
     """Loss and weight of each counted pixel."""
-    return -true_log_probabilities(z, y), w[y[y != 255]]
+    counted = y != 255
+    z, y = z[counted], y[counted]
+    return np.logaddexp.reduce(z, axis=-1) - z[np.arange(len(y)), y], w[y]
 
 
 def means(loss, weight):
