@@ -198,3 +198,12 @@ def test_lesson_03_says_how_much_probability_the_target_gets():
     prose = (Path(__file__).parents[2] / "lessons/03_gradient_network.ipynb").read_text()
     assert "on 12 of its training scenes the target gets its share, within 5 %" in prose
     assert "on the same scenes the target gets more than three times its share" in prose
+
+
+def test_lesson_03_says_how_few_pixels_of_a_whole_frame_train_mode_changes():
+    frames = [data_gen.render(data_gen.sample_scene(seed, "train"), (320, 240)) for seed in (600_002, 600_008, 600_011)]
+    for frame in frames:
+        x = torch.from_numpy(frame.rgb / 255.0).permute(2, 0, 1)[None].float()
+        with torch.no_grad():
+            right, wrong = (load_model(weights_path("unet")).train(mode)(x).argmax(1) for mode in (False, True))
+        assert 0 < (right != wrong).float().mean() < 1 / 20
