@@ -62,6 +62,7 @@ GUIDES = {
         "docs/teaching",
         "docs/grading",
         "docs/library",
+        "docs/capstone",
         "docs/hub",
         "docs/scale",
         "CONTRIBUTING",

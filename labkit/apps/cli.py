@@ -420,7 +420,7 @@ def new_question(
 
 @new.command("lab")
 def new_lab(
-    topic: Annotated[str, typer.Argument(help="Two digits and a name, such as 10_instances.")],
+    topic: Annotated[str, typer.Argument(help="Two digits and a name, such as 11_instances.")],
     course: Checkout = Path("."),
 ) -> None:
     """Write a lab without questions: a topic, its solution, and a row in README."""

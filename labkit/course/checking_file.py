@@ -22,10 +22,13 @@ from labkit.course.grading.isolated import Run, public_cases
 from labkit.course.grading.sandbox import Limits
 from labkit.course.topics import TOPICS, of_topic
 
+NO_TEXT = "*Your answer.*"  # what a released lab holds in the place of a text
+
 
 def check_file(path: Path | str) -> bool:
     """Check every answer in a saved lab, print the results, and tell whether all are right.
 
+    Of the texts that a person grades it says which are still empty; a lab of texts alone is right if none is.
     path: of a notebook file. Raises ValueError if it is no lab of the course.
     """
     path = Path(path)
@@ -43,10 +46,22 @@ def check_file(path: Path | str) -> bool:
     for name in names:
         print(describe(lab.questions[name], lab.verdict(name), Printed()))
     right = sum(lab.verdict(name).passed for name in names)
-    print(f"{path.name}, as it is saved: {right} of {len(names)} answers are right.")
+    if names:
+        print(f"{path.name}, as it is saved: {right} of {len(names)} answers are right.")
+    texts = texts_of(notebook["cells"])
+    empty = [name for name, text in texts.items() if text.strip() in ("", NO_TEXT)]
+    if empty or not names:
+        said = f"still empty: {', '.join(empty)}." if empty else "none of them is empty."
+        print(f"{path.name}, as it is saved, has {len(texts)} texts that a person grades; {said}")
     for name in not_saved(names, cells):
         print(f"The {name} that you ran last is not in the file: save the notebook (Ctrl+S), then run this cell again.")
-    return right == len(names)
+    return right == len(names) if names else not empty
+
+
+def texts_of(cells: Sequence[dict]) -> dict[str, str]:
+    """The texts of a notebook's cells that a person grades, by their grade ids."""
+    marks = [(cell, cell.get("metadata", {}).get("nbgrader", {})) for cell in cells if cell["cell_type"] == "markdown"]
+    return {mark["grade_id"]: "".join(cell["source"]) for cell, mark in marks if mark.get("grade")}
 
 
 def topic_of(path: Path, cells: Sequence[Cell]) -> str:

@@ -23,6 +23,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from labkit import __version__
+from labkit.course.checking_file import NO_TEXT
 from labkit.course.topics import TOPICS, of_topic
 from labkit.support.files import write_atomically
 
@@ -161,7 +162,7 @@ def convert(course: Path, topic: str) -> None:
     config.GenerateAssignment.force = True
     config.SaveCells.enabled = False
     config.ClearSolutions.code_stub = {"python": "# your lines\nraise NotImplementedError"}
-    config.ClearSolutions.text_stub = "*Your answer.*"
+    config.ClearSolutions.text_stub = NO_TEXT
     converter = GenerateAssignment(coursedir=CourseDirectory(config=config, log=log), config=config, log=log)
     try:
         converter.start()

@@ -87,13 +87,13 @@ def is_used(name: str, source: str) -> bool:
 
 
 def new_lab(course: Path, topic: str) -> list[Path]:
-    """Begin a lab such as "10_instances", without a question yet; returns the files written.
+    """Begin a lab such as "11_instances", without a question yet; returns the files written.
 
     These are the topic's module, the solution, and README, whose table of topics gets a row. course: a checkout.
     Raises ValueError, and writes nothing, if the name is not two digits and an identifier, or its number is taken.
     """
     course = checkout(course)
-    require("topic", re.fullmatch(r"\d\d(_[a-z0-9]+)+", topic), "two digits, _ and a name: 10_instances", repr(topic))
+    require("topic", re.fullmatch(r"\d\d(_[a-z0-9]+)+", topic), "two digits, _ and a name: 11_instances", repr(topic))
     there = {path.parent.name for path in course.glob("solutions/*/*.ipynb")}
     there |= {path.parent.name.removeprefix("t") for path in course.glob("labkit/course/topics/t*/__init__.py")}
     taken = sorted(other for other in there if other[:2] == topic[:2])

@@ -44,6 +44,14 @@ def test_every_solution_is_right_as_it_is_saved(topic):
     assert check_file(ROOT / "solutions" / topic / f"{topic}.ipynb")
 
 
+def test_a_lab_of_texts_alone_is_right_when_none_is_empty(capsys):
+    lab, solution = (ROOT / folder / "10_capstone" / "10_capstone.ipynb" for folder in ("labs", "solutions"))
+    assert not check_file(lab)
+    assert "has 6 texts that a person grades; still empty: question, labels," in capsys.readouterr().out
+    assert check_file(solution)
+    assert "has 6 texts that a person grades; none of them is empty" in capsys.readouterr().out
+
+
 def test_an_answer_that_calls_a_wrong_one_gets_the_kits(tmp_path, capsys):
     answers = right_answers(TOPIC) | {"iou": WRONG_IOU, "mean_iou": CALLS_IOU}
     found = said(saved(tmp_path, lab_notebook(TOPIC, answers)), capsys)

@@ -99,7 +99,7 @@ def test_a_tenth_lab_is_released_checked_and_graded_as_it_is_written(course, ten
 @pytest.mark.bad_input  # as test_questions is
 def test_a_question_as_it_is_written_fulfils_the_rules_for_questions(tenth):
     name = "10_pieces.rows"
-    test_questions.test_a_topic_has_questions_under_its_name("10_pieces")
+    test_questions.test_a_topics_questions_have_its_name("10_pieces")
     test_questions.test_a_question_is_complete(name)
     test_questions.test_a_reference_is_short_and_complete_in_itself(name)
     test_questions.test_cases_are_the_seeds_and_hold_what_is_claimed(name)
@@ -156,7 +156,7 @@ def test_a_question_for_a_lab_that_there_is_comes_last_and_counts(course):
         ("question ../t04_iou.x", "name: expected a topic and a function"),
         ("lab 04_iou", "topic: expected a number that is free, not that of 04_iou, got '04_iou'"),
         ("lab 04_other", "topic: expected a number that is free, not that of 04_iou, got '04_other'"),
-        ("lab pieces", "topic: expected two digits, _ and a name: 10_instances, got 'pieces'"),
+        ("lab pieces", "topic: expected two digits, _ and a name: 11_instances, got 'pieces'"),
         ("lab 10_a/b", "topic: expected two digits"),
     ],
 )

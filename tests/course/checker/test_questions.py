@@ -124,9 +124,8 @@ def passes(question: Question, mutant: Mutant, cases: list[Case]) -> bool:
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_a_topic_has_questions_under_its_name(topic):
+def test_a_topics_questions_have_its_name(topic):
     questions = of_topic(topic)
-    assert questions, f"`labkit new question {topic}.NAME` begins one"
     for function, question in questions.items():
         assert question.name == f"{topic}.{function}" and find(question.name) is question
 

@@ -8,12 +8,12 @@ import pytest
 
 from labkit.course.grading.run import grade_course
 from labkit.course.grading.sandbox import Limits
-from labkit.course.topics import TOPICS
+from labkit.course.topics import TOPICS, of_topic
 
 SEED = "a hidden seed"
 
 
-@pytest.mark.parametrize("topic", TOPICS)
+@pytest.mark.parametrize("topic", filter(of_topic, TOPICS))  # those that have questions
 def test_every_grade_is_as_constructed(topic, tmp_path):
     students = kit.synthetic_class(topic)
     kit.write_lab(tmp_path, topic)

@@ -89,3 +89,21 @@ def test_formgraders_button_refuses_too(course, tmp_path_factory):
         answer = json.loads(urllib.request.urlopen(urllib.request.Request(address, data=b"")).read())
     assert not answer["success"] and SAYS in answer["log"]
     assert scores(course) == POINTS
+
+
+def test_a_lab_of_texts_alone_waits_for_a_person_where_something_is_written(tmp_path):
+    """Its points are those of its rubrics, and a text that was left empty has nothing to read."""
+    lab = "10_capstone"
+    for folder in ("labs", "solutions"):
+        shutil.copytree(ROOT / folder / lab, tmp_path / folder / lab)
+    for student, folder in (("wrote", "solutions"), ("wrote_nothing", "labs")):
+        kit.submit(tmp_path, student, lab, json.loads((ROOT / folder / lab / f"{lab}.ipynb").read_text()))
+    grade_course(lab, tmp_path, seed="secret", progress=False)
+    with opened(tmp_path) as book:
+        found = {student: book.find_submission(lab, student) for student in ("wrote", "wrote_nothing")}
+        assert {student: one.needs_manual_grade for student, one in found.items()} == {
+            "wrote": True,
+            "wrote_nothing": False,
+        }
+        assert found["wrote"].max_score == 24.0 and found["wrote"].score == 0.0
+    assert "Rubric (4 points)" in (tmp_path / "autograded" / "wrote" / lab / f"{lab}.ipynb").read_text()
