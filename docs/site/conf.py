@@ -1,16 +1,19 @@
 """How `make site` makes a static site of the repository: lessons, labs, guides, and reference pages from docstrings.
 
-The pages are the repository's own files, where they lie; nothing is written twice. Four hooks adapt them: links into
-the code lead to its reference page, views in 3-D get one plotly for the whole site, docstrings and lessons are linked
-both ways by the topic's number, and README becomes the first page. Everything is bundled: the site needs no network.
+The pages are the repository's own files, where they lie; nothing is written twice. Hooks adapt them: links into the
+code lead to its reference page, views in 3-D get one plotly for the whole site, explorers get pictures of their states
+(`explorers.py`), docstrings and lessons are linked both ways by the topic's number, and README becomes the first page.
+Everything is bundled: the site needs no network.
 """
 
+import html
 import importlib
 import json
 import os
 import pkgutil
 import re
 import shutil
+import sys
 from collections import defaultdict
 from pathlib import Path
 
@@ -20,6 +23,9 @@ import labkit
 from labkit import losses  # noqa: F401  torch first: its threads must not meet those of other libraries half loaded
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(Path(__file__).parent))
+import explorers  # noqa: E402  beside this file
+
 project, author, version = "labkit", "the labkit authors", importlib.metadata.version("labkit")
 project_copyright = "the labkit authors, MIT licence"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx-mathjax-offline"]
@@ -75,7 +81,8 @@ GUIDES = {
 
 # Where four kinds of readers want to go from the first page, under its title.
 SHORTCUTS = (
-    "Ten minutes: [twenty bugs](/lessons/errata.md) in others' code. Learn: [first lesson](/lessons/01_labels.ipynb). "
+    "Decide: [ten minutes](/docs/ten_minutes.md) from picture to lift. "
+    "Learn: [first lesson](/lessons/01_labels.ipynb), [twenty bugs](/lessons/errata.md). "
     "Teach: [syllabus](/docs/teaching.md). Use: {ref}`all names of the library <genindex>`."
 )
 
@@ -99,7 +106,8 @@ def lesson_of(number: str) -> str | None:
     return next((page for page in LESSONS if f"/{number}_" in page), None)
 
 
-LESSONS, MODULES = written("lessons", ".ipynb"), modules()
+LESSONS, LABS, MODULES = written("lessons", ".ipynb"), written("labs", ".ipynb"), modules()
+EXPLORERS = explorers.build(LESSONS)  # lesson's page -> names of its explorers
 TOPIC = re.compile(r"\bTopics? ((?:\d\d(?:_\w+)?(?:, | and )?)+)")
 derived: dict[str, set[str]] = defaultdict(set)  # lesson's page -> modules whose docstrings cite its topic
 
@@ -132,8 +140,9 @@ def write_reference() -> None:
 def contents() -> str:
     """The site's table of contents, as README's last lines."""
     parts = {
+        "Start": ["docs/ten_minutes"],
         "Lessons": [*LESSONS, "lessons/errata"],
-        "Labs": written("labs", ".ipynb"),
+        "Labs": LABS,
         **{name: [page for page in pages if (ROOT / f"{page}.md").exists()] for name, pages in GUIDES.items()},
         "Reference": ["genindex", *(f"out/reference/{name}" for name in MODULES)],
     }
@@ -172,15 +181,19 @@ def read_source(app, page: str, source: list[str]) -> None:
     path = ROOT / page
     if (ROOT / f"{page}.md").exists():
         text = links_that_lead_somewhere(source[0], path.parent.relative_to(ROOT))
+        text = re.sub(r"<!-- explorer: (\w+) -->", lambda match: explorers.page(match[1], page), text)
         source[0] = text.replace("\n\n", f"\n\n{SHORTCUTS}\n\n", 1) + contents() if page == root_doc else text
         return
     if not (ROOT / f"{page}.ipynb").exists():
         return
-    notebook = json.loads(source[0])
+    notebook, names = json.loads(source[0]), iter(EXPLORERS.get(page, ()))
     for cell in notebook["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
             cell["source"] = links_that_lead_somewhere(text, path.parent.relative_to(ROOT))
+        if explorers.shows_explorer(cell):
+            cell["outputs"] = cell["outputs"][:1]
+            cell["outputs"][0]["data"] = {"text/html": explorers.page(next(names), page)}
         for output in cell.get("outputs", []):
             show_in_3d(output.get("data", {}))
         cell["metadata"]["mystnb"] = {"image": {"alt": what_is_shown(notebook["cells"], cell)}}
@@ -188,12 +201,26 @@ def read_source(app, page: str, source: list[str]) -> None:
         links = ", ".join(f"[`{name}`](/out/reference/{name}.rst)" for name in sorted(derived[page]))
         last = {"cell_type": "markdown", "metadata": {}, "id": "reference", "source": f"**In the kit:** {links}"}
         notebook["cells"].append(last)
-    if page.startswith("labs/"):
-        words = (
-            f"{{download}}`Download this lab <{Path(page).name}.ipynb>` and open it in JupyterLab: here it only reads."
-        )
-        notebook["cells"].insert(1, {"cell_type": "markdown", "metadata": {}, "id": "download", "source": words})
+    if labs := [lab for lab in LABS if Path(lab).name[:3] == Path(page).name[:3]]:
+        notebook["cells"].insert(1, {"cell_type": "markdown", "metadata": {}, "id": "lab", "source": to_lab(labs[0])})
     source[0] = json.dumps(notebook)
+
+
+def to_lab(lab: str) -> str:
+    """Where a reader opens a lab: `_static/lab.js` makes a link of it once it knows the address of a JupyterLab.
+
+    LABKIT_HUB in the environment is that of the site, up to the folder that holds labs/; readers may give their own.
+    """
+    name, address = Path(lab).name, html.escape(os.environ.get("LABKIT_HUB", ""))
+    return (
+        f'<div class="lab" data-lab="{lab}.ipynb" data-address="{address}">\n'
+        f'<p class="open" hidden><a>Open lab {name} in your JupyterLab</a> '
+        f'<button type="button">Elsewhere</button></p>\n'
+        f'<p class="how">To work on lab {name}, type <code>make lab</code> (or <code>pip install -c constraints.txt '
+        f'-e ".[course,stacks]"</code>, then <code>jupyter lab</code>) and open <code>{lab}.ipynb</code>.</p>\n'
+        f'<form><label for="jupyter">With the address of your JupyterLab or hub, it is one click from then on:</label> '
+        f'<input id="jupyter" type="url" placeholder="http://localhost:8888"> <button>Keep it</button></form></div>\n'
+    )
 
 
 def what_is_shown(cells: list[dict], cell: dict) -> str:
@@ -202,6 +229,7 @@ def what_is_shown(cells: list[dict], cell: dict) -> str:
     words = [("".join(c["source"]) if c["cell_type"] == "markdown" else "") for c in cells]
     titles = [line.strip("# ") for text in words[:place] for line in text.splitlines() if line.startswith("#")]
     after = next((text for text in words[place + 1 : place + 3] if text), "")
+    after = re.sub(r"<details>.*?</details>", "", after, flags=re.DOTALL)
     plain = re.sub(r"<[^>]*>|[*`$#\[\]\\]|\([^)]*\.\w+\)", "", after)
     sentence = re.split(r"(?<=[.!?])\s", " ".join(plain.split()))[0]
     return f'Figure in "{titles[-1] if titles else "the lesson"}". {sentence}'
@@ -215,8 +243,9 @@ def show_in_3d(data: dict) -> None:
     text = json.dumps(figure).replace("</", "<\\/")
     height = figure.get("layout", {}).get("height", 460)
     data["text/html"] = (
-        f'<div class="view" style="height:{height}px" role="img" aria-label="A view in 3-D: drag to turn">'
+        f'<div class="view" style="height:{height}px" role="img" aria-label="A view in 3-D">'
         f'<script type="application/json">{text}</script></div>'
+        f'<p class="note">Drag to turn, scroll to come nearer, double-click to go back.</p>'
     )
 
 
@@ -240,11 +269,14 @@ def plain_words(app, what, name, thing, options, lines: list[str]) -> None:
 
 
 def finish(app, error) -> None:
-    """The first page is index.html; plotly stands beside the pages once."""
+    """The first page is index.html; plotly and the explorers' pictures stand beside the pages once."""
     if error is None:
+        static = Path(app.outdir) / "_static"
+        for folder in explorers.OUT.glob("*/*/"):
+            shutil.copytree(folder, static / "explorers" / folder.name, dirs_exist_ok=True)
         shutil.copy(Path(app.outdir) / "README.html", Path(app.outdir) / "index.html")
         script = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
-        shutil.copy(script, Path(app.outdir) / "_static" / "plotly.min.js")
+        shutil.copy(script, static / "plotly.min.js")
 
 
 write_reference()
@@ -253,6 +285,8 @@ write_reference()
 def setup(app) -> None:
     """Tell Sphinx of the hooks."""
     app.add_js_file("views.js", defer="defer")
+    app.add_js_file("explorers.js", defer="defer")
+    app.add_js_file("lab.js", defer="defer")
     app.connect("source-read", read_source)
     app.connect("autodoc-process-docstring", plain_words)
     app.connect("build-finished", finish)

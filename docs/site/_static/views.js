@@ -10,12 +10,18 @@ function load() {
   });
   return plotly;
 }
+async function draw(view) {
+  const { data, layout } = JSON.parse(view.querySelector("script").textContent);
+  const camera = structuredClone(layout.scene.camera); // plotly changes the layout's own
+  await load();
+  await Plotly.newPlot(view, data, layout, { responsive: true });
+  view.addEventListener("dblclick", () => Plotly.relayout(view, { "scene.camera": structuredClone(camera) }));
+}
 document.addEventListener("DOMContentLoaded", () => {
   const near = new IntersectionObserver((entries) => {
     for (const entry of entries.filter((entry) => entry.isIntersecting)) {
       near.unobserve(entry.target);
-      const figure = JSON.parse(entry.target.querySelector("script").textContent);
-      load().then(() => Plotly.newPlot(entry.target, figure.data, figure.layout, { responsive: true }));
+      draw(entry.target);
     }
   }, { rootMargin: "600px" });
   document.querySelectorAll("div.view").forEach((view) => near.observe(view));
