@@ -180,8 +180,8 @@ def read_source(app, page: str, source: list[str]) -> None:
     """Adapt a page: see the module's docstring."""
     path = ROOT / page
     if (ROOT / f"{page}.md").exists():
-        text = links_that_lead_somewhere(source[0], path.parent.relative_to(ROOT))
-        text = re.sub(r"<!-- explorer: (\w+) -->", lambda match: explorers.page(match[1], page), text)
+        text = re.sub(r"\[explorer: (\w+)\]\(.*\)", lambda match: explorers.page(match[1], page), source[0])
+        text = links_that_lead_somewhere(text, path.parent.relative_to(ROOT))
         source[0] = text.replace("\n\n", f"\n\n{SHORTCUTS}\n\n", 1) + contents() if page == root_doc else text
         return
     if not (ROOT / f"{page}.ipynb").exists():

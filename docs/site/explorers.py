@@ -230,7 +230,7 @@ def page(name: str, place: str) -> str:
     for control in state["controls"]:
         start = start * len(control["options"]) + control["start"]
     source = "../" * place.count("/") + f"_static/explorers/{name}/{start}.webp"
-    size = f'width="{state["width"]}" height="{state["height"]}"'
+    size = f'width="{state["width"]}" height="{state["height"]}" style="--width: {state["width"]}px"'
     text = json.dumps({"controls": state["controls"], "words": state["words"]}).replace("</", "<\\/")
     note = (
         f'<p class="note">The controls have {len(state["words"])} positions here; in JupyterLab they move freely.</p>'
