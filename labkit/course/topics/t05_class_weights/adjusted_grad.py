@@ -54,7 +54,7 @@ def shares_added(z, y, shares, tau):
     return (p - Y) * counted
 
 
-@wrong("Rare classes get a logit that is lowered while training: they must earn more. Yours is raised.")
+@wrong("The loss lowers the logit of a rare class by log(share). Yours raises it: which sign does the shift have?")
 def raised(z, y, shares, tau):
     return adjusted_grad(z, y, shares, -tau)
 
@@ -77,7 +77,7 @@ def one_hot_adjusted(z, y, shares, tau):
     return (p - Y * shares) * counted
 
 
-@wrong("You divide the gradient, as weights would: the shares move the logits, before the softmax.")
+@wrong("You divide the gradient by the shares. Here the shares shift the logits, before the softmax.")
 def shares_as_weights(z, y, shares, tau):
     p, Y, counted = parts(z, y)
     return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
@@ -91,13 +91,13 @@ def one_maximum_for_all(z, y, shares, tau):
     return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
 
 
-@wrong("tau multiplies the logarithm: log(tau * shares) adds the same to all classes, and so nothing.")
+@wrong("log(tau * shares) is log(shares) plus one number for all classes, which changes nothing. Where must tau stand?")
 def tau_inside_the_logarithm(z, y, shares, tau):
     p, Y, counted = parts(z + np.log(tau * shares), y)
     return (p - Y) * counted
 
 
-@wrong("A share stands in front of your gradient, as a weight would: here it only moves the logits.")
+@wrong("Your gradient is multiplied by a share, like a weight. A share only shifts the logits, before the softmax.")
 def times_the_share(z, y, shares, tau):
     return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]
 

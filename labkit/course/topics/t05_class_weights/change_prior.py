@@ -40,7 +40,7 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("A factor of a probability is a summand of its logarithm: which?")
+@wrong("If a probability is multiplied by a factor, what is added to its logit?")
 def ratios_added(z, w, shares, new_shares):
     return z + new_shares / (w * shares)
 
@@ -56,12 +56,12 @@ def probabilities(z, w, shares, new_shares):
     return q / q.sum(axis=-1, keepdims=True)
 
 
-@wrong("A factor of a probability is a summand of its logarithm: which?")
+@wrong("If a probability is multiplied by a factor, what is added to its logit?")
 def shares_added_and_subtracted(z, w, shares, new_shares):
     return z - w - shares + new_shares
 
 
-@wrong("Which probability belongs to the logits 0 and -800, and which logarithm has it? Can you do without?")
+@wrong("The softmax of the logits 0 and -800 is 1 and 0, and log 0 is -inf. Do you need probabilities here?")
 def by_probabilities(z, w, shares, new_shares):
     p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
     return np.log(p * new_shares / (w * shares))

@@ -47,7 +47,7 @@ def weights_not_scaled(counts, power):
     return np.maximum(counts, 1) ** -power
 
 
-@wrong("Not the weights are to sum to one: their mean over pixels is 1.")
+@wrong("Your weights sum to 1. It is their mean over all pixels that should be 1.")
 def weights_summing_to_one(counts, power):
     w = weights_not_scaled(counts, power)
     w[counts > 0] /= w[counts > 0].sum()

@@ -37,7 +37,7 @@ def most_likely(p, cost):
     return p.argmax(axis=-1)
 
 
-@wrong("You gave each true class one price; here the price depends on what is said instead, too.")
+@wrong("Your price depends on the true class alone. Here it depends on the class that is said, too.")
 def one_weight_per_class(p, cost):
     return (p * cost.sum(axis=1)).argmax(axis=-1)
 
@@ -57,7 +57,7 @@ def right_for_nothing(p, cost):
     return (p @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)
 
 
-@wrong("You take the most probable class for the truth: what do the other classes, less probable, cost?")
+@wrong("You decide as if the most probable class were surely the true one. What does it cost if another one is?")
 def cheapest_for_the_most_likely(p, cost):
     return cost[p.argmax(axis=-1)].argmin(axis=-1)
 

@@ -48,7 +48,7 @@ def of_log_probabilities(log_p, y, w):
     return means(-np.take_along_axis(log_p[counted], y[counted][:, None], -1)[:, 0], w[y[counted]])
 
 
-@wrong("A pixel that adds no loss is not one of those that you divide by.")
+@wrong("Pixels labelled 255 add no loss. Are they in the number that you divide by?")
 def means_over_all_pixels(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float((loss * weight).sum() / y.size), float((loss * weight).sum() / weight.sum())

@@ -56,7 +56,7 @@ def from_below(p1, y, recall):
     return 1.0 / weight_for_recall(1.0 - p1, y, recall)
 
 
-@wrong("At least the share: 0.4 of three pixels are 1.2, and one found pixel is too few.")
+@wrong("0.4 of three pixels are 1.2 pixels. Is one found pixel enough for a share of at least 0.4?")
 def one_too_few(p1, y, recall):
     found_first = np.sort(p1[y])[::-1]
     last = found_first[max(int(recall * len(found_first)), 1) - 1]
@@ -91,7 +91,9 @@ def at_least_one(p1, y, recall):
     return max(weight_for_recall(p1, y, recall), 1.0)
 
 
-@wrong("In floats (1 - p) / p * p may be a hair less than 1 - p: leave the limit a hair of room, or sort the pixels.")
+@wrong(
+    "By rounding, (1 - p) / p * p can be just below 1 - p. Give the limit a little room, or sort the pixels instead."
+)
 def tried_without_room(p1, y, recall):
     odds = np.unique((1.0 - p1) / p1)
     return next(w for w in odds if np.mean(w * p1[y] >= 1.0 - p1[y]) >= recall)

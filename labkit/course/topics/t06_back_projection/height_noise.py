@@ -185,7 +185,7 @@ def depth_along_a_unit_ray(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sig
     return np.linalg.norm(shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth / length, sigma_tilt))
 
 
-@wrong("By how much does a translation change the difference of two points? Noise is a difference.")
+@wrong("Noise is a difference of two points, and a translation changes no difference. Where does yours come in?")
 def translation_added(u, v, d, K, T_base_cam, *sigmas):
     J = np.vstack([jacobian(u, v, d, K), np.ones(4)])
     return np.linalg.norm(T_base_cam[2] @ J * (sigmas[0], *sigmas))

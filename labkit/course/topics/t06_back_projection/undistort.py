@@ -150,7 +150,7 @@ def too_few(pixels, K, k, rounds):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**4, rounds)
 
 
-@wrong("Newton divides by the slope of what he wants to be 0: what is the derivative of k1 r^3?")
+@wrong("Newton's step divides by the slope of the function that should become 0. What is the derivative of k1 r^3?")
 def newton_with_a_wrong_slope(pixels, K, k):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     x = (pixels - c) / f

@@ -52,12 +52,12 @@ def packed(P, kind="<f4", padding=4):
     return np.hstack([rows, np.zeros((len(P), padding), np.uint8)])
 
 
-@wrong("is_dense promises that no point is NaN: who promised that here?")
+@wrong("is_dense says that no point is NaN. Which line of yours makes sure of that?")
 def holes_kept(P):
     return packed(P).ravel()
 
 
-@wrong("A pixel without depth has become a point in the robot's foot.")
+@wrong("Points with NaN have become (0, 0, 0), a place in the robot's base. They should be left out.")
 def holes_as_origin(P):
     return packed(np.where(np.isfinite(P).all(axis=1, keepdims=True), P, 0.0)).ravel()
 
@@ -105,12 +105,12 @@ def millimetres(P):
     return packed(1000.0 * finite(P)).ravel()
 
 
-@wrong("Three coordinates must be finite: how many of them do you ask?")
+@wrong("All three coordinates must be finite. How many of them do you test?")
 def only_z_asked(P):
     return packed(P[np.isfinite(P[:, 2])]).ravel()
 
 
-@wrong("Infinite is not NaN, and it is not finite either: what else may a hole hold?")
+@wrong("You leave out NaN. Which other value is not finite?")
 def infinite_ones_kept(P):
     return packed(P[~np.isnan(P).any(axis=1)]).ravel()
 

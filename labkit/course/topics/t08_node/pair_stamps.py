@@ -86,7 +86,7 @@ def pairs(a, b, slop, distance):
     return np.where(mutual & (apart.min(axis=1) <= slop), best, -1)
 
 
-@wrong("Two images share one partner: is the nearest of b also nearer to this stamp than to any other?")
+@wrong("Two stamps of a have the same partner. Is each of the two stamps in a pair the nearest of the other?")
 def one_partner_for_two(a, b, slop):
     return np.concatenate([pair_stamps(alone, b, slop) for alone in a[:, None]])
 

@@ -186,7 +186,7 @@ def stamps_in_seconds(stamps, positions, quaternions, t):
         return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
 
 
-@wrong("The places are right and the turns are not in between: which turn is it at this time?")
+@wrong("The places are right. The turn is that of a published pose: which turn lies between the two poses?")
 def turn_of_the_one_before(*given):
     return with_turn(*given, lambda a, b, share: b if share >= 1 else a)
 
@@ -242,6 +242,6 @@ def shares_of_the_turn_exchanged(*given, side):
     return with_turn(*given, lambda a, b, share: arc(a, nearer(a, b), share, 1 - share), side)
 
 
-@wrong("The nearer one of b and -b is near to a: does the sign of b's own w know where a is?")
+@wrong("Take the one of b and -b that is nearer to a. Does the sign of b's w tell which one that is?")
 def sign_of_w(*given):
     return with_turn(*given, lambda a, b, share: arc(a, b if b[3] >= 0 else -b, 1 - share, share))

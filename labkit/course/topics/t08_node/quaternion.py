@@ -79,7 +79,7 @@ def length_is_1(R, q):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("Where the trace is -1, w is 0, and you divide by it. A hand that points down is half a turn.")
+@wrong("You divide by w, and after half a turn w is 0. A hand that points down has made half a turn.")
 def from_trace(R, least=-np.inf):
     """The formula that divides by w: fine only for turns well below half a turn. least: what 4 w^2 is at least."""
     w = 0.5 * np.sqrt(max(1.0 + np.trace(R), least))
@@ -155,7 +155,7 @@ def always_the_row_of_w(R):
     return row_of(R, 3)
 
 
-@wrong("All of your row has one factor, the component of the smallest square: how small can that be?")
+@wrong("Your row is q times one component, the one with the smallest square. How small can that be?")
 def row_of_the_smallest(R):
     return row_of(R, np.diagonal(products(R)).argmin())
 

@@ -83,7 +83,7 @@ def chosen_although_forbidden(features, mean, covariance, allowed):
     return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0
 
 
-@wrong("After features[allowed] the rows have new numbers: which ones does the image of pieces know?")
+@wrong("In features[allowed] the rows have new numbers. Which number has the piece in the image of pieces?")
 def chosen_among_the_allowed(features, mean, covariance, allowed):
     return 1 + int(distances(features[allowed], mean, covariance).argmin()) if allowed.any() else 0
 

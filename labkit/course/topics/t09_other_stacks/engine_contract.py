@@ -75,7 +75,7 @@ def kept_on_average(reference, other, tolerance):
     return np.abs(reference - other).mean() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
 
-@wrong("An engine that is too low by a mile keeps your contract: which way may a logit be off?")
+@wrong("An engine whose logits are far too low keeps your contract: in which directions can a logit be off?")
 def kept_upwards_alone(reference, other, tolerance):
     return (other - reference).max() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
@@ -103,7 +103,7 @@ def sorted_along_a_row(reference, other, tolerance):
     return *engine_contract(reference, other, tolerance)[:2], np.mean(best - second <= 2 * tolerance)
 
 
-@wrong("An engine that is too high by a mile keeps your contract: which way may a logit be off?")
+@wrong("An engine whose logits are far too high keeps your contract: in which directions can a logit be off?")
 def kept_downwards_alone(reference, other, tolerance):
     return ((reference - other) <= tolerance).all(), *engine_contract(reference, other, tolerance)[1:]
 

@@ -54,7 +54,7 @@ def resize_by_corners(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: i * old // n)
 
 
-@wrong("np.unique before and after: is the mean of class 0 and 2 a class 1?")
+@wrong("Print np.unique before and after: you average labels. Is the mean of classes 0 and 2 class 1?")
 def resize_bilinear(labels, size):
     W, H = size
     h, w = labels.shape
@@ -78,7 +78,7 @@ def resize_by_floats(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) * (old / n))
 
 
-@wrong("np.resize repeats the data in reading order: look at it.")
+@wrong("np.resize repeats the data in reading order, and does not enlarge a picture. Look at what it gives.")
 def resize_tiled(labels, size):
     W, H = size
     return np.resize(labels, (H, W))

@@ -103,7 +103,7 @@ def mask_with_swapped_bounds(hsv, lower, upper):
     return (h >= low) & (h <= high) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
-@wrong("Grey pixels have a hue too, any one: what excludes them?")
+@wrong("Grey pixels have a hue, too, which can be any number. Which bounds keep them out?")
 def mask_of_hue(hsv, lower, upper):
     return inside(hsv, lower, upper)[..., 0]
 
@@ -120,7 +120,7 @@ def hue_by_a_remainder_of_bytes(hsv, lower, upper):
     return hue & ((hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])).all(axis=-1)
 
 
-@wrong("From 5 to 20 nearly every hue is in yours: when is it `or`?")
+@wrong("With a range from 5 to 20 you mark nearly every hue. When is `or` right?")
 def mask_always_round(hsv, lower, upper):
     h = hsv[..., 0]
     return ((h >= lower[0]) | (h <= upper[0])) & between(hsv, lower, upper)[..., 1:].all(axis=-1)

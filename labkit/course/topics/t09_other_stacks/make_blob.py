@@ -86,28 +86,28 @@ def blob_of_256(bgr, multiple):
     return (planes(padded(bgr[..., ::-1], multiple)) / 256.0).astype(np.float32)
 
 
-@wrong("A side that is a multiple already needs no room: what do you add to 8 for a multiple of 4?")
+@wrong("A side that is a multiple already stays as it is: what do you add to 8 for a multiple of 4?")
 def room_for_one_more(bgr, multiple):
     return with_room(bgr, lambda n: (0, multiple - n % multiple))
 
 
-@wrong("The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+@wrong("New rows go below and new columns at the right, so that pixel (0, 0) stays where it is.")
 def room_all_round(bgr, multiple):
     return with_room(bgr, lambda n: (-n % multiple // 2, -n % multiple - -n % multiple // 2))
 
 
-@wrong("The room goes below and at the right, so that pixel (0, 0) stays where it is.")
+@wrong("New rows go below and new columns at the right, so that pixel (0, 0) stays where it is.")
 def room_above_and_left(bgr, multiple):
     return with_room(bgr, lambda n: (-n % multiple, 0))
 
 
-@wrong("What is left over was cut off: the network should see all of the image.")
+@wrong("You cut rows or columns off. The network should see all of the image.")
 def cut_to_a_multiple(bgr, multiple):
     H, W = (n // multiple * multiple for n in bgr.shape[:2])
     return scaled(planes(bgr[:H, :W, ::-1]))
 
 
-@wrong("The room is to be 0, not the last pixel once more.")
+@wrong("The rows and columns that you add hold 0, not the last pixel once more.")
 def room_like_the_edge(bgr, multiple):
     return scaled(planes(padded(bgr, multiple, "edge")[..., ::-1]))
 

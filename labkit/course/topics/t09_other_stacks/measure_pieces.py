@@ -64,7 +64,7 @@ def measured_with_open_boxes(pieces):
     return measured(pieces, box=lambda vu: (*vu.min(axis=0)[::-1], *(vu.max(axis=0)[::-1] + 1)))
 
 
-@wrong("0 is no piece: which piece is your first row of?")
+@wrong('0 means "no piece". Which piece does your first row measure?')
 def measured_with_the_background(pieces):
     return measured(pieces, first=0)
 
