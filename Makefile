@@ -33,11 +33,26 @@ demo: .venv/installed
 test: .venv/installed
 	tests/run $(ARGS)
 
-# JupyterLab with the course's settings and kernel. A .venv that has everything is used as it is.
+# JupyterLab with the course's settings and kernel. A .venv that has everything is used as it is. A new one gets all but
+# PyTorch, which is a third of it or, with CUDA, most: that comes while the first lesson is read.
 lab: export JUPYTER_CONFIG_PATH := $(CURDIR)/labkit/course/jupyter
 lab: export JUPYTER_PATH := $(JUPYTER_CONFIG_PATH)
 lab: $(or $(wildcard .venv/installed),.venv/installed-lab)
+	@if [ ! -e .venv/installed ] && [ ! -e .venv/torch ]; then
+	    echo "PyTorch comes in the background, and this terminal says when it is there. Topics 01 and 04 do without it."
+	    (
+	        pip="$(BIN)/python -m pip install --disable-pip-version-check --progress-bar off"
+	        if { [ -z "$(TORCH_INDEX)" ] || $$pip $(TORCH_BUILD); } > .venv/torch.log 2>&1 &&
+	            $$pip -c constraints.txt --no-compile torch >> .venv/torch.log 2>&1; then
+	            touch .venv/torch
+	            echo "PyTorch is there. Where a notebook missed it, run the cell again."
+	        else
+	            echo "pip could not install PyTorch: .venv/torch.log says why, and make lab tries again."
+	        fi
+	    ) &
+	fi
 	$(BIN)/jupyter lab $(ARGS)
+	wait
 
 release: .venv/installed
 	$(BIN)/labkit release $(ARGS)
@@ -108,6 +123,9 @@ train: .venv/installed
 	cp data/runs/{smallsegnet,unet}.pt data/runs/any/unet_rgbd.pt labkit/weights/
 	for model in smallsegnet unet; do $(BIN)/labkit export --model $$model --onnx labkit/weights/$$model.onnx; done
 
+# pip's arguments for the build of PyTorch that TORCH_INDEX asks for; what it requires comes from the usual index.
+TORCH_BUILD = --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"
+
 # Environments, and the extras of pyproject.toml that each holds.
 .venv/installed: EXTRAS := course,instructor,stacks,cluster,test
 .venv/installed-lab: EXTRAS := course,stacks
@@ -119,6 +137,15 @@ train: .venv/installed
 .venv-ros2/installed: EXTRAS := stacks,test
 .venv-ros2/installed: MORE := -r constraints-ros2.txt
 .venv-ros2/installed: constraints-ros2.txt
+
+# What `make lab` installs first: a list from pyproject.toml, since PyTorch is a dependency of the kit.
+export define ALL_BUT_TORCH
+import sys, tomllib
+project = tomllib.load(open("pyproject.toml", "rb"))["project"]
+lists = [project["dependencies"], *map(project["optional-dependencies"].get, sys.argv[1:])]
+print(*[name for names in lists for name in names if name != "torch"], sep="\n")
+endef
+COMMA := ,
 
 # A file `installing` is there while an installation runs and becomes `installed` when it ends. One that was killed leaves
 # `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
@@ -159,7 +186,13 @@ train: .venv/installed
 	        exit 1
 	    fi
 	}
-	if [ -n "$(TORCH_INDEX)" ]; then install --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"; fi
 	install -c constraints.txt setuptools
-	install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]' $(MORE)
+	if [ $@ = .venv/installed-lab ]; then
+	    $(@D)/bin/python -c "$$ALL_BUT_TORCH" $(subst $(COMMA), ,$(EXTRAS)) > $(@D)/first.txt
+	    install -c constraints.txt -r $(@D)/first.txt $(MORE)
+	    install --no-deps --no-build-isolation -e .
+	else
+	    if [ -n "$(TORCH_INDEX)" ]; then install $(TORCH_BUILD); fi
+	    install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]' $(MORE)
+	fi
 	mv $(@D)/installing $@

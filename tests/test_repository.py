@@ -242,6 +242,33 @@ def test_the_wrong_python_gets_one_line(checkout, arguments):
     assert not (checkout / ".venv").exists()
 
 
+STUB = """#!/bin/bash
+if [ "$1 $2" = "-m venv" ]; then
+    mkdir -p "$3/bin" && cp "$0" "$3/bin/python" && cp "$0" "$3/bin/jupyter"
+elif [ "$1 $2" = "-m pip" ]; then
+    echo "$@" >> asked
+elif [ "$1" != lab ]; then
+    exec {python} "$@"
+fi
+"""
+
+
+def test_a_student_begins_before_pytorch_is_there(checkout):
+    """With a Python that only writes down what pip is asked for: all but torch, the kit, then torch beside JupyterLab."""
+    (checkout / "python3.12").write_text(STUB.format(python=sys.executable))
+    (checkout / "python3.12").chmod(0o755)
+    done = make(checkout, "lab", "PYTHON=./python3.12")
+    assert done.returncode == 0 and "PyTorch is there." in done.stdout, done.stderr
+    first = (checkout / ".venv/first.txt").read_text().splitlines()
+    extras = PROJECT["optional-dependencies"]
+    assert sorted([*first, "torch"]) == sorted(PROJECT["dependencies"] + extras["course"] + extras["stacks"])
+    asked = [line.partition(" off ")[2] for line in (checkout / "asked").read_text().splitlines()]
+    assert [line.split()[-1] for line in asked] == ["setuptools", "--no-compile", ".", "torch"]
+    assert asked[1].startswith("-c constraints.txt -r ") and "--no-deps" in asked[2]
+    assert make(checkout, "lab").returncode == 0
+    assert len((checkout / "asked").read_text().splitlines()) == len(asked)
+
+
 def test_every_target_runs_something_and_readme_commands_exist():
     targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)[1].split()
     assert set(targets) >= {"demo", "test", "lab", "train", "bench", "clean"}

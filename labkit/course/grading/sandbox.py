@@ -337,9 +337,8 @@ def names_of(library: str) -> list[str]:
 
 def site_folders() -> list[str]:
     """Where this interpreter keeps installed packages."""
-    return list(
-        dict.fromkeys(str(Path(str(metadata.distribution(name).locate_file("")))) for name in ("numpy", "torch"))
-    )
+    found = [packages[0] for name in ("numpy", "torch") if (packages := list(metadata.distributions(name=name)))]
+    return list(dict.fromkeys(str(Path(str(package.locate_file("")))) for package in found))
 
 
 @functools.lru_cache
