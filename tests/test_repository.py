@@ -254,7 +254,7 @@ fi
 
 
 def test_a_student_begins_before_pytorch_is_there(checkout):
-    """With a Python that only writes down what pip is asked for: all but torch, the kit, then torch beside JupyterLab."""
+    """With a Python that only writes down what pip is asked for: all but torch, the kit, then torch."""
     (checkout / "python3.12").write_text(STUB.format(python=sys.executable))
     (checkout / "python3.12").chmod(0o755)
     done = make(checkout, "lab", "PYTHON=./python3.12")
