@@ -158,7 +158,7 @@ def test_half_of_a_labs_points_ask_for_a_step_that_no_lesson_shows():
             f"{name} says that it is new and is {like[name]:.2f} like a lesson" for name in new if like[name] >= NEW
         ]
         got = sum(points[f"check_{name}"] for name in new)
-        if 2 * got < sum(points.values()):
+        if like and 2 * got < sum(points.values()):
             said.append(f"{got} of {sum(points.values())} points are new steps; likeness "
                         + ", ".join(f"{name} {value:.2f}" for name, value in like.items()))  # fmt: skip
         return "; ".join(said)
