@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 pytest.importorskip("sphinx", reason="needs `make test-site`")
+pytestmark = pytest.mark.timeout(1800)  # the first test waits for the site, and that for its explorers' pictures
 ROOT = Path(__file__).parent.parent
 PAGES = [
     "index.html",
