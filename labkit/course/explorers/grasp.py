@@ -1,6 +1,6 @@
-"""Explorers of topic 07: the jaws at any yaw, and the visible centroid from any height of the camera.
+"""Explorers of topic 07: the jaws at any yaw, the visible centroid from any height of the camera, and friction cones.
 
-Besides the explorers: jaws seen from above, and a lift as a row of pictures.
+Besides the explorers: jaws seen from above, a lift as a row of pictures, and a can that is gripped beside its middle.
 """
 
 from functools import lru_cache
@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.patches import Circle, Polygon, Rectangle
 
 from labkit.course.explorers.explorer import Explorer
 from labkit.geometry import backproject_to_base
-from labkit.grasp import Gripper
+from labkit.grasp import Grasp, Gripper
 from labkit.labels import PALETTE, TARGET
 from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
 from labkit.views import fingers
@@ -29,6 +29,7 @@ THINGS = {
     "block": ((Part("box", (0.03, 0.07, 0.04)),), 0.02),
     "can": ((Part("cylinder", (0.025, 0.09)),), 0.045),
 }
+CAN_RADIUS, CAN_HEIGHT = 0.025, 0.08  # of the can that is gripped beside its middle, metres
 
 
 def draw_jaws(axes: Axes, T_base_grasp: Float[np.ndarray, "4 4"], width: float, **style) -> None:
@@ -162,3 +163,76 @@ def visible_centroid() -> Explorer:
         "thing": ipywidgets.Dropdown(options=list(THINGS), value="ball", description="thing"),
     }
     return Explorer(draw, controls, size=(8.5, 3.3))
+
+
+def contact_angle(offset: float) -> float:
+    """The angle between the closing direction and the can's normal where a pad meets it; radians.
+
+    offset: from the middle of the pads to the can's axis, along the pads, metres. Up to half a pad's width the flat pad
+    meets the can's side head-on; beyond, the pad's edge meets it at a slant. NaN where the pads pass the can by.
+
+    >>> [round(float(np.degrees(contact_angle(offset))), 1) for offset in (0.0, 0.008, 0.0212, 0.04)]
+    [0.0, 0.0, 30.0, nan]
+    """
+    beyond = max(abs(offset) - Gripper().pad_width / 2, 0.0) / CAN_RADIUS
+    return float(np.arcsin(beyond)) if beyond <= 1.0 else np.nan
+
+
+def lift_can(offset: float, friction: float, mass: float = 0.1, camera: Camera | None = None):
+    """Let the arm grip a can so far beside its axis, and lift: its LiftResult, and the pictures of a camera, if any.
+
+    offset: along the pads, metres. friction: the coefficient between pads and can. mass: kg. The simulator multiplies
+    the coefficients of two bodies, and the Panda's fingers have 1.
+    """
+    from labkit.sim.panda import Panda
+    from labkit.sim.world import World
+
+    parts = (Part("cylinder", (CAN_RADIUS, CAN_HEIGHT)),)
+    can = ObjectSpec(
+        "can", "can", TARGET, (0.5, 0.0, CAN_HEIGHT / 2), parts=parts, mass=mass, friction=friction, colour=ORANGE
+    )
+    T = np.diag([1.0, -1.0, -1.0, 1.0])  # x along the base's x, the jaws close along y, the hand points down
+    T[:3, 3] = 0.5 - offset, 0.0, 0.05
+    spec = SceneSpec((can,), camera or Camera.looking_at((0.5, 0.0, 0.05), 0.6, 0.3, 0.6))
+    with World(spec) as world:
+        pictures = film(world, camera, 0.2) if camera else []
+        return Panda(world).lift(Grasp(T, Gripper().max_opening)), pictures
+
+
+def friction_cones() -> Explorer:
+    """Two pads grip a can beside its axis: do both cones hold the line of force? Controls: offset (mm), friction."""
+    half = Gripper().pad_width / 2
+
+    def draw(figure: Figure, offset: int, friction: float) -> None:
+        above, curve = figure.subplots(1, 2, width_ratios=[1, 1.2])
+        angle, cone = contact_angle(offset / 1000), np.arctan(friction)
+        holds = angle <= cone
+        colour = "tab:green" if holds else "tab:red"
+        above.add_patch(Circle((offset, 0.0), 1000 * CAN_RADIUS, facecolor=ORANGE, alpha=0.5))
+        reach = 1000 * CAN_RADIUS * np.cos(angle)
+        x = min(offset, 1000 * half)
+        for side in (-1, 1):
+            y = side * reach
+            above.add_patch(Rectangle((-1000 * half, y), 2000 * half, 8 * side, facecolor="tab:blue"))
+            inwards = np.arctan2(-y, offset - x)  # the can's normal, from the contact to the axis
+            edges = inwards + np.array([-cone, cone])
+            corners = [(x, y), *np.add((x, y), 20 * np.column_stack([np.cos(edges), np.sin(edges)]))]
+            above.add_patch(Polygon(corners, facecolor=colour, alpha=0.35))
+        above.plot([x, x], [-reach, reach], "k-o", markersize=4, linewidth=1.5)
+        above.set(xlim=(-20, 60), ylim=(-40, 40), aspect="equal", xlabel="along the pads (mm)")
+        above.set(ylabel="closing direction (mm)", title="from above")
+        offsets = np.arange(0, 34)
+        angles = np.degrees([contact_angle(millimetres / 1000) for millimetres in offsets])
+        curve.plot(offsets, angles, color="0.4", label="angle at the contact")
+        curve.axhline(np.degrees(cone), color="tab:blue", linestyle="--", label="half angle of the cone")
+        curve.plot(offset, np.degrees(angle), "o", color=colour)
+        curve.set(xlabel="the can's axis is off by (mm)", ylabel="degrees", ylim=(-3, 90))
+        said = "inside, it holds" if holds else "outside, it slips"
+        curve.set_title(f"{np.degrees(angle):.0f} degrees, cone of {np.degrees(cone):.0f}: {said}", fontsize=10)
+        curve.legend(fontsize=8, loc="upper left")
+
+    controls = {
+        "offset": ipywidgets.IntSlider(14, min=0, max=32, step=2, description="offset (mm)"),
+        "friction": ipywidgets.FloatSlider(0.2, min=0.1, max=1.2, step=0.1, description="friction"),
+    }
+    return Explorer(draw, controls, size=(8.5, 3.6), stills=({"offset": 12}, {"offset": 20}))

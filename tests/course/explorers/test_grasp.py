@@ -54,3 +54,29 @@ def test_a_ball_shows_its_camera_a_centroid_two_thirds_of_the_radius_off():
         assert np.isclose(offset @ ray, 2 / 3 * widgets.RADIUS, rtol=0.06)
         assert np.linalg.norm(offset - offset @ ray * ray) < 0.001
         assert np.allclose(np.linalg.norm(cloud - centre, axis=1), widgets.RADIUS, atol=0.002)
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.4, 0.8])
+def test_a_can_holds_inside_the_friction_cone_and_slips_outside(friction):
+    """The offset at which the contact's angle is the cone's: half a pad, and radius times the sine of the cone."""
+    limit = 0.0174 / 2 + widgets.CAN_RADIUS * np.sin(np.arctan(friction))
+    assert np.isclose(np.tan(widgets.contact_angle(limit)), friction)
+    assert widgets.lift_can(limit - 0.002, friction)[0].success
+    assert widgets.lift_can(limit + 0.002, friction)[0].reason in ("slipped", "missed")
+
+
+def test_two_pads_carry_twice_the_friction_of_their_force():
+    friction, force = 0.2, 20.0  # N, the effort of a finger
+    limit = 2.0 * friction * force / 9.81
+    assert widgets.lift_can(0.0, friction, 0.8 * limit)[0].success
+    assert not widgets.lift_can(0.0, friction, 1.05 * limit)[0].success
+
+
+@pytest.mark.parametrize("offset, friction, said", [(8, 0.1, "inside, it holds"), (20, 0.2, "outside, it slips")])
+def test_the_drawn_cones_say_whether_the_line_of_force_is_inside(offset, friction, said):
+    above, curve = widgets.friction_cones().figure(offset=offset, friction=friction).axes
+    assert said in curve.get_title()
+    (line,) = above.lines
+    contacts = np.column_stack(line.get_data())
+    assert np.allclose(np.hypot(*(contacts - [offset, 0.0]).T), 1000 * widgets.CAN_RADIUS)
+    assert np.isclose(*contacts[:, 0])
