@@ -183,14 +183,20 @@ def compare(
 
 @app.command()
 def study(
-    out: Annotated[Path, typer.Option(help="Where to write the table.")] = Path("out/07_grasp.csv"),
+    out: Annotated[
+        Path | None, typer.Option(help="Where to write the table; out/07_grasp.csv or 07_scores.csv.")
+    ] = None,
+    scores: Annotated[
+        bool, typer.Option("--scores", help="Measure what the planner's score is worth instead.")
+    ] = False,
     workers: Workers = 1,
     dask: Dask = None,
 ) -> None:
     """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it goes on where it was."""
-    from labkit.apps import mask_study
+    from labkit.apps import mask_study, score_study
 
-    rows = mask_study.run(out, workers=workers, dask=dask)
+    out = out or Path("out/07_scores.csv" if scores else "out/07_grasp.csv")
+    rows = (score_study if scores else mask_study).run(out, workers=workers, dask=dask)
     rate, low, high = mask_study.lift_rate(rows)
     typer.echo(f"{out}: {len(rows)} lifts, {rate:.1%} succeeded (95 % interval {low:.1%} to {high:.1%})")
 

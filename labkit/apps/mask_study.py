@@ -121,8 +121,8 @@ def read(path) -> list[Row]:
     return trials.read_rows(path, Row)
 
 
-def lift_rate(rows: Sequence[Row]) -> tuple[float, float, float]:
-    """The share of trials that lifted, and its 95 % Wilson interval. Raises ValueError without any trial.
+def lift_rate(rows: Sequence) -> tuple[float, float, float]:
+    """The share of trials with `lifted` set, and its 95 % Wilson interval. Raises ValueError without any trial.
 
     >>> row = Row(600000, "true", 0.0, 1.0, 1, "lifted")
     >>> [round(x, 2) for x in lift_rate([row] * 20)]
