@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
@@ -52,13 +52,18 @@ class Trial:
 
 
 def run_trial(
-    spec, model=None, size: tuple[int, int] = (320, 240), crf: bool | None = None, perturb: bool = False
+    spec,
+    model=None,
+    size: tuple[int, int] = (320, 240),
+    crf: bool | None = None,
+    perturb: bool = False,
+    grasp: Callable | None = None,
 ) -> Trial:
     """Build a scene, look at it once, and let the arm try the best grasp that it can reach, once.
 
     spec: a SceneSpec. model: as in Pipeline, or the path of weights; None for true masks. crf: as in Pipeline. perturb:
     depth as a sensor measures it and a camera pose that is off (labkit.geometry.sensor.perturbed), the same for every
-    model. No reachable candidate is a
+    model. grasp: a planner in place of the kit's, as in Pipeline. No reachable candidate is a
     failure, and so is lifting anything but a target. Only the score reads the simulator's truth. Raises ValueError for
     a CRF on true masks.
     """
@@ -67,7 +72,7 @@ def run_trial(
     if crf and model is None:
         raise ValueError("crf: expected none with true masks, which there is nothing to refine in")
     with World(spec) as world:
-        perception, seconds = look(world, model, size, crf, perturb)
+        perception, seconds = look(world, model, size, crf, perturb, grasp)
         with timed(seconds, "lift"):
             result = lift(world, perception)
     frame = perception.frame
@@ -87,11 +92,18 @@ def run_trial(
     )
 
 
-def look(world, model, size: tuple[int, int], crf: bool | None, perturb: bool) -> tuple[Perception, dict[str, float]]:
+def look(
+    world,
+    model=None,
+    size: tuple[int, int] = (320, 240),
+    crf: bool | None = None,
+    perturb: bool = False,
+    grasp: Callable | None = None,
+) -> tuple[Perception, dict[str, float]]:
     """What a trial perceives in a World before it lifts, its frame with the true labels; and the seconds by stage."""
     if isinstance(model, (str, Path)):
         model = _loaded(str(model), Path(model).stat().st_mtime_ns)
-    pipeline, seconds = Pipeline(model, crf=crf), {}
+    pipeline, seconds = Pipeline(model, crf=crf, grasp=grasp), {}
     with timed(seconds, "render"):
         frame = world.render(size)
     if perturb:

@@ -1,0 +1,95 @@
+"""The table of attempts: the same cases for everybody, a paired interval, several processes, and a file."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import numpy as np
+import pytest
+
+from labkit.course.attempts import Attempts
+
+
+def table(**options) -> Attempts:
+    """Answers are functions of a case, 0 or 1 for each of 150."""
+    return Attempts(
+        lambda answer, case: int(answer(case)),
+        range(150),
+        np.mean,
+        lambda found: f"{sum(found)} of {len(found)}",
+        **options,
+    )
+
+
+def test_a_difference_has_the_interval_of_paired_trials():
+    """20 gained and 5 lost of 150 are 10 points, give or take 6."""
+    attempts = table().score("first", lambda case: case < 90)
+    attempts.score("second", lambda case: 5 <= case < 110)
+    assert attempts.rows[1][1] == [int(5 <= case < 110) for case in range(150)]
+    half = 1.96 * np.sqrt(25 - 15**2 / 150) / 150 * np.sqrt(150 / 149)
+    assert attempts.gain(0) == ""
+    assert attempts.gain(1) == f"  against 1: +20 -5, +10.0 points ({10 - 100 * half:+.1f} to {10 + 100 * half:+.1f})"
+
+
+def test_a_short_round_is_compared_on_its_own_cases_and_a_name_scored_again_replaces_its_row():
+    attempts = table().score("first", lambda case: case < 90).score("second", lambda case: case < 30, of=40)
+    assert "against 1: +0 -10" in attempts.gain(1)
+    attempts.score("second", lambda case: True, of=40)
+    assert [(name, len(results)) for name, results in attempts.rows] == [("first", 150), ("second", 40)]
+    assert "against 1: +0 -0" in repr(attempts)
+
+
+def test_a_full_round_is_not_compared_with_a_short_one():
+    attempts = table().score("first", lambda case: True, of=40).score("second", lambda case: True)
+    assert attempts.gain(1) == ""
+
+
+def test_what_a_notebook_defines_reaches_the_workers():
+    """Functions by value: these are local, so that no worker could import them."""
+    share = 0.5
+    attempts = table(workers=2).score("half", lambda case: case < share * 150)
+    assert sum(attempts.rows[0][1]) == 75
+
+
+def test_the_table_outlasts_the_kernel_and_tells_other_cases(tmp_path):
+    keep = tmp_path / "attempts.json"
+    table(keep=keep).score("first", lambda case: case < 90)
+    again = table(keep=keep).score("second", lambda case: case < 100)
+    assert [name for name, _ in again.rows] == ["first", "second"] and "+10 -0" in again.gain(1)
+    with pytest.raises(ValueError, match=r"keep: .*attempts\.json is a table of other cases"):
+        Attempts(max, [1, 2], sum, str, keep=keep)
+
+
+def test_ctrl_c_stops_a_round_whose_answer_never_ends(tmp_path):
+    script = """
+        import sys, time
+        from pathlib import Path
+        from labkit.course.attempts import Attempts
+
+        def forever(case):
+            Path(sys.argv[1]).touch()
+            while True:
+                time.sleep(0.01)
+
+        if __name__ == "__main__":
+            attempts = Attempts(lambda answer, case: answer(case), range(4), sum, str, workers=2)
+            try:
+                attempts.score("forever", forever)
+            except KeyboardInterrupt:
+                print("rows:", attempts.rows)
+    """
+    (tmp_path / "script.py").write_text(textwrap.dedent(script))
+    command = [sys.executable, tmp_path / "script.py", tmp_path / "began"]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        deadline = time.monotonic() + 120
+        while not (tmp_path / "began").exists():
+            assert running.poll() is None and time.monotonic() < deadline
+            time.sleep(0.05)
+        os.kill(running.pid, signal.SIGINT)  # to the kernel alone, not to its workers
+        assert running.communicate(timeout=120)[0] == "rows: []\n"
+    finally:
+        running.kill()
