@@ -73,10 +73,11 @@ class PictureFolder(Sequence):
     def _read(self, color: Path) -> RGBDFrame:
         """A picture with its labels, in the camera's own frame."""
         depth, mask = (self.folder / kind / f"{color.stem}.png" for kind in ("depth", "mask"))
-        for kind, path in (("depth", depth), ("mask", mask)):
-            if not path.is_file():
-                raise FileNotFoundError(f"{kind}: expected {path}, named as its picture is")
-        frame, labels = read_frame(color, depth, self.camera, self.depth_scale), read_image("mask", mask, np.uint8)
+        try:
+            frame, labels = read_frame(color, depth, self.camera, self.depth_scale), read_image("mask", mask, np.uint8)
+        except FileNotFoundError as error:
+            missing = Path(error.filename)
+            raise FileNotFoundError(f"{missing.parent.name}: expected {missing}, named as its picture is") from None
         if self.size not in (None, frame.size):
             raise ValueError(f"color: expected pictures of one size, {self.size} as before, got {frame.size}")
         if set(np.unique(labels)) == {0, IGNORE}:  # as many tools write a mask of one thing

@@ -1,12 +1,13 @@
 """Tables of trials: made scene by scene, stopped anywhere, read as they were written."""
 
-import inspect
+import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from labkit.apps import cli
+from labkit.apps import cli, mask_study, score_study, stack_study
 from labkit.apps.trials import in_order, make_table, read_rows, write_rows
 
 
@@ -55,7 +56,14 @@ def test_several_processes_give_results_in_order():
     assert list(in_order(abs, [-3, 2, -1], workers=2)) == [3, 2, 1]
 
 
-@pytest.mark.parametrize("command", [cli.compare, cli.study])
-def test_no_command_overwrites_a_committed_table_unasked(command):
-    out = inspect.signature(command).parameters["out"].default
+@pytest.mark.parametrize(
+    ("study", "command"),
+    [(stack_study, cli.compare), (mask_study, cli.study), (score_study, partial(cli.study, scores=True))],
+)
+def test_no_command_overwrites_a_committed_table_unasked(study, command, monkeypatch):
+    asked = []
+    monkeypatch.setattr(study, "run", lambda out, *_, **__: asked.append(out) or sys.exit())
+    with pytest.raises(SystemExit):
+        command()
+    (out,) = asked
     assert out.parts[0] == "out" and (Path(__file__).parents[2] / "lessons" / out.name).is_file()

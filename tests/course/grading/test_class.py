@@ -13,7 +13,7 @@ from labkit.course.topics import TOPICS, of_topic
 SEED = "a hidden seed"
 
 
-@pytest.mark.parametrize("topic", filter(of_topic, TOPICS))  # those that have questions
+@pytest.mark.parametrize("topic", [topic for topic in TOPICS if of_topic(topic)])  # those that have questions
 def test_every_grade_is_as_constructed(topic, tmp_path):
     students = kit.synthetic_class(topic)
     kit.write_lab(tmp_path, topic)

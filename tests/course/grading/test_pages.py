@@ -148,7 +148,9 @@ def test_nothing_that_a_student_wrote_runs_in_formgrader(course, page, tmp_path)
         page.set_extra_http_headers(
             {"Authorization": f"token {serving.TOKEN}"}
         )  # what pages ask for later needs it, too
+        page.route(lambda asked: not asked.startswith(url), lambda route: route.abort())  # no other network
         attacked, asked = visit(page, f"{url}/formgrader/submissions/{ids['eve']}/?index=0")
+        page.wait_for_selector(".MathJax .mfrac, .MathJax_SVG", timeout=20000)
         assert page.locator("#check_iou").count() == 1 and page.locator("text=onerror").count() > 0
         assert not attacked and not asked
         assert page.locator("text=one for the union").count() == 1 and page.locator("text=A model").count() == 0

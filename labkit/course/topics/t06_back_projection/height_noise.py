@@ -48,14 +48,14 @@ def turned_about(axis, P):
     return np.cross(np.eye(3)[axis], P)
 
 
-def shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt, columns=columns, axis=0):
+def shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt, moves=columns, axis=0):
     """Give how far u, v, d and the tilt each move the height, one standard deviation."""
-    J = jacobian(u, v, d, K, columns, axis)
+    J = jacobian(u, v, d, K, moves, axis)
     return T_base_cam[2, :3] @ J * (sigma_pixel, sigma_pixel, sigma_depth, sigma_tilt)
 
 
-def jacobian(u, v, d, K, columns=columns, axis=0):
-    du, dv, q = columns(u, v, d, K)
+def jacobian(u, v, d, K, moves=columns, axis=0):
+    du, dv, q = moves(u, v, d, K)
     return np.stack([du, dv, q, turned_about(axis, d * np.linalg.inv(K) @ (u, v, 1.0))], axis=1)
 
 
@@ -152,7 +152,7 @@ def straight(u, v, d, K):
 
 @wrong("An error of depth moves the point along its ray, and off the optical axis that is not the z axis.")
 def ray_straight_ahead(*arguments):
-    return np.linalg.norm(shares(*arguments, columns=straight))
+    return np.linalg.norm(shares(*arguments, moves=straight))
 
 
 @wrong("You have the whole error of the point; only its component along the base frame's z is asked for.")
