@@ -1,7 +1,8 @@
 """The grader's end of a worker's pipes: requests out, replies in until a deadline; nothing that comes is believed.
 
-A reply is a number of bytes with a limit, a letter, and then numbers or a short printable text: never a pickle. Texts
-of replies to secret cases are for nobody to read: what students are told comes from public cases (`grade`).
+A reply is a number of bytes with a limit, a letter, and then numbers or a short printable text: never a pickle. Long
+texts come only where one is asked for; in the place of an output they end the worker. Texts of replies to secret cases
+are for nobody to read: what students are told comes from public cases (`grade`).
 """
 
 import builtins
@@ -25,11 +26,13 @@ from labkit.course.grading.worker import DTYPES, MOST_AXES, MOST_BYTES, MOST_MES
 KINDS = {"c": "complex numbers", "O": "objects", "U": "text", "S": "bytes", "M": "dates", "m": "spans of time"}
 
 
-MOST_REPLY = 32 << 20  # bytes; the programs of a long notebook are long
+MOST_REPLY = MOST_BYTES + 1024  # bytes: an output, or an exception, with what is around it
+MOST_PROGRAMS = 32 << 20  # bytes; the programs of a long notebook are long
+MOST_FOUND = 1 << 20  # bytes of what is found in a program, which may have written them itself
 
 
 class Text(str):
-    """What a worker says that has run nothing of a student's; no answer's output."""
+    """What a worker says where a text is asked for: programs, or what is found in one; no answer's output."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +68,17 @@ class Worker:
     def __exit__(self, *exception) -> None:
         self.close()
 
-    def ask(self, request: tuple, limit_s: float) -> object:
-        """Send a request and return what the reply holds; raises WorkerLost, and kills the worker, if none came."""
+    def ask(self, request: tuple, limit_s: float, text: int = 0) -> object:
+        """Send a request and return what the reply holds; raises WorkerLost, and kills the worker, if none came.
+
+        text: the most bytes of a Text that may come; without it, a Text is no reply.
+        """
         data = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL)
-        return self.exchange(struct.pack("<I", len(data)) + data, limit_s)
+        return self.exchange(struct.pack("<I", len(data)) + data, limit_s, text)
 
     def programs(self, cells: list, asked: list, limit_s: float) -> list[tuple[Program, list[str]]]:
         """Have programs cut out of a notebook, by a worker in which nothing of it has run; each with its shapes."""
-        found = self.ask(("cut", cells, asked), limit_s)
+        found = self.ask(("cut", cells, asked), limit_s, MOST_PROGRAMS)
         if not isinstance(found, Text):
             raise WorkerLost(found if isinstance(found, Problem) else Problem("ended", "its cells cannot be read"))
         made = json.loads(found)
@@ -85,14 +91,14 @@ class Worker:
         """Wait until the worker has loaded its packages; no student's code has run by then."""
         self.exchange(b"", limit_s)
 
-    def exchange(self, data: bytes, limit_s: float) -> object:
+    def exchange(self, data: bytes, limit_s: float, text: int = 0) -> object:
         """Write, then read one reply. The deadline holds for both: a pipe that nobody reads gets full."""
         alarm = threading.Timer(limit_s, self.stop_late)
         alarm.start()
         try:
             self.requests.write(data)
             self.requests.flush()
-            return decode(self.read())
+            return decode(self.read(max(text, MOST_REPLY)), text > 0)
         except (OSError, EOFError, ValueError) as error:
             self.close()
             if self.late:
@@ -117,10 +123,10 @@ class Worker:
                 self.closed = True
                 self.kill()
 
-    def read(self) -> bytes:
+    def read(self, most: int) -> bytes:
         """Read one reply, of a length that is reasonable."""
         (length,) = struct.unpack("<I", self.read_exactly(4))
-        if length > MOST_REPLY:
+        if length > most:
             raise ValueError("length: a reply that is too long")
         return self.read_exactly(length)
 
@@ -139,10 +145,10 @@ class Worker:
                 stream.close()
 
 
-def decode(reply: bytes) -> object:
+def decode(reply: bytes, text: bool = False) -> object:
     """Read a reply: an array or number, a tuple of these, None for a cell that ran, or the Problem that it tells.
 
-    Raises ValueError for anything that `worker.encode` does not write.
+    text: whether a Text is a reply, too. Raises ValueError for anything that `worker.encode` does not write.
 
     >>> decode(b"V\\xff\\x03\\x01" + struct.pack("<q2i", 2, 5, -1))
     array([ 5, -1], dtype=int32)
@@ -150,7 +156,7 @@ def decode(reply: bytes) -> object:
     letter, rest = reply[:1], reply[1:]
     if letter == b"V":
         return decode_values(rest)
-    if letter == b"J":
+    if letter == b"J" and text:
         return Text(rest.decode("utf-8", "replace"))
     if letter == b"C" and rest[1:2] == b"V":
         return Changed(rest[0], decode_values(rest[2:]))

@@ -14,7 +14,7 @@ from labkit.course.checker.judge import Case, Problem, Verdict, expected_cases, 
 from labkit.course.checker.program import Program
 from labkit.course.checker.question import PACKAGES, PUBLIC_SEED, Question
 from labkit.course.grading import sandbox
-from labkit.course.grading.channel import Changed, Worker, WorkerLost
+from labkit.course.grading.channel import MOST_FOUND, Changed, Worker, WorkerLost
 from labkit.course.grading.sandbox import Limits
 
 drawing = threading.Lock()  # references are called with Python's warnings off, which no thread has for itself
@@ -71,7 +71,8 @@ class Run:
         public, fresh = pairs(public_cases(question)), pairs(more_public_cases(question))
         try:
             with sandbox.fresh_worker(self.packages(), self.limits, self.unsafe) as worker:
-                reply = worker.ask(("look", tolerances, pieces, public, fresh), self.limits.question_s)
+                task = ("look", tolerances, pieces, public, fresh)
+                reply = worker.ask(task, self.limits.question_s, MOST_FOUND)
         except WorkerLost:
             return []
         return read(reply, pieces) if isinstance(reply, str) else []
