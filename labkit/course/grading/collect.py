@@ -5,7 +5,9 @@
     Canvas                 lovelaceada_LATE_1234_567890_04_iou-2.ipynb
 
 A student is named by name and number, since two may share a name: "Ada Lovelace_1234567", "lovelaceada_1234".
-Moodle's zip tells when each file was handed in; Canvas's only which are late.
+Moodle's zip tells when each file was handed in; Canvas's only which are late. What follows these words is the name that
+the student gave the file, which may look like another student's or the other platform's: the platform's words come
+first, and count.
 """
 
 import datetime
@@ -16,8 +18,21 @@ from pathlib import Path
 
 from nbgrader.plugins import FileNameCollectorPlugin
 
-MOODLE = re.compile(r"(?P<name>[^/\\]+)_(?P<number>\d+)_assignsubmission_file_?[/\\]?(?:.*[/\\])?(?P<file>[^/\\]+)$")
-CANVAS = re.compile(r"(?:.*[/\\])?(?P<name>[^/\\_]+)(?P<late>_LATE)?_(?P<number>\d+)_\d+_(?P<file>[^/\\]+)$")
+MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_file_?(?P<file>.*)")
+CANVAS = re.compile(r"(?P<name>[^_]+)(?P<late>_LATE)?_(?P<number>\d+)_\d+_(?P<file>.+)")
+
+
+def read_name(path: str | Path) -> tuple[re.Match | None, str]:
+    """What a platform says in a file's name or in that of a folder around it, None if nothing; and the file's own name.
+
+    Canvas comes first for a file: no name of Moodle's has its two numbers.
+    """
+    *folders, last = Path(path).parts
+    for folder in folders:
+        if (found := MOODLE.fullmatch(folder)) and not found["file"]:
+            return found, last
+    found = CANVAS.fullmatch(last) or MOODLE.fullmatch(last)
+    return found, found["file"] if found else last
 
 
 def student_and_notebook(path: str) -> tuple[str, str] | None:
@@ -28,10 +43,10 @@ def student_and_notebook(path: str) -> tuple[str, str] | None:
     >>> student_and_notebook("extracted/all/lovelaceada_LATE_1234_567890_04_iou-2.ipynb")
     ('lovelaceada_1234', '04_iou.ipynb')
     """
-    found = MOODLE.search(path) or CANVAS.match(path)
+    found, file = read_name(path)
     if found is None:
         return None
-    notebook = re.sub(r"(?: ?\(\d+\)|-\d+)(?=\.ipynb$)", "", found["file"])  # of a file handed in, or saved, again
+    notebook = re.sub(r"(?: ?\(\d+\)|-\d+)(?=\.ipynb$)", "", file)  # of a file handed in, or saved, again
     return f"{unicodedata.normalize('NFC', found['name'])}_{found['number']}", notebook
 
 
@@ -39,8 +54,8 @@ def marked_late(course: Path, topic: str) -> set[str]:
     """The students whose files Canvas marks as late."""
     found = set()
     for path in (Path(course) / "downloaded" / topic).rglob("*.ipynb"):
-        mark = CANVAS.match(str(path))
-        if not MOODLE.search(str(path)) and mark and mark["late"]:
+        mark, _ = read_name(path)
+        if mark and mark.re is CANVAS and mark["late"]:
             found.add(student_and_notebook(str(path))[0])
     return found
 
@@ -48,7 +63,8 @@ def marked_late(course: Path, topic: str) -> set[str]:
 def handed_in(path: Path) -> str:
     """When a file in an extracted zip of Moodle's was handed in, as the zip says in local time; "" if it does not."""
     folder = next((parent for parent in path.parents if parent.name == "extracted"), None)
-    if folder is None or not MOODLE.search(str(path)):
+    found, _ = read_name(path)
+    if folder is None or found is None or found.re is not MOODLE:
         return ""
     archive, *parts = path.relative_to(folder).parts
     try:

@@ -11,6 +11,7 @@ from pathlib import Path
 import grading_course as kit
 import pytest
 
+from labkit.course.grading.collect import handed_in, marked_late, student_and_notebook
 from labkit.course.grading.run import grade_course
 from labkit.course.topics import of_topic
 
@@ -58,3 +59,27 @@ def test_a_zip_becomes_grades(tmp_path, files, students):
     records = {record.student: record for record in grade_course(TOPIC, tmp_path, progress=False).records}
     assert set(students) <= records.keys()
     assert records[students[0]].points == TOTAL and records[students[1]].points == records[students[2]].points == 0.0
+
+
+GRACE = "Grace Hopper_7654321_assignsubmission_file_04_iou.ipynb"  # what others may call their files
+
+
+@pytest.mark.parametrize(
+    "name, student",
+    [
+        (f"Eve Adams_1111111_assignsubmission_file_{GRACE}", "Eve Adams_1111111"),
+        (f"Eve Adams_1111111_assignsubmission_file_/{GRACE}", "Eve Adams_1111111"),
+        (f"Eve Adams_1111111_assignsubmission_file_/{GRACE}/04_iou.ipynb", "Eve Adams_1111111"),
+        (f"adamseve_1235_567891_{GRACE}", "adamseve_1235"),
+        ("adamseve_LATE_1235_567891_hoppergrace_7654_1_04_iou.ipynb", "adamseve_1235"),
+        ("adamseve_LATE_1235_567891_x_1235_assignsubmission_file_04_iou.ipynb", "adamseve_1235"),
+        ("adamseve_1235_567891_x\\hoppergrace_7654_1_04_iou.ipynb", "adamseve_1235"),
+    ],
+)
+def test_the_name_that_a_student_gives_a_file_makes_nobody_else_of_them(tmp_path, name, student):
+    path = tmp_path / "downloaded" / TOPIC / "extracted/all" / name
+    path.parent.mkdir(parents=True)
+    path.touch()
+    assert student_and_notebook(str(path))[0] == student
+    assert marked_late(tmp_path, TOPIC) == ({student} if "_LATE_" in name else set())
+    assert handed_in(path) == ""  # there is no zip
