@@ -155,10 +155,14 @@ class Server:
 
 
 class Servers:
-    """Servers that wait for the next answer, by packages and limits; threads take them and give them back."""
+    """Servers that wait for the next answer, by packages and limits; threads take them and give them back.
+
+    Before the first one with some packages, since they were all closed, what earlier answers read is forgotten.
+    """
 
     def __init__(self):
         self.idle: dict[tuple, collections.deque[Server]] = collections.defaultdict(collections.deque)
+        self.forgotten: set[tuple[str, ...]] = set()
 
     def take(self, packages: Sequence[str], limits: Limits) -> Server:
         """Give a server that is idle, or start one."""
@@ -167,6 +171,9 @@ class Servers:
             try:
                 server = idle.pop()
             except IndexError:
+                if not limits.container and tuple(packages) not in self.forgotten:
+                    self.forgotten.add(tuple(packages))
+                    forget_pages(tuple(packages))
                 return Server(packages, limits)
             if server.alive:
                 return server
@@ -181,6 +188,7 @@ class Servers:
 
     def close(self) -> None:
         """End all servers that are idle."""
+        self.forgotten.clear()
         for idle in self.idle.values():
             while idle:
                 idle.pop().close()
@@ -325,6 +333,27 @@ def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | N
     programs = TOOLS | {"worker": os.path.abspath(worker.__file__)}
     shown += [(f"/look/{file}", str(CHECKER / file)) for file in LOOK_FOR_MISTAKES.values()]
     return python, [*dict.fromkeys(shown), *((f"/{name}.py", path) for name, path in programs.items())]
+
+
+def forget_pages(packages: tuple[str, ...]) -> None:
+    """Take the files that the sandbox shows out of memory, but for what other processes have mapped.
+
+    Which pages are there tells an answer which ones one of an earlier run has read, on secret arguments perhaps.
+    """
+    for place, source in shown_files(packages)[1]:
+        if source is None or place.startswith("/dev/"):
+            continue
+        found = [source] if os.path.isfile(source) else []
+        for folder, folders, names in os.walk(source):
+            folders[:] = [name for name in folders if name != "site-packages"]  # the standard library's is not shown
+            found += [f"{folder}/{name}" for name in names]
+        for path in found:
+            with suppress(OSError):
+                file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+                try:
+                    os.posix_fadvise(file, 0, 0, os.POSIX_FADV_DONTNEED)
+                finally:
+                    os.close(file)
 
 
 def names_of(library: str) -> list[str]:

@@ -278,6 +278,34 @@ def test_no_answer_finds_what_an_earlier_one_left():
     assert kept == 0 and other != number
 
 
+# Gives how many pages each of some files had to be read for, from the disk; `every` other one is passed over.
+PAGES = """
+import mmap, os, resource
+import numpy as np
+FILES = sorted(f"{base}/{name}" for base, _, names in os.walk("/packages/numpy") for name in names)
+FILES = [path for path in FILES if path.endswith(".pyi") and os.path.getsize(path) > 9999][:16]
+def f(every):
+    found = []
+    for path in FILES[::every]:
+        file = os.open(path, os.O_RDONLY)
+        with mmap.mmap(file, 0, prot=mmap.PROT_READ) as pages:
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_majflt
+            pages[5000]
+            found.append(resource.getrusage(resource.RUSAGE_SELF).ru_majflt - before)
+        os.close(file)
+    return np.array(found)
+"""
+
+
+def test_no_answer_sees_what_one_of_an_earlier_run_read():
+    for every in (2, 1):
+        sandbox.servers.close()  # as at the end of a run
+        with sandbox.fresh_worker(("numpy",), LIMITS) as started:
+            assert started.ask(("run", "f", PAGES), PATIENCE) is None
+            found = called(started, every)
+    assert len(found) == 16 and len(set(found.tolist())) == 1  # all from the disk, or none where it is memory itself
+
+
 def test_a_server_that_ended_costs_nobody_and_one_that_an_answer_ends_costs_that_answer():
     with sandbox.fresh_worker(("numpy",), LIMITS):
         pass
