@@ -315,7 +315,7 @@ def test_a_server_that_ended_costs_nobody_and_one_that_an_answer_ends_costs_that
         assert told(started, "return 2") == 2
         started.kill.__self__.close()
         with pytest.raises(WorkerLost):
-            started.ask(("run", "f", "1"), 5.0)
+            started.ask(("run", "f", "import time; time.sleep(20)"), PATIENCE)  # or it may be done before it is ended
     with sandbox.fresh_worker(("numpy",), LIMITS) as started:
         assert told(started, "return 2") == 2
 
