@@ -92,9 +92,9 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
             )
             jobs = ((grading, batch.secret if cases == "secret" else None) for grading in gradings.values())
             with bar:
-                for submission, results in as_they_come(graded, jobs, executor, 2 * batch.workers):
-                    student, sandboxed = submission.student, not batch.unsafe
-                    key = keys[student] + mark
+                for judged, results in as_they_come(graded, jobs, executor, 2 * batch.workers):
+                    submission, student, sandboxed = judged.submission, judged.submission.student, not batch.unsafe
+                    key = "" if judged.failed else keys[student] + mark  # the next run tries again
                     record = Record(student, submission.reason, results, sandboxed, submission.digest, key)
                     records[student] = record
                     write_record(batch.out, record)
@@ -102,12 +102,11 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
     return [records[submission.student] for submission in batch.submissions], len(gradings)
 
 
-def graded(grading: Grading, secret: str | None) -> tuple[Submission, tuple[Result, ...]]:
-    """A submission with its results in public, or those of all cases if there is a secret; none if it is unreadable."""
-    submission = grading.submission
-    if submission.reason:
-        return submission, ()
-    return submission, grading.in_public() if secret is None else grading.in_secret(secret)
+def graded(grading: Grading, secret: str | None) -> tuple[Grading, tuple[Result, ...]]:
+    """A grading with its results in public, or those of all cases if there is a secret; none if it is unreadable."""
+    if grading.submission.reason:
+        return grading, ()
+    return grading, grading.in_public() if secret is None else grading.in_secret(secret)
 
 
 # ------------------------------------------------------------------------------------------------------ records

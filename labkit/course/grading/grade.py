@@ -8,10 +8,12 @@ arguments can reach a page.
 """
 
 import hashlib
+import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -32,6 +34,7 @@ ONLY_HIDDEN = (
     "right in the cases of its check, wrong in others: which inputs does the task allow that these do not have?"
 )
 WRONG_IN_SECRET = "right in the public cases"  # how such answers behave
+NOT_JUDGED = "the grader could not judge it, which your instructor sees"
 
 
 @dataclass(frozen=True)
@@ -58,8 +61,8 @@ class Result:
 class Grading:
     """The grading of one submission that can be read, question by question: all of them in public, then in secret.
 
-    drafts: results of an earlier run on the public cases. unsafe: without a sandbox. Raises ValueError if no sandbox
-    can be made.
+    drafts: results of an earlier run on the public cases. unsafe: without a sandbox. An error of the grader's own costs
+    the one answer that it judged, which is flagged; failed: whether there was one, so that another try is due.
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class Grading:
         self.questions = of_topic(lab.topic)
         self.drafts = {draft.question: draft for draft in drafts}
         self.results: dict[str, Result] = {}
+        self.failed = False
 
     def in_public(self) -> tuple[Result, ...]:
         """The results on the public cases, in the lab's order."""
@@ -116,8 +120,18 @@ class Grading:
         """What a question earns if its answer is right in secret, too; answers that it calls are judged before."""
         if name not in self.drafts:
             self.drafts[name] = not_gradable(self.lab, name, "it calls itself through another answer")
-            self.drafts[name] = self.judged_in_public(name)
+            self.drafts[name] = self.unless_it_fails(name, lambda: self.judged_in_public(name))
         return self.drafts[name]
+
+    def unless_it_fails(self, name: str, judge: Callable[[], Result]) -> Result:
+        """The result of a judgement, or a flag that says where the grader failed; what it said may be a stranger's."""
+        try:
+            return judge()
+        except Exception as error:
+            self.failed = True
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{type(error).__name__} in {Path(place.filename).name}, line {place.lineno}"
+            return replace(not_gradable(self.lab, name, NOT_JUDGED), flag=f"the grader failed: {where}; grade it again")
 
     def judged_in_public(self, name: str) -> Result:
         """Judge an answer on the public cases, and say what is wrong with a wrong one."""
@@ -160,7 +174,7 @@ class Grading:
         if name not in self.results:
             self.results[name] = self.draft(name)
             if self.results[name].right:
-                self.results[name] = self.judged_in_secret(name, secret)
+                self.results[name] = self.unless_it_fails(name, lambda: self.judged_in_secret(name, secret))
         return self.results[name]
 
     def judged_in_secret(self, name: str, secret: str) -> Result:

@@ -138,8 +138,9 @@ def read_submission(place: Path, lab: Lab) -> Submission | None:
         code, cells = pick_cells(content["cells"], lab)
     except Unreadable as reason:
         return Submission(student, reason=str(reason), digest=digest)
-    except OSError as error:
-        return Submission(student, reason=f"it cannot be opened: {error.strerror}", digest=digest)
+    except Exception as error:  # of one student's folder: the others are read all the same
+        why = getattr(error, "strerror", None) or type(error).__name__
+        return Submission(student, reason=f"it cannot be opened: {why}", digest=digest)
     beside = text_of(notebook.with_name("timestamp.txt")), text_of(notebook.with_name("submission_secret.txt"))
     return Submission(student, code, cells, "", digest, outdated(content, lab), *beside)
 

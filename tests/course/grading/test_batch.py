@@ -5,6 +5,7 @@ import hashlib
 import html
 import json
 import os
+import re
 import shutil
 import signal
 import stat
@@ -223,6 +224,34 @@ def test_a_student_whom_the_gradebook_cannot_take_stops_nobody_else(course, monk
     assert grade(course).failures == {}
     with gradebook.opened(course) as book:
         assert book.find_submission(TOPIC, "ben").score == 0.0
+
+
+@pytest.mark.parametrize("cases", ["public", "secret"])
+def test_an_error_of_the_grader_flags_one_answer_stops_nobody_and_is_tried_again(course, monkeypatch, cases):
+    right = kit.right_answers(TOPIC)["iou"]
+    answer = "def iou(n):\n    return n / 7\n" if cases == "public" else f"{right}\n# mine\n"
+    path = kit.submit(course, "fay", TOPIC, kit.right_answers(TOPIC) | {"iou": answer})
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    name = "behaviour_of" if cases == "public" else "secret_cases"
+    original = getattr(grading, name)
+
+    def fails_for_fay(first, *rest):
+        in_public = not rest and isinstance(first[0], kit.np.ndarray)
+        if in_public or (digest in rest and first.function == "iou"):
+            raise OverflowError(f"a stranger's words: {SECRET}")
+        return original(first, *rest)
+
+    monkeypatch.setattr(grading, name, fails_for_fay)
+    graded = grade(course)
+    assert [record.points for record in graded.records] == [TOTAL, 0.0, BUT_IOU, BUT_IOU]
+    (flag,) = [result.flag for result in graded.records[3].results if result.flag]
+    assert re.fullmatch(r"the grader failed: OverflowError in test_batch.py, line \d+; grade it again", flag)
+    told = for_students(course)["feedback/fay.html"].decode()
+    assert "The grader could not judge it" in told and "OverflowError" not in told and SECRET not in told
+    assert grade(course).graded_now == 1
+    monkeypatch.undo()
+    assert grade(course).records[3].points == (BUT_IOU if cases == "public" else TOTAL)
+    assert grade(course).graded_now == 0
 
 
 def test_a_folder_that_cannot_be_entered_stops_nobody_else(course, monkeypatch):
