@@ -7,6 +7,7 @@ c.CourseDirectory.source_directory = "solutions"
 c.CourseDirectory.release_directory = "labs"
 c.CourseDirectory.ignore = [".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"]
 # Whose a file is in a zip of Moodle's or Canvas's: downloaded/TOPIC/archive/ANY.zip, then `nbgrader zip_collect TOPIC`.
+c.ZipCollectApp.extractor_plugin = "labkit.course.grading.collect.LmsExtractor"
 c.ZipCollectApp.collector_plugin = "labkit.course.grading.collect.LmsCollector"
 # `nbgrader autograde` and formgrader's Autograde refuse: `labkit grade` grades.
 c.Autograde.exporter_class = "labkit.course.grading.refusal.GradedByLabkit"

@@ -5,34 +5,43 @@
     Canvas                 lovelaceada_LATE_1234_567890_04_iou-2.ipynb
 
 A student is named by name and number, since two may share a name: "Ada Lovelace_1234567", "lovelaceada_1234".
-Moodle's zip tells when each file was handed in; Canvas's only which are late. What follows these words is the name that
-the student gave the file, which may look like another student's or the other platform's: the platform's words come
-first, and count.
+Moodle's zip tells when each file was handed in; Canvas's only which are late. Moodle writes no underscore into a name,
+and Canvas none beside a number, so these words can be read in one way only. What follows them, or lies in a zip that a
+student handed in, has names of the student's making, which may look like another student's: they name nobody.
 """
 
 import datetime
+import io
+import os
 import re
 import unicodedata
 import zipfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from nbgrader.plugins import FileNameCollectorPlugin
+from nbgrader.plugins import ExtractorPlugin, FileNameCollectorPlugin
 
-MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_file_?(?P<file>.*)")
-CANVAS = re.compile(r"(?P<name>[^_]+)(?P<late>_LATE)?_(?P<number>\d+)_\d+_(?P<file>.+)")
+from labkit.course.grading.reading import LARGEST_NOTEBOOK
+
+MOODLE = re.compile(r"(?P<name>[^_]+)_(?P<number>\d+)_assignsubmission_file_?(?P<file>.*)")
+CANVAS = re.compile(r"(?P<name>.+?)(?P<late>_LATE)?_(?P<number>\d+)_\d+_(?P<file>(?!assignsubmission_file).+)")
+MOST_NOTEBOOKS = 20  # in a zip of a student's
 
 
 def read_name(path: str | Path) -> tuple[re.Match | None, str]:
     """What a platform says in a file's name or in that of a folder around it, None if nothing; and the file's own name.
 
-    Canvas comes first for a file: no name of Moodle's has its two numbers.
+    path: ../extracted/ARCHIVE/..; the outermost name in it that a platform could have written counts.
     """
-    *folders, last = Path(path).parts
-    for folder in folders:
-        if (found := MOODLE.fullmatch(folder)) and not found["file"]:
-            return found, last
-    found = CANVAS.fullmatch(last) or MOODLE.fullmatch(last)
-    return found, found["file"] if found else last
+    parts = Path(path).parts
+    if "extracted" in parts:
+        parts = parts[parts.index("extracted") + 2 :]
+    for depth, part in enumerate(parts, 1):
+        if found := MOODLE.fullmatch(part) or CANVAS.fullmatch(part):
+            if depth == len(parts):
+                return found, found["file"]
+            is_platforms = not found["file"] or found["file"].endswith(".zip")
+            return found if is_platforms else None, parts[-1]
+    return None, parts[-1]
 
 
 def student_and_notebook(path: str) -> tuple[str, str] | None:
@@ -50,10 +59,15 @@ def student_and_notebook(path: str) -> tuple[str, str] | None:
     return f"{unicodedata.normalize('NFC', found['name'])}_{found['number']}", notebook
 
 
+def extracted(course: Path, topic: str) -> list[Path]:
+    """The notebooks that were taken out of a platform's zips."""
+    return sorted((Path(course) / "downloaded" / topic / "extracted").rglob("*.ipynb"))
+
+
 def marked_late(course: Path, topic: str) -> set[str]:
     """The students whose files Canvas marks as late."""
     found = set()
-    for path in (Path(course) / "downloaded" / topic).rglob("*.ipynb"):
+    for path in extracted(course, topic):
         mark, _ = read_name(path)
         if mark and mark.re is CANVAS and mark["late"]:
             found.add(student_and_notebook(str(path))[0])
@@ -61,19 +75,57 @@ def marked_late(course: Path, topic: str) -> set[str]:
 
 
 def handed_in(path: Path) -> str:
-    """When a file in an extracted zip of Moodle's was handed in, as the zip says in local time; "" if it does not."""
-    folder = next((parent for parent in path.parents if parent.name == "extracted"), None)
+    """When a file from Moodle's zip was handed in, as the zip says in local time; "" if it does not."""
     found, _ = read_name(path)
-    if folder is None or found is None or found.re is not MOODLE:
-        return ""
-    archive, *parts = path.relative_to(folder).parts
-    try:
-        with zipfile.ZipFile(folder.with_name("archive") / f"{archive}.zip") as packed:
-            stamp = packed.getinfo("/".join(parts)).date_time
-        when = datetime.datetime(*stamp).astimezone(datetime.UTC)
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
-        return ""
-    return f"{when:%Y-%m-%d %H:%M:%S} UTC" if when.year > 1980 else ""  # of a zip without times
+    when = datetime.datetime.fromtimestamp(path.stat().st_mtime, datetime.UTC)
+    is_told = found is not None and found.re is MOODLE and when.year > 1980
+    return f"{when:%Y-%m-%d %H:%M:%S} UTC" if is_told else ""
+
+
+class LmsExtractor(ExtractorPlugin):
+    """Takes the notebooks out of a platform's zips, and out of zips that students handed in.
+
+    What cannot be read is named and left: nbgrader's own extractor stops at a student's broken zip, and never ends with
+    one that holds itself. A file has the time of the platform's entry, 1970 for none.
+    """
+
+    def extract(self, archive_path: str, extracted_path: str) -> None:
+        """Extract what is in a folder of zips; notebooks that lie there without a zip are copied."""
+        archive, target = Path(archive_path), Path(extracted_path)
+        for path in archive.rglob("*.ipynb"):
+            self.write(target / "files" / path.relative_to(archive), path.read_bytes(), 0.0)
+        for path in sorted(archive.rglob("*.zip")):
+            with zipfile.ZipFile(path) as packed:
+                for entry in packed.infolist():
+                    try:
+                        self.take(packed, entry, target / path.stem)
+                    except Exception as error:  # of one student's file: the others' are extracted all the same
+                        self.log.warning("Left out %a: %s", entry.filename, type(error).__name__)
+
+    def take(self, packed: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
+        """Write the notebook that an entry of a platform's zip is, or those in the zip that it is."""
+        path, when = PurePosixPath(entry.filename), datetime.datetime(*entry.date_time)
+        found = {path: entry}
+        if path.suffix == ".zip":
+            packed = zipfile.ZipFile(io.BytesIO(content(packed, entry)))
+            found = {path / PurePosixPath(inner.filename).name: inner for inner in packed.infolist()}
+        notebooks = [place for place in found if place.suffix == ".ipynb" and not place.name.startswith(".")]
+        for place in notebooks[:MOST_NOTEBOOKS]:
+            if place.is_absolute() or ".." in place.parts:
+                raise ValueError("it names a place outside")
+            self.write(folder / place, content(packed, found[place]), when.timestamp() if when.year > 1980 else 0.0)
+
+    def write(self, path: Path, data: bytes, time: float) -> None:
+        """Write a file with a time."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+        os.utime(path, (time, time))
+
+
+def content(packed: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
+    """The bytes of an entry; of one that is larger than a notebook may be, enough for the grader to say so."""
+    with packed.open(entry) as file:
+        return file.read(LARGEST_NOTEBOOK + 1)
 
 
 class LmsCollector(FileNameCollectorPlugin):

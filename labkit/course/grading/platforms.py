@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labkit.course.grading.changes import changed, read_changes
-from labkit.course.grading.collect import student_and_notebook
+from labkit.course.grading.collect import extracted, read_name, student_and_notebook
 from labkit.course.grading.deadlines import read_deadline
 from labkit.course.grading.final import Final, finish_pages, settle
 from labkit.course.grading.gradebook import register
@@ -121,9 +121,10 @@ def names_in_zip(course: Path, topic: str, people: dict[str, Person], platform: 
         named = {student: keys_of(student)[0].removesuffix(f"_{person.id}") for student, person in people.items()}
         return {s: f"{named[s].replace('_', ' ')}_{people[s].id}_assignsubmission_file_{topic}.html" for s in people}
     names = {}
-    for path in sorted((course / "downloaded" / topic).rglob("*.ipynb")):
+    for path in extracted(course, topic):
         if (whose := student_and_notebook(str(path))) is not None:
-            names.setdefault(whose[0], f"{path.stem}.html")
+            mark, _ = read_name(path)
+            names.setdefault(whose[0], f"{Path(mark.string).stem}.html")
     return names
 
 

@@ -73,6 +73,6 @@ def read_roster(course: Path) -> dict[str, Person]:
         if not values["id"]:
             raise ValueError(f"{where}: expected an id, got none for {values['name'] or 'this line'}")
         if values["id"] in people:
-            raise ValueError(f"{where}: expected each id once, got {values['id']} again")
+            raise ValueError(f"{where}: expected each id once, got {values['id']} again; keep one line of it")
         people[values["id"]] = Person(**values, more=dict(zip(heading, row, strict=False)))
     return people

@@ -1,5 +1,6 @@
 """From the zip that a learning platform gives, through nbgrader's zip_collect, to grades."""
 
+import io
 import json
 import os
 import shutil
@@ -34,6 +35,28 @@ CANVAS = {
 }
 
 
+def zipped(files: dict[str, str | bytes], when: tuple[int, ...] = (1980, 1, 1, 0, 0, 0)) -> bytes:
+    """A zip of files with a time."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as packed:
+        for name, data in files.items():
+            packed.writestr(zipfile.ZipInfo(name, when), data)
+    return content.getvalue()
+
+
+def collect(course: Path, files: dict[str, str | bytes], when: tuple[int, ...] = (1980, 1, 1, 0, 0, 0)) -> str:
+    """Let nbgrader collect a platform's zip of files; what it says."""
+    shutil.copy(ROOT / "nbgrader_config.py", course)
+    archive = course / "downloaded" / TOPIC / "archive" / "vision_2026_10_04_iou_submissions.zip"
+    archive.parent.mkdir(parents=True)
+    archive.write_bytes(zipped(files, when))
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "nbgrader", "zip_collect", TOPIC]
+    done = subprocess.run(command, cwd=course, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
 @pytest.mark.parametrize(
     "files, students",
     [
@@ -45,17 +68,9 @@ CANVAS = {
 )
 def test_a_zip_becomes_grades(tmp_path, files, students):
     kit.write_lab(tmp_path, TOPIC)
-    shutil.copy(ROOT / "nbgrader_config.py", tmp_path)
     right = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC))
-    archive = tmp_path / "downloaded" / TOPIC / "archive" / "all.zip"
-    archive.parent.mkdir(parents=True)
-    with zipfile.ZipFile(archive, "w") as packed:
-        for name, is_right in files.items():
-            packed.writestr(name, json.dumps(right if is_right else kit.lab_notebook(TOPIC, {})))
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    collect = [sys.executable, "-m", "nbgrader", "zip_collect", TOPIC]
-    done = subprocess.run(collect, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    contents = {n: json.dumps(right if is_right else kit.lab_notebook(TOPIC, {})) for n, is_right in files.items()}
+    collect(tmp_path, contents)
     records = {record.student: record for record in grade_course(TOPIC, tmp_path, progress=False).records}
     assert set(students) <= records.keys()
     assert records[students[0]].points == TOTAL and records[students[1]].points == records[students[2]].points == 0.0
@@ -80,6 +95,60 @@ def test_the_name_that_a_student_gives_a_file_makes_nobody_else_of_them(tmp_path
     path = tmp_path / "downloaded" / TOPIC / "extracted/all" / name
     path.parent.mkdir(parents=True)
     path.touch()
+    os.utime(path, (0, 0))
     assert student_and_notebook(str(path))[0] == student
     assert marked_late(tmp_path, TOPIC) == ({student} if "_LATE_" in name else set())
-    assert handed_in(path) == ""  # there is no zip
+    assert handed_in(path) == ""
+
+
+NAMES = ("Ada_12", "Ada_LATE_12", "Ada_12_", "Grace Hopper_7654321_assignsubmission_file_")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_display_name_with_underscores_which_no_platform_writes_hands_in_for_nobody(name):
+    for rest in ("04_iou.ipynb", "/04_iou.ipynb"):
+        found = student_and_notebook(f"extracted/all/{name}_1111111_assignsubmission_file_{rest}")
+        assert found is None or found[1] != "04_iou.ipynb"
+
+
+IN_MOODLE = "_assignsubmission_file_"
+
+
+def test_what_a_student_zips_is_the_students_and_what_cannot_be_opened_stops_nobody(tmp_path):
+    """Eve's zip, or folder, looks like Grace's; Mallory's is none; one who zips a notebook, or hides it, has a time."""
+    kit.write_lab(tmp_path, TOPIC)
+    right, wrong = (json.dumps(kit.lab_notebook(TOPIC, answers)) for answers in (kit.right_answers(TOPIC), {}))
+    forged = zipped({f"Grace Hopper_7{IN_MOODLE}/04_iou.ipynb": wrong, f"Grace Hopper_7{IN_MOODLE}04_iou.ipynb": wrong})
+    files = {
+        f"Eve Adams_1{IN_MOODLE}x.zip": forged,
+        f"Eve Adams_2{IN_MOODLE}/x.zip": forged,
+        f"Grace Hopper_7{IN_MOODLE}04_iou.ipynb": right,
+        f"Ivy Ho_8{IN_MOODLE}/extracted/all/Grace Hopper_7{IN_MOODLE}/04_iou.ipynb": wrong,
+        f"Joy Ng_9{IN_MOODLE}/lab.zip": zipped({"iou/04_iou.ipynb": right, "__MACOSX/._04_iou.ipynb": "x"}),
+        f"Mallory_3{IN_MOODLE}/x.zip": b"no zip",
+        f"Mallory_4{IN_MOODLE}/../../../04_iou.ipynb": wrong,
+    }
+    said = collect(tmp_path, files, (2026, 10, 6, 12, 0, 0))
+    assert said.count("Left out") == 2 and f"Left out 'Mallory_3{IN_MOODLE}/x.zip': BadZipFile" in said
+    points = {record.student: record.points for record in grade_course(TOPIC, tmp_path, progress=False).records}
+    assert {"Grace Hopper_7": TOTAL, "Ivy Ho_8": 0.0, "Joy Ng_9": TOTAL}.items() <= points.items()
+    for student in ("Grace Hopper_7", "Ivy Ho_8", "Joy Ng_9"):
+        assert (tmp_path / "submitted" / student / TOPIC / "timestamp.txt").read_text().startswith("2026-10-06 ")
+    assert not list(tmp_path.glob("*.ipynb"))
+
+
+def test_a_zip_in_canvass_zip_is_its_students(tmp_path):
+    kit.write_lab(tmp_path, TOPIC)
+    right, wrong = (json.dumps(kit.lab_notebook(TOPIC, answers)) for answers in (kit.right_answers(TOPIC), {}))
+    collect(
+        tmp_path,
+        {
+            "adamseve_LATE_1235_567891_x.zip": zipped(
+                {"hoppergrace_7654_9_04_iou.ipynb": wrong, "04_iou.ipynb": right}
+            ),
+            "hoppergrace_7654_567_04_iou.ipynb": right,
+        },
+    )
+    points = {record.student: record.points for record in grade_course(TOPIC, tmp_path, progress=False).records}
+    assert points == {"adamseve_1235": TOTAL, "hoppergrace_7654": TOTAL}
+    assert marked_late(tmp_path, TOPIC) == {"adamseve_1235"}
