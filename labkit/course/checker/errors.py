@@ -180,7 +180,7 @@ TABLE = {
     ),
     r"ValueError: zero-size array to reduction operation (\w+)|ValueError: attempt to get (\w+) of an empty|"
     r"ValueError: (\w+)\(\) (?:arg is an empty sequence|iterable argument is empty)": (
-        "{1} gets an empty array: does an index run too far, or does a mask select nothing in this case?"
+        "{1} gets an empty array: is an input empty, does a mask select nothing, or does an index run too far?"
     ),
     r"ValueError: zip\(\) argument (\d+) is (\w+) than": (
         "Of the lists that you go through together, number {1} is {2} than those before: print them."
@@ -247,7 +247,7 @@ TABLE = {
         "You go through something that is one number: is it the length, where `range` or the array itself is meant?"
     ),
     r"ValueError: invalid literal for int|ValueError: cannot convert float NaN": (
-        "int() makes a whole number, which infinity and NaN are not: is float() meant?"
+        "A whole number cannot be NaN or infinite: is float() meant? An array of integers needs .astype(float) before."
     ),
     r"TypeError: '(\w+)' object does not support item assignment": (
         "You assign to an entry of a {1}, which has none that can change: was an array meant?"

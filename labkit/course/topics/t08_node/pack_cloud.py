@@ -34,7 +34,7 @@ QUESTION = Question(
 )
 
 
-@holds("as many points as have three finite coordinates")
+@holds("16 bytes for each point with three finite coordinates")
 def as_many_points(P, data):
     return np.size(data) == 16 * np.count_nonzero(np.isfinite(P).all(axis=1))
 
@@ -60,6 +60,11 @@ def holes_kept(P):
 @wrong("Points with NaN have become (0, 0, 0), a place in the robot's base. They should be left out.")
 def holes_as_origin(P):
     return packed(np.where(np.isfinite(P).all(axis=1, keepdims=True), P, 0.0)).ravel()
+
+
+@wrong("astype(np.uint8) makes one byte of each number, its whole part. A float32 has four: how do you get at these?")
+def numbers_cast_to_bytes(P):
+    return np.pad(finite(P), ((0, 0), (0, 1))).astype(np.uint8).ravel()
 
 
 @wrong("A point of yours takes 32 bytes: float32 has 4 bytes per number. How many has float64?")

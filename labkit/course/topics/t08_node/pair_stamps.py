@@ -132,6 +132,22 @@ def first_within(a, b, slop):
     return pairs(a, b, 0, lambda x, y: np.where(np.abs(x - y) <= slop, 0, 1))
 
 
+@wrong("Two stamps can be equally near. Then the first of them counts as the nearest: which does yours take?")
+def last_of_the_nearest(a, b, slop):
+    last = len(b) - 1 - pair_stamps(a[::-1], b[::-1], slop)[::-1]
+    return np.where(last == len(b), -1, last)
+
+
+@wrong("Of stamps that are equally near only the first is the nearest: how many pairs does yours make of them?")
+def all_of_the_nearest(a, b, slop):
+    j = np.full(len(a), -1)
+    for i, k in np.ndindex(len(a), len(b)):
+        apart = abs(a[i] - b[k])
+        if apart <= slop and apart == np.abs(a - b[k]).min() == np.abs(b - a[i]).min():
+            j[i] = k
+    return j
+
+
 @wrong("One lost message shifts all pairs after it: compare stamps, not positions.")
 def in_order_of_arrival(a, b, slop):
     near = np.abs(a[: len(b)] - b[: len(a)]) <= slop

@@ -130,9 +130,9 @@ def arc(a, b, first, second, sine=np.sin, divided=True):
 STRAIGHT = "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?"
 
 
-@wrong(STRAIGHT)
-def turn_by_the_chord(*given):
-    return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * nearer(a, b)))
+@wrong(STRAIGHT, scaled=(unit, np.asarray))
+def turn_by_the_chord(*given, scaled):
+    return with_turn(*given, lambda a, b, share: scaled((1 - share) * a + share * nearer(a, b)))
 
 
 @wrong(STRAIGHT)
@@ -170,6 +170,17 @@ def held_at_the_ends(stamps, positions, quaternions, t):
 @wrong(OUTSIDE)
 def gone_on_beyond_the_ends(*given):
     return between(*given, lambda a, b, share: slerp(a, nearer(a, b), share))
+
+
+@wrong("Exactly at the first and at the last stamp the pose is known: does your comparison let these two through?")
+def unknown_at_the_ends(stamps, positions, quaternions, t):
+    known = stamps[0] < t < stamps[-1]
+    return pose_at(stamps, positions, quaternions, t if known else stamps[-1] + 1)
+
+
+@wrong("Outside the stamps both outputs keep their shapes: how many numbers has a place, and how many has a turn?")
+def one_nan_each(stamps, positions, quaternions, t):
+    return pose_at(stamps, positions, quaternions, t) if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
 
 
 @wrong("At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")

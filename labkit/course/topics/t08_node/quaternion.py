@@ -100,6 +100,11 @@ def row_of(R, which):
     return row / np.linalg.norm(row)
 
 
+@wrong("The numbers are right and stand in another order: which place has w in (x, y, z, w)?")
+def w_first(R):
+    return np.roll(quaternion(R), 1)
+
+
 @wrong("Half a turn about y or z has w = 0 and x = 0, too: your row is zeros then. Which square is the largest?")
 def x_where_w_is_small(R):
     q = quaternion(R)
