@@ -52,7 +52,7 @@ def without_padding(kernels, strides, paddings, u):
     return input_window(kernels, strides, np.zeros_like(paddings), u)
 
 
-@wrong("Output u of a layer with stride s starts to read at s u: what does a stride do to a position?")
+@wrong("Output u of a layer starts to read at stride times u: what does a stride do to a position?")
 def without_strides(kernels, strides, paddings, u):
     """Strides forgotten."""
     return input_window(kernels, np.ones_like(strides), paddings, u)
@@ -70,7 +70,7 @@ def padding_added(kernels, strides, paddings, u):
     return input_window(kernels, strides, -np.asarray(paddings), u)
 
 
-@wrong("s u - p: the padding is counted in pixels of the layer's input, so the stride does not multiply it.")
+@wrong("The padding is counted in pixels of the layer's input: does the stride multiply it?")
 def padding_before_the_stride(kernels, strides, paddings, u):
     """s (u - p) in the place of s u - p."""
     return input_window(kernels, strides, strides * paddings, u)
