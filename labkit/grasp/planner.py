@@ -88,7 +88,7 @@ class Grasp:
     """Where to close the jaws.
 
     T_base_grasp: (4, 4), the grasp frame in the base frame: z = approach, y = the direction in which the jaws close,
-    x = across the pads, origin = the point between the pads (the Panda's panda_grasptarget). width: metres between the
+    x = along the pads, origin = the point between the pads (the Panda's panda_grasptarget). width: metres between the
     pads to come down with. score: 1 for a grip without a shortcoming, less for others. target: number of the cloud.
     """
 

@@ -1,7 +1,7 @@
 """The Panda's kinematics in NumPy: where the links are for given joints, and which joints put the hand on a grasp.
 
 Frames: the base frame is link 0's and the world's. The grasp frame (the URDF's panda_grasptarget) lies between the
-pads: z is the approach direction, the jaws close along y, x runs across the pads (topic 07). Metres and radians.
+pads: z is the approach direction, the jaws close along y, x runs along the pads (topic 07). Metres and radians.
 Nothing here imports PyBullet.
 """
 

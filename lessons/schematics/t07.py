@@ -64,7 +64,7 @@ def from_above(axes) -> None:
     word(axes, (13.2, 2.95), "true middle", size=SMALL)
     line(axes, (12.7, 4.85), (12.7, 3.5), dashed=True, colour=INK, width=2.0)
     line(axes, (12.7, 3.5), (13.1, 3.5), dashed=True, colour=LEAF, width=2.0)
-    word(axes, (10.3, 3.35), "across y: this slips", size=SMALL)
+    word(axes, (10.3, 3.35), "along x: this slips", size=SMALL)
     arrow(axes, (11.5, 3.65), (12.6, 4.1))
     word(axes, (10.6, 2.1), "along y: the jaws\npush this away", size=SMALL, colour=LEAF)
     arrow(axes, (11.7, 2.5), (12.8, 3.38), colour=LEAF)
