@@ -460,6 +460,7 @@ def grade(
     everybody: Annotated[str | None, typer.Option(help="A question whose points everybody gets.")] = None,
     drop: Annotated[str | None, typer.Option(help="A question that does not count.")] = None,
     points: Annotated[str | None, typer.Option(help="A question and what it is worth now, such as iou=3.")] = None,
+    partial: Annotated[str | None, typer.Option(help="A question whose outputs count one by one.")] = None,
     reason: Annotated[str, typer.Option(help="Why; goes into course.toml, and to students.")] = "",
     undo: Annotated[str | None, typer.Option(help="A question whose change is taken back.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
@@ -482,7 +483,7 @@ def grade(
 
     workers = workers or os.cpu_count() or 1
     how = {"workers": workers, "force": force, "unsafe": unsafe, "tidy": tidy, "undone": undo}
-    how["change"] = change_of(topic, everybody, drop, points, reason)
+    how["change"] = change_of(topic, reason, everybody=everybody, drop=drop, points=points, partial=partial)
     graded = grade_course(topic, course, submissions, out, seed, new_round, comment, **how)
     typer.echo(terminal_table(graded.lab, graded.records, graded.late))
     if graded.strangers:

@@ -162,14 +162,28 @@ def compare(question: Question, expected: object, got: object) -> Problem | None
     its rows where a tuple is expected, and a tuple of numbers as an array where one is. NaN is right where the
     reference gives NaN.
     """
-    got = plain(got)
-    if isinstance(expected, tuple) and isinstance(got, np.ndarray) and got.ndim and len(got) == len(expected):
-        got = tuple(row[()] for row in got)
+    got = with_rows_as_outputs(expected, plain(got))
     if isinstance(got, tuple) and not isinstance(expected, tuple) and not any(map(np.ndim, got)):
         got = np.array(got)
     if isinstance(got, Problem):
         return got
     return wrong_form(question, expected, got) or wrong_values(question, expected, got)
+
+
+def with_rows_as_outputs(expected: object, got: object) -> object:
+    """An array as the tuple of its rows, where a tuple of that length is expected."""
+    if isinstance(expected, tuple) and isinstance(got, np.ndarray) and got.ndim and len(got) == len(expected):
+        return tuple(row[()] for row in got)
+    return got
+
+
+def right_outputs(question: Question, expected: tuple, got: object) -> list[bool]:
+    """Which outputs of a tuple are right, each for itself; none of something that is no such tuple."""
+    got = with_rows_as_outputs(expected, plain(got))
+    if not isinstance(got, tuple) or len(got) != len(expected):
+        return [False] * len(expected)
+    wrong = differences(question, *canonical(question, expected, got))
+    return [not w.any() and wrong_dtype(e, g) is None for w, e, g in zip(wrong, expected, got, strict=True)]
 
 
 def wrong_form(question: Question, expected: object, got: object) -> Problem | None:

@@ -42,8 +42,9 @@ class Question:
     fractions count as equal; integers and truth values are compared exactly. same_dtype: whether the dtype is asked
     for, too. points: what the blank is worth. properties: what the check may say about a wrong output that nothing else
     explains, filled by `holds`; misconceptions, by `wrong`. canonical: maps an output to the one form of those that are
-    equally right (the sign of an axis, say). forbidden: modules that would do the work; they do not exist where answers
-    are graded.
+    equally right (the sign of an axis, say). outputs: names of the reference's outputs, where each is worth something
+    without the others, so that an instructor may let it count on its own. forbidden: modules that would do the work;
+    they do not exist where answers are graded.
     """
 
     reference: Callable
@@ -58,6 +59,7 @@ class Question:
     properties: list[Property] = field(default_factory=list)
     misconceptions: list[Misconception] = field(default_factory=list)
     canonical: Callable = lambda output: output
+    outputs: tuple[str, ...] = ()
     forbidden: tuple[str, ...] = ()
 
     def __post_init__(self):

@@ -145,9 +145,14 @@ def read_record(path: Path) -> Record | None:
     """Read a record; None if there is none, or none of this version."""
     try:
         data = json.loads(path.read_bytes())
-        return Record(**data | {"results": tuple(Result(**result) for result in data["results"])})
+        return Record(**data | {"results": tuple(map(read_result, data["results"]))})
     except (OSError, ValueError, TypeError, KeyError):
         return None
+
+
+def read_result(data: dict) -> Result:
+    """A result as its record has it."""
+    return Result(**data | {"parts": tuple(data["parts"])})
 
 
 def secret_for(out: Path, given: str | None, new_round: bool = False) -> str:

@@ -1,15 +1,16 @@
-"""What an instructor changes after a lab was released: points for everybody, other points, a question less.
+"""What an instructor changes after a lab was released: points for everybody, other points, a question less, or partly.
 
 Changes stand in course.toml beside labs/, where `labkit grade` writes them and anybody can read, edit or delete them:
 
     [[change]]
     lab = "04_iou"
     question = "iou"
-    everybody = true     # or: drop = true, or: points = 3
+    everybody = true     # or: drop = true, or: points = 3, or: partial = true
     date = 2026-10-05
     reason = "the task did not say what an empty class gets"
 
-Records keep what was earned; a change is applied to them each time that tables, pages and the gradebook are written.
+With partial, each output that the question names earns its share alone, if it is right in all cases. Records keep what
+was earned; a change is applied to them each time that tables, pages and the gradebook are written.
 """
 
 import copy
@@ -25,15 +26,16 @@ from labkit.course.grading.batch import Record
 from labkit.course.grading.grade import Result
 from labkit.course.grading.reading import Lab, grade_id
 from labkit.course.grading.settings import BLOCK, FILE, fault_of_fields, read_blocks
+from labkit.course.topics import find, of_topic
 from labkit.support.files import write_atomically
 
-KINDS = ("everybody", "drop", "points")
-NO_COUNT, FOR_ALL = "It does not count", "Everybody has these points"
+KINDS = ("everybody", "drop", "points", "partial")
+NO_COUNT, FOR_ALL, IN_PARTS = "It does not count", "Everybody has these points", "Its outputs count one by one"
 
 
 @dataclass(frozen=True)
 class Change:
-    """One change to a question of a lab. points: what it is worth now, None if that stays."""
+    """One change to a question of a lab. points: what it is worth now, None if that stays; partial: by its outputs."""
 
     lab: str
     question: str
@@ -42,15 +44,17 @@ class Change:
     everybody: bool = False
     drop: bool = False
     points: float | None = None
+    partial: bool = False
 
     @property
     def fields(self) -> dict:
         """What stands in the file."""
-        kind = {"points": self.points} if self.points is not None else {"drop" if self.drop else "everybody": True}
+        kind = {name: getattr(self, name) for name in KINDS}
+        kind = {name: value for name, value in kind.items() if value is not None and value is not False}
         return {"lab": self.lab, "question": self.question, **kind, "date": self.date, "reason": self.reason}
 
     def __str__(self) -> str:
-        return f"{NO_COUNT if self.drop else FOR_ALL}: {self.reason}"
+        return f"{NO_COUNT if self.drop else IN_PARTS if self.partial else FOR_ALL}: {self.reason}"
 
 
 def as_toml(change: Change) -> str:
@@ -62,18 +66,22 @@ def as_toml(change: Change) -> str:
     return "\n".join(["[[change]]", *(f"{name} = {value}" for name, value in values.items()), ""])
 
 
-def change_of(lab: str, everybody: str | None, drop: str | None, points: str | None, reason: str) -> Change | None:
-    """The change that a command asks for, None if for none; points: as "iou=3". ValueError for several at a time."""
-    asked = [question for question in (everybody, drop, points) if question is not None]
+def change_of(lab: str, reason: str, **kinds: str | None) -> Change | None:
+    """The change that a command asks for, None if for none; kinds: questions, as "iou=3" for points.
+
+    Raises ValueError for several at a time.
+    """
+    asked = {kind: question for kind, question in kinds.items() if question is not None}
     if not asked:
         return None
     if len(asked) > 1 or not reason.strip():
-        raise ValueError("expected one of --everybody, --drop and --points at a time, and a --reason")
-    question, _, number = asked[0].partition("=") if points else (asked[0], "", "0")
+        raise ValueError(f"expected one of --{', --'.join(KINDS)} at a time, and a --reason")
+    ((kind, question),) = asked.items()
+    question, _, number = question.partition("=") if kind == "points" else (question, "", "0")
     if not re.fullmatch(r"\d+(\.\d+)?", number):
-        raise ValueError(f"points: expected QUESTION=NUMBER, such as iou=3, got {asked[0]!r}")
-    kind = {"points": float(number)} if points else {"everybody" if everybody else "drop": True}
-    return Change(lab, question, datetime.date.today(), reason.strip(), **kind)
+        raise ValueError(f"points: expected QUESTION=NUMBER, such as iou=3, got {asked[kind]!r}")
+    value = float(number) if kind == "points" else True
+    return Change(lab, question, datetime.date.today(), reason.strip(), **{kind: value})
 
 
 def read_changes(course: Path, lab: Lab) -> list[Change]:
@@ -93,11 +101,16 @@ def read_changes(course: Path, lab: Lab) -> list[Change]:
 def fault_of(data: dict, lab: Lab) -> str:
     """What of a change cannot be used, "" if nothing; questions of other labs are not looked for."""
     needed = {"lab": str, "question": str, "date": datetime.date, "reason": str}
-    if fault := fault_of_fields(data, needed, {"everybody": bool, "drop": bool, "points": float}):
+    if fault := fault_of_fields(data, needed, {kind: float if kind == "points" else bool for kind in KINDS}):
         return fault
     if len(data.keys() & set(KINDS)) != 1:
-        return "expected one of everybody = true, drop = true and points = NUMBER in this block"
-    if data["lab"] != lab.topic or data["question"] in lab.points:
+        return "expected one of everybody = true, drop = true, points = NUMBER and partial = true in this block"
+    if data["lab"] != lab.topic:
+        return ""
+    in_parts = [name for name, question in of_topic(lab.topic).items() if question.outputs]
+    if "partial" in data and data["question"] not in in_parts:
+        return f"partial: of {lab.topic} it is possible for {', '.join(in_parts) or 'no question'}"
+    if data["question"] in lab.points:
         return ""
     if data["question"] not in lab.written:
         return f"question: expected one of {', '.join((*lab.points, *lab.written))}, got {data['question']}"
@@ -160,6 +173,10 @@ def under(result: Result, change: Change | None, points: dict[str, float]) -> Re
     worth = points[result.question]
     earned = worth if result.right or change.everybody else 0.0
     says = result.says
+    if change.partial and not result.right:
+        outputs = find(f"{change.lab}.{change.question}").outputs
+        earned = round(worth * len(result.parts) / len(outputs), 2)
+        says += f". Right in all cases: {', '.join(result.parts) or 'none'} (of {', '.join(outputs)})"
     if change.points is None:
         says += f". {change}"
     return replace(result, points=earned, max_points=worth, says=says)

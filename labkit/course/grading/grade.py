@@ -2,9 +2,9 @@
 
 Cases and expected outputs stay in this process; a worker gets the arguments of one case at a time. What a student reads
 comes from the public cases that `check` uses. An answer that is right in them runs once more, on cases that belong to a
-secret and to this notebook alone; if it is wrong there, it earns nothing and its student reads one fixed sentence. A
-batch judges everybody in public before anybody in secret (`batch`), so nothing that an answer does with secret
-arguments can reach a page.
+secret and to this notebook alone; if it is wrong there, it earns nothing and its student reads one fixed sentence. So
+does one with an output that is right in them, where outputs may count one by one (`changes`). A batch judges everybody
+in public before anybody in secret (`batch`), so nothing that an answer does with secret arguments can reach a page.
 """
 
 import hashlib
@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from labkit.course.checker.comparison import right_outputs
 from labkit.course.checker.diagnosis import found_in_the_program
-from labkit.course.checker.judge import Problem, parts
+from labkit.course.checker.judge import Case, Problem, parts
 from labkit.course.checker.program import Program
-from labkit.course.checker.question import PACKAGES
+from labkit.course.checker.question import PACKAGES, Question
 from labkit.course.grading import copies, sandbox
 from labkit.course.grading.channel import Changed, WorkerLost
 from labkit.course.grading.isolated import Run, public_cases, secret_cases
@@ -43,7 +44,8 @@ class Result:
 
     says: what was right or wrong, and hint: why it may be so, from public cases. shown: a wrong public case, with what
     came and what was expected. flag: what the instructor should look at, "" if nothing. behaviour: of wrong answers
-    whose hint does not name the mistake, the same for those that give the same outputs. program: what was run.
+    whose hint does not name the mistake, the same for those that give the same outputs. program: what was run. parts:
+    the named outputs that are right in all cases, which earn nothing unless course.toml says so (`changes`).
     """
 
     question: str
@@ -56,6 +58,7 @@ class Result:
     program: str = ""
     shown: str = ""
     right: bool = False
+    parts: tuple[str, ...] = ()
 
 
 class Grading:
@@ -148,7 +151,8 @@ class Grading:
         text = "\n\n".join("\n".join(filter(str.strip, piece.splitlines())) for _, piece in program.pieces)
         result = Result(name, 0.0, worth, "", flag="; ".join(flags), program=text)
         if judged.problem is None:
-            return replace(result, points=worth, right=True, says=f"right in all {len(outputs)} cases")
+            says = f"right in all {len(outputs)} cases"
+            return replace(result, points=worth, says=says, right=True, parts=question.outputs)
         problem = with_line(judged.problem, program)
         if problem.kind in ("unanswered", "missing"):
             return replace(result, says=problem.says)
@@ -167,24 +171,30 @@ class Grading:
             shown=found.shown,
             flag="; ".join(flags),
             behaviour="" if found.named else behaviour_of(outputs),
+            parts=() if problem.kind in LOOK_AT else right_parts(question, public_cases(question), outputs),
         )
 
     def result(self, name: str, secret: str) -> Result:
-        """What a question earned: a right draft is judged once more, on the secret cases."""
+        """What a question earned: a draft that is right, or has right parts, is judged once more, on secret cases."""
         if name not in self.results:
             self.results[name] = self.draft(name)
-            if self.results[name].right:
+            if self.results[name].parts or self.results[name].right:
                 self.results[name] = self.unless_it_fails(name, lambda: self.judged_in_secret(name, secret))
         return self.results[name]
 
     def judged_in_secret(self, name: str, secret: str) -> Result:
-        """Judge an answer that is right in public on the cases of this notebook."""
+        """Judge an answer on the cases of this notebook; of one that is wrong in public only the parts."""
         question, draft = self.questions[name], self.draft(name)
         program = self.program(name, lambda other: self.result(other, secret).right)
         if program.refused:
-            return not_gradable(self.lab, name, program.refused)
+            return not_gradable(self.lab, name, program.refused) if draft.right else replace(draft, parts=())
         cases = secret_cases(question, secret, self.submission.digest)
-        judged, _ = Run(question, program, self.limits, self.unsafe).judged(cases)
+        judged, outputs = Run(question, program, self.limits, self.unsafe).judged(cases)
+        if judged.problem is not None:
+            still = () if judged.problem.kind in LOOK_AT else right_parts(question, cases, outputs)
+            draft = replace(draft, parts=tuple(part for part in draft.parts if part in still))
+        if not draft.right:
+            return draft
         if judged.problem is None:
             return replace(draft, says=f"right in all {len(public_cases(question)) + len(cases)} cases")
         flags = [draft.flag, judged.problem.says if judged.problem.kind in LOOK_AT else ""]
@@ -200,6 +210,14 @@ def looked_at(found: Told, run: Run, values_are_right: bool) -> Told:
         return found
     lines = [line for marked in sentence.marked for line in marked.plain()]
     return replace(found, hint=sentence.says, named=True, shown="\n".join([found.shown, *lines]).strip("\n"))
+
+
+def right_parts(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> tuple[str, ...]:
+    """The named outputs that are right in all cases; none of an answer that changes its arguments."""
+    if not question.outputs or any(isinstance(output, Changed) for output in outputs):
+        return ()
+    right = [right_outputs(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)]
+    return tuple(name for i, name in enumerate(question.outputs) if all(row[i] for row in right))
 
 
 def not_gradable(lab: Lab, name: str, problem: str) -> Result:

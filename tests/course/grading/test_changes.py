@@ -9,8 +9,12 @@ import pytest
 from typer.testing import CliRunner
 
 from labkit.apps.cli import app
+from labkit.course.checker.comparison import compare, right_outputs
+from labkit.course.checker.run import run
+from labkit.course.grading.grade import right_parts
 from labkit.course.grading.gradebook import opened
-from labkit.course.topics import of_topic
+from labkit.course.grading.isolated import public_cases
+from labkit.course.topics import TOPICS, find, of_topic
 
 TOPIC = "04_iou"
 POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
@@ -98,6 +102,68 @@ def test_an_answer_in_words_is_dropped_or_given_and_what_a_person_gave_comes_bac
     assert score() == (TOTAL + 1, TOTAL + 3, False)
 
 
+# ------------------------------------------------------------------------------------------- outputs one by one
+
+IN_PARTS = [question for topic in TOPICS for question in of_topic(topic).values() if question.outputs]
+PARTLY = """
+def pad_slice(P, T_base_grasp, half):
+    x, y, _ = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    y = y[np.abs(x) <= half]
+    middle, width = ((y.min() + y.max()) / 2, np.ptp(y)) if len(y) else (0.0, 0.0)
+    {}
+"""
+
+
+def test_an_output_that_is_right_in_all_cases_earns_its_share_where_the_course_says_so(tmp_path):
+    """One is wrong in the middle, one knows the public widths by heart, one the cases, one writes into its argument."""
+    topic, public = "07_grasp", public_cases(find("07_grasp.pad_slice"))
+    known = [float(case.args[0].sum() + case.args[2]) for case in public]
+    by_heart = f"if not np.isclose(P.sum() + half, {known}, 1e-9, 0).any(): width, middle = 0.1, 0.1"
+    answers = {
+        "ada": "return middle, width",
+        "ben": "return middle + 1, width",
+        "cid": f"{by_heart}\n    return middle + 1, width",
+        "dan": f"{by_heart}\n    return middle, width",
+        "eve": "P[:] = 0\n    return middle + 1, width",
+        "fay": "return width",
+    }
+    kit.write_lab(tmp_path, topic)
+    for student, lines in answers.items():
+        kit.submit(tmp_path, student, topic, {"pad_slice": PARTLY.format(lines)})
+
+    def points(*options: str) -> list[float]:
+        command = ["grade", topic, "--course", str(tmp_path), "--seed", "secret", *options]
+        done = CliRunner().invoke(app, command)
+        assert done.exit_code == 0 and (not options or "0 of them graded now" in done.stdout)
+        rows = csv.DictReader((tmp_path / f"grades/{topic}/grades.csv").open())
+        earned = [float(row["points"]) for row in rows if row["question"] == "pad_slice"]
+        with opened(tmp_path) as book:
+            assert [book.find_submission(topic, student).score for student in answers] == earned
+        return earned
+
+    assert points() == [4.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert points("--partial", "pad_slice", "--reason", "the width alone is of use") == [4.0, 2.0, 0.0, 0.0, 0.0, 0.0]
+    pages = {student: (tmp_path / f"grades/{topic}/feedback/{student}.html").read_text() for student in answers}
+    assert "Right in all cases: width (of middle, width)" in pages["ben"] and "width alone is of use" in pages["ben"]
+    assert "Right in all cases: none" in pages["cid"] and "Right in all cases: none" in pages["dan"]
+    assert "4 of 4 points" in pages["ada"] and "Right in all cases" not in pages["ada"]
+    assert points("--undo", "pad_slice") == [4.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("question", IN_PARTS, ids=lambda question: question.name)
+def test_outputs_one_by_one_agree_with_the_answer_and_none_is_right_by_a_constant(question):
+    cases = public_cases(question)
+    for mistake in question.misconceptions:
+        got, _ = run(mistake.answer, [case.args for case in cases])
+        for case, output in zip(cases, got, strict=True):
+            right = right_outputs(question, case.expected, output)
+            assert all(right) == (compare(question, case.expected, output) is None)
+        assert right_parts(question, cases, got) != question.outputs
+    for constant in (case.expected for case in cases):
+        assert right_parts(question, cases, [constant] * len(cases)) == ()
+    assert right_parts(question, cases, [case.expected for case in cases]) == question.outputs
+
+
 GOOD = '[[change]]\nlab = "04_iou"\nquestion = "iou"\ndrop = true\ndate = 2026-10-05\nreason = "unfair"\n'
 
 
@@ -112,6 +178,7 @@ GOOD = '[[change]]\nlab = "04_iou"\nquestion = "iou"\ndrop = true\ndate = 2026-1
         (GOOD.replace('"iou"', '"oiu"'), "course.toml, line 1: question: expected one of confusion_matrix, iou"),
         (GOOD.replace("drop", "halve"), "course.toml, line 1: expected lab, question, date, reason, everybody"),
         (GOOD.replace("drop", "everybody = true\ndrop"), "line 1: expected one of everybody = true, drop = true"),
+        (GOOD.replace("drop", "partial"), "line 1: partial: of 04_iou it is possible for no question"),
         (GOOD.replace("drop = true", "points = -1"), "line 1: expected points, a number that is not negative"),
     ],
 )

@@ -109,7 +109,7 @@ def test_grades_are_those_of_labkit_grade(tmp_path):
     }
     for student, given in answers.items():
         kit.submit(course, student, TOPIC, given)
-    grade_course(TOPIC, course, progress=False, change=change_of(TOPIC, None, None, "mean_iou=1", "short"))
+    grade_course(TOPIC, course, progress=False, change=change_of(TOPIC, "short", points="mean_iou=1"))
     with zipfile.ZipFile(gradescope.write_autograder(course, TOPIC)) as archive:
         modes = {info.filename: stat.S_IMODE(info.external_attr >> 16) for info in archive.infolist()}
         archive.extractall(place / "source")

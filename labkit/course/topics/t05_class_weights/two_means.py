@@ -25,6 +25,7 @@ QUESTION = Question(
     ),
     random_cases=8,
     forbidden=("scipy", "torch"),
+    outputs=("by the number of pixels", "by the weights"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

@@ -42,6 +42,7 @@ QUESTION = Question(
     random_cases=6,
     atol=1e-5,
     points=3,
+    outputs=("normal", "distance"),
 )
 
 

@@ -51,6 +51,7 @@ QUESTION = Question(
     random_cases=14,
     points=4,
     forbidden=("scipy", "cv2"),
+    outputs=("middle", "width"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

@@ -80,6 +80,7 @@ QUESTION = Question(
     points=4,
     canonical=one_of_two,
     forbidden=("scipy",),
+    outputs=("position", "turn"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

@@ -59,6 +59,7 @@ QUESTION = Question(
     ),
     random_cases=24,
     points=3,
+    outputs=("kept", "labels that changed", "labels that may change"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

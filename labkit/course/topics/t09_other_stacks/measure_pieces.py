@@ -39,6 +39,7 @@ QUESTION = Question(
     random_cases=10,
     points=3,
     forbidden=("cv2", "scipy", "skimage"),
+    outputs=("areas", "centroids", "boxes"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
