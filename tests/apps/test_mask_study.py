@@ -1,11 +1,13 @@
 """The study of masks: its committed table comes out again, and it can be stopped anywhere."""
 
 from collections import defaultdict
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import box, scene
+from scipy.stats import binomtest
 from typer.testing import CliRunner
 
 import data_gen
@@ -39,6 +41,21 @@ def test_more_spoilt_masks_have_less_iou_and_iou_is_worth_something(table):
     assert all(iou == [1.0] for (_, kind), iou in scores.items() if kind == "true")
     worse, better = (mask_study.lift_rate(rows) for rows in mask_study.by_iou(table, [0.0, 0.4, 1.0]))
     assert worse[2] < better[1]  # the intervals lie apart
+
+
+def test_of_25_pairs_of_kinds_with_nearly_equal_iou_one_has_a_small_p_value(table):
+    """Lesson 07, worth: McNemar's test of all such pairs, of which one p below 0.05 is what chance gives."""
+    iou, lifted = defaultdict(list), defaultdict(list)
+    for row in table:
+        iou[row.kind, row.strength].append(row.iou)
+        lifted[row.kind, row.strength].append(row.lifted)
+    pairs = [(a, b) for a, b in combinations(iou, 2) if a[0] != b[0] and abs(np.mean(iou[a]) - np.mean(iou[b])) < 0.05]
+    gains = [np.subtract(lifted[a], lifted[b]) for a, b in pairs]
+    p = [binomtest(int((gain > 0).sum()), max(1, int(abs(gain).sum()))).pvalue for gain in gains]
+    assert len(pairs) == 25 and [set(pairs[k]) for k in np.flatnonzero(np.array(p) < 0.05)] == [
+        {("holed", 0.2), ("part missing", 0.2)}
+    ]
+    assert min(iou["eroded", 5.0]) == 0.0 and 0.68 < max(iou["eroded", 5.0]) < 0.70
 
 
 def test_a_few_lifts_made_again_give_the_tables_rows(table):
