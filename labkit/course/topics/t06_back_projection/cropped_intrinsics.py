@@ -68,6 +68,11 @@ def half_pixel_with_the_other_sign(K, left, top, scale):
     return with_centre(K, scale, scale * (K[0, 2] - left) + half, scale * (K[1, 2] - top) + half)
 
 
+@wrong("With scale 1 only the crop counts, and yours is half a pixel off: what do you add before the resize?")
+def half_pixel_only_after_the_resize(K, left, top, scale):
+    return with_centre(K, scale, scale * (K[0, 2] - left) - 0.5, scale * (K[1, 2] - top) - 0.5)
+
+
 @wrong("A resize multiplies u and v: which rows of K make them, and which entry must stay 1?")
 def whole_matrix_scaled(K, left, top, scale):
     new = cropped_intrinsics(K, left, top, scale)

@@ -7,7 +7,7 @@ from labkit.course.topics.t06_back_projection import pose
 
 
 def fit_plane(P, sigma):
-    """Fit n . p = d by least squares of the distances along n, each divided by its point's sigma; n points up."""
+    """Fit n . p = c by least squares of the distances along n, each divided by its point's sigma; n points up."""
     w = 1.0 / sigma**2
     centre = w @ P / w.sum()
     n = np.linalg.eigh((P - centre).T * w @ (P - centre))[1][:, 0]
@@ -51,7 +51,7 @@ def n_has_length_1(P, sigma, plane):
     return np.isclose(np.linalg.norm(plane[0]), 1.0, atol=1e-3)
 
 
-@holds("the plane goes through the weighted mean m of the points, n . m = d")
+@holds("the plane goes through the weighted mean m of the points, n . m = c")
 def goes_through_the_mean(P, sigma, plane):
     return np.isclose(plane[0] @ np.average(P, axis=0, weights=sigma**-2.0), plane[1], atol=1e-3)
 
@@ -86,7 +86,7 @@ def largest_spread(P, sigma):
     return up(axes[:, 2], centre)
 
 
-@wrong("An eigenvector's sign is arbitrary: where n points down, turn n up, and d with it.")
+@wrong("An eigenvector's sign is arbitrary: where n points down, turn n up, and c with it.")
 def not_turned_up(P, sigma):
     centre, axes = centre_and_axes(P, sigma)
     return axes[:, 0], float(axes[:, 0] @ centre)
@@ -119,7 +119,7 @@ def row_of_the_eigenvectors(P, sigma):
     return up(axes[0], centre)
 
 
-@wrong("d is gone only if you subtract the mean m from the points before you look for n; then d = n . m.")
+@wrong("c is gone only if you subtract the mean m from the points before you look for n; then c = n . m.")
 def not_centred(P, sigma):
     return up(np.linalg.eigh(P.T / sigma**2 @ P)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
 
@@ -130,10 +130,10 @@ def weights_in_both_factors(P, sigma):
     return up(np.linalg.eigh(centred.T @ centred)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
 
 
-@wrong("Turn n up before you compute n . m = d: yours still has the sign of the other normal.")
-def d_before_the_turn(P, sigma):
-    n, d = not_turned_up(P, sigma)
-    return up(n, P[0])[0], d
+@wrong("Turn n up before you compute n . m = c: yours still has the sign of the other normal.")
+def c_before_the_turn(P, sigma):
+    n, c = not_turned_up(P, sigma)
+    return up(n, P[0])[0], c
 
 
 @wrong("In which direction do points of a plane scatter least, and in which most?")

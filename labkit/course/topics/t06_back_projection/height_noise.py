@@ -69,10 +69,13 @@ def another_axis_of_the_camera(*arguments, axis):
     return np.linalg.norm(shares(*arguments, axis=axis))
 
 
-@wrong("The camera's own x axis is meant, not the base frame's: turn P_cam before T takes it to the base frame.")
-def about_the_base_frames_x(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
+@wrong(
+    "The camera's own x axis is meant, not the base frame's: turn P_cam before T takes it to the base frame.",
+    through=(0.0, 1.0),  # the camera's place, or the base frame's
+)
+def about_the_base_frames_x(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt, through):
     noise = shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt)
-    P_base = (T_base_cam @ [*(d * np.linalg.inv(K) @ (u, v, 1.0)), 1.0])[:3]
+    P_base = (T_base_cam @ [*(d * np.linalg.inv(K) @ (u, v, 1.0)), through])[:3]
     return np.hypot(np.linalg.norm(noise[:3]), turned_about(0, P_base)[2] * sigma_tilt)
 
 
@@ -103,10 +106,14 @@ def whole_way_of_the_tilt(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigm
     return np.hypot(np.linalg.norm(noise[:3]), np.linalg.norm(moved) * sigma_tilt)
 
 
-@wrong("A tilt moves the point by -z and y along the camera's y and z: how much of that is height? r3 decides.")
-def depth_times_the_tilt(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
+@wrong(
+    "A tilt moves the point by -z and y along the camera's y and z: how much of that is height? r3 decides.",
+    part=(1, 2),
+)
+def one_way_of_the_tilt(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt, part):
     noise = shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt)
-    return np.hypot(np.linalg.norm(noise[:3]), d * sigma_tilt)
+    moved = turned_about(0, d * np.linalg.inv(K) @ (u, v, 1.0))
+    return np.hypot(np.linalg.norm(noise[:3]), moved[part] * sigma_tilt)
 
 
 @wrong("You count the height of the turned point. An error is a change: by how much does the turn change the height?")

@@ -93,11 +93,14 @@ def radius_as_seen(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**4, rounds=1)
 
 
-@wrong("Each round divides the last guess again, so that the factors pile up. Which numbers are to be divided?")
-def guess_divided_again(pixels, K, k):
+@wrong(
+    "Each round divides the last guess again, so that the factors pile up. Which numbers are to be divided?",
+    rounds=(10, 20, 50, 100),
+)
+def guess_divided_again(pixels, K, k, rounds):
     f, c = np.diagonal(K)[:2], K[:2, 2]
     guess = (pixels - c) / f
-    for _ in range(10):
+    for _ in range(rounds):
         r2 = (guess**2).sum(axis=1, keepdims=True)
         guess = guess / (1.0 + k[0] * r2 + k[1] * r2**2)
     return c + f * guess
