@@ -158,3 +158,13 @@ def forbidden_ones_at_the_mean(features, mean, covariance, allowed):
 @wrong("Yours is the allowed piece farthest from the mean: do you want argmax?")
 def farthest(features, mean, covariance, allowed):
     return chosen(-distances(features, mean, covariance), allowed)
+
+
+@wrong("Row 0 holds piece 1: which number has your best row?")
+def row_in_place_of_the_number(features, mean, covariance, allowed):
+    return max(choose_region(features, mean, covariance, allowed) - 1, 0)
+
+
+@wrong("How far is a piece from the mean target? You never subtract the mean.")
+def distances_from_zero(features, mean, covariance, allowed):
+    return choose_region(features, 0.0 * mean, covariance, allowed)

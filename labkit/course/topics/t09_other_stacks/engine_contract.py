@@ -149,3 +149,26 @@ def kept_unless_above_and_nan_for_the_best(reference, other, tolerance):
 def classes_on_the_last_axis(reference, other, tolerance):
     last = sorted_along_a_row(reference, other, tolerance)[2]
     return *labels_along_rows(reference, other, tolerance)[:2], last
+
+
+@wrong(
+    "Off by exactly the tolerance is still kept, and a gap of exactly two is open: do you ask < or <=?",
+    alike=(False, True),
+)
+def strictly_less(reference, other, tolerance, alike):
+    kept, changed, _ = engine_contract(reference, other, tolerance)
+    if alike:
+        kept = np.abs(reference - other).max() < tolerance
+    gap = np.diff(np.sort(reference, axis=0)[-2:], axis=0)
+    return kept, changed, np.mean(gap < 2 * tolerance)
+
+
+@wrong("The gap that counts is the one between the reference's logits: whose do you sort?")
+def margin_of_the_other_engine(reference, other, tolerance):
+    return *engine_contract(reference, other, tolerance)[:2], engine_contract(other, other, tolerance)[2]
+
+
+@wrong("A share is a mean of truth values: 0 for no pixel, 1 for all. Do you count?")
+def pixels_counted(reference, other, tolerance):
+    kept, changed, at_risk = engine_contract(reference, other, tolerance)
+    return kept, changed * reference[0].size, at_risk * reference[0].size

@@ -113,3 +113,8 @@ def measured_from_first_to_last(pieces):
 def measured_by_the_sides_of_the_image(pieces):
     H, W = pieces.shape
     return measured(pieces, centroid=lambda vu: vu.sum(axis=0)[::-1] / (W, H))
+
+
+@wrong("A box is first column, first row, last column, last row: which comes first in yours?")
+def measured_with_rows_first(pieces):
+    return measured(pieces, box=lambda vu: (*vu.min(axis=0), *vu.max(axis=0)))
