@@ -6,6 +6,7 @@ from labkit.course.checker.comparison import Case, Problem, canonical, differenc
 from labkit.course.checker.question import Question
 
 LONGEST = 100  # characters of a line
+LONGEST_CALL = 180  # of a call's arguments; they wrap, and whoever does a case by hand needs them all
 MOST_NUMBERS = 24  # of an array that is shown whole
 
 
@@ -34,7 +35,7 @@ def call(question: Question, args: tuple) -> str:
     'mean(n = (90, 120) uint8 from 0 to 0, 0.5)'
     """
     whole = [written(value) for value in args]
-    if sum(map(len, whole)) <= LONGEST and not any("..." in text for text in whole):
+    if sum(map(len, whole)) <= LONGEST_CALL and not any("..." in text for text in whole):
         return f"{question.function}({', '.join(whole)})"
     names = question.parameters
     short = [
