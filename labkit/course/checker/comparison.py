@@ -248,6 +248,8 @@ def wrong_values(question: Question, expected: object, got: object) -> Problem |
     count, size = sum(int(np.count_nonzero(w)) for w in wrong), sum(w.size for w in wrong)
     if not count:
         return None
+    if size != sum(np.size(part) for part in parts(got)):  # of the canonical form, which a student does not see
+        return Problem("values", "some values are not right")
     return Problem("values", f"{count} of {size} values are not right" if size > 1 else "the value is not right")
 
 

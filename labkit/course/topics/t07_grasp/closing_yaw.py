@@ -117,7 +117,7 @@ def nearest_by_quarter_turns(Sigma, now):
 
 
 @wrong(
-    "That is the direction in which the cloud is longest. The jaws close across it.",
+    "That is the direction in which the cloud is longest. The jaws close at right angles to it.",
     how=(AS_IT_COMES, FROM_0, NEAREST),
 )
 def longest_direction(Sigma, now, how):

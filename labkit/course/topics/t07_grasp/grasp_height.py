@@ -77,6 +77,11 @@ def clearance_below_the_palm_too(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm + clearance, P[:, 2].min(), table_z + clearance) + tips
 
 
+@wrong("clearance is air above the table: at which height is the table?")
+def table_at_zero(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min(), clearance) + tips
+
+
 @wrong("A table may stand lower than the robot's base: what lies at height 0?")
 def never_below_the_base(P, table_z, palm, tips, clearance):
     return max(0.0, P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips

@@ -74,7 +74,7 @@ def closing_taken_as_it_is(position, approach, closing):
     return pose(np.cross(y, z), y, z, position)
 
 
-@wrong("A cross product with closing is at right angles to it: your jaws close across what was asked for.")
+@wrong("A cross product with closing is at right angles to it: your jaws close a quarter turn off.")
 def closing_crossed_with_the_approach(position, approach, closing):
     z = unit(approach)
     y = unit(np.cross(z, closing))

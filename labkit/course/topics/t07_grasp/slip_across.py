@@ -92,6 +92,18 @@ def left_of_the_way_seen_from_above(T_base_grasp, middle):
     return pushed, np.sqrt(np.maximum(off[0] ** 2 + off[1] ** 2 - pushed**2, 0.0))
 
 
+@wrong("The points are in metres: in which unit are the two distances asked for?")
+def in_metres(T_base_grasp, middle):
+    off = np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
+    return off[1], off[0]
+
+
+@wrong("The jaws close along y of the grasp frame: that part is pushed, and it is asked for first.")
+def exchanged(T_base_grasp, middle):
+    off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
+    return off[0], off[1]
+
+
 @wrong("A slip is a distance: what do yours say if the middle lies on the other side of the hand?")
 def with_signs(T_base_grasp, middle):
     off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
