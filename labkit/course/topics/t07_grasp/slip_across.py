@@ -92,7 +92,7 @@ def left_of_the_way_seen_from_above(T_base_grasp, middle):
     return pushed, np.sqrt(np.maximum(off[0] ** 2 + off[1] ** 2 - pushed**2, 0.0))
 
 
-@wrong("The points are in metres: in which unit are the two distances asked for?")
+@wrong("Your distances are 1000 times too small: the points are in metres, and which unit is asked for?")
 def in_metres(T_base_grasp, middle):
     off = np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
     return off[1], off[0]
