@@ -15,7 +15,7 @@ from labkit.geometry import back_project_to_base, cluster_indices, inliers
 from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
 from labkit.labels import IGNORE, TARGET
 from labkit.learning.engines import open_engine
-from labkit.learning.inference import FunctionEngine, check_probabilities
+from labkit.learning.inference import Engine, FunctionEngine, check_probabilities
 from labkit.notices import notices
 from labkit.support.validation import (
     check_finite,
@@ -75,7 +75,8 @@ class Pipeline:
     `labkit.stacks.objects.on_the_table`: then each object is a target. None if labels come from elsewhere, and only
     `locate` is used. table_z: height of the table in the base frame, metres; None takes the frame's own, or else 0.
     target_class: what to grasp.
-    mirror: let a network look at the image and at its mirror image, and average: a little better, at twice the time.
+    mirror: let a network look at the image and at its mirror image, and average: a little better, at twice its time;
+    None does so for a network that sees the canonical view, whose size, and so its time, no picture changes.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.learning.engines): equal numbers, other
     speeds; the model may then be an ONNX file of `labkit export`.
     crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
@@ -100,7 +101,7 @@ class Pipeline:
         table_z: float | None = None,
         target_class: int = TARGET,
         *,
-        mirror: bool = False,
+        mirror: bool | None = None,
         engine: str = "torch",
         crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] | None = None,
         workspace: Sequence[Sequence[float]] = WORKSPACE,
@@ -116,7 +117,8 @@ class Pipeline:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
         self.table_z = None if table_z is None else check_height("table_z", table_z)
         self.target_class = target_class
-        self.mirror = mirror
+        sees_view = isinstance(self.model, Engine) and self.model.takes.pixel is not None
+        self.mirror = sees_view if mirror is None else mirror
         crf = not isinstance(self.model, FunctionEngine) if crf is None else crf
         self.crf = refine_labels if crf is True else crf
         self.workspace = check_finite("workspace", check_shape("workspace", workspace, (3, 2))).astype(np.float64)

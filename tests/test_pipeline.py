@@ -12,7 +12,7 @@ from labkit.frame import RGBDFrame
 from labkit.grasp import GraspPlan, Gripper
 from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
 from labkit.learning.engines import open_engine
-from labkit.learning.network import SmallSegNet
+from labkit.learning.network import SmallSegNet, UNetRGBD
 from labkit.pipeline import (
     WORKSPACE,
     Pipeline,
@@ -62,6 +62,17 @@ def test_a_network_or_a_function_of_the_image_may_be_the_model(frame):
     assert np.allclose(p.probabilities.sum(axis=-1), 1.0, atol=1e-5)
     q = Pipeline(lambda rgb: open_engine(network)(rgb)).run(frame)
     assert np.array_equal(p.labels, q.labels)
+
+
+def test_a_network_with_canonical_views_looks_into_the_mirror_as_well(frame):
+    torch.manual_seed(0)
+    network = UNetRGBD().eval()
+    once, twice = (open_engine(network)(frame, mirror) for mirror in (False, True))
+    assert not np.array_equal(once, twice)
+    for asked, expected in ((None, twice), (True, twice), (False, once)):
+        assert np.array_equal(Pipeline(network, mirror=asked).perceive(frame)[1], expected)
+    network.takes = dataclasses.replace(network.takes, pixel=None)  # its time grows with the picture
+    assert np.array_equal(Pipeline(network).perceive(frame)[1], open_engine(network)(frame))
 
 
 def test_ones_own_functions_take_the_stages_places(frame):

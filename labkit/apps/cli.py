@@ -321,8 +321,11 @@ def node(
     model: Model = "unet_rgbd",
     engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch",
     mirror: Annotated[
-        bool, typer.Option(help="Look at the mirror image, too: a little better, at twice the time.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--mirror/--no-mirror", help="Look at the mirror image, too; else only a network with canonical views does."
+        ),
+    ] = None,
     crf: Refine = None,
     target: Annotated[int, typer.Option(help="The class to grasp.")] = 2,
     table_z: Annotated[

@@ -33,7 +33,7 @@ class Settings:
     table_z: float | None = None
     camera_pose: str | None = None
     base_frame: str = "base_link"
-    mirror: bool = False
+    mirror: bool | None = None
     slop: float = 0.02
     depth_scale: float = 0.001
     qos_inputs: str = "best_effort"

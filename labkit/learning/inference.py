@@ -97,9 +97,10 @@ class Engine(ABC):
         errors differ. Raises ValueError if the picture is not what the network takes, or the result is not finite (the
         weights may hold NaN).
         """
-        p = _softmax(self.logits(picture))
+        view, arrays = self._seen(picture)
+        p = _softmax(self._logits(view, arrays, mirror=False))
         if mirror:
-            p = 0.5 * (p + _softmax(self.logits(picture, mirror=True)))
+            p = 0.5 * (p + _softmax(self._logits(view, arrays, mirror=True)))
         return check_finite("probabilities", np.ascontiguousarray(p.transpose(1, 2, 0)))
 
     def logits(
@@ -110,8 +111,14 @@ class Engine(ABC):
         mirror: those of the mirrored picture, mirrored back. Logits of a canonical view are brought back to the
         picture's own pixels.
         """
+        return self._logits(*self._seen(picture), mirror)
+
+    def _seen(self, picture):
+        """The canonical view of a picture, None if the network sees it as it is, and the arrays for the network."""
         view = self.takes.view(picture)
-        arrays = self.takes.build(picture if view is None else view.frame)
+        return view, self.takes.build(picture if view is None else view.frame)
+
+    def _logits(self, view: View | None, arrays, mirror: bool) -> Float32[np.ndarray, "C H W"]:
         z = self.padded([(mirrored(array) if mirror else array)[None] for array in arrays])[0]
         z = z[..., ::-1] if mirror else z
         return z if view is None else view.back(z.transpose(1, 2, 0)).transpose(2, 0, 1)
