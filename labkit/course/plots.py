@@ -75,8 +75,8 @@ def certainty(reports: Mapping[str, Mapping]) -> Figure:
     """Draw whether a network's certainty is worth its name: a reliability diagram, and what declining gains.
 
     reports: name -> a report of `labkit evaluate --json`, of which `calibration`, `declining` and `trials` are drawn.
-    On the left, a point on the diagonal is a probability that comes true as often as it says, and one below it comes true
-    less often; on the right, a curve that falls from left to right belongs to a robot that is surer where it succeeds. Topic 07.
+    On the left, a point on the diagonal is a probability that comes true as often as it says, one below it less often;
+    on the right, a curve that falls from left to right is of a robot that is surer where it succeeds. Topic 07.
 
     >>> report = {"calibration": [(0.1, 0.2, 50)], "declining": [(0.9, 0.5, 1.0), (0.4, 1.0, 0.8)], "trials": 10}
     >>> [axes.get_ylabel() for axes in certainty({"test": report}).axes]
