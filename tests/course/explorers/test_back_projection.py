@@ -1,5 +1,6 @@
 """The explorers of topic 06: what each bug does to a cloud, and that the noise drawn is the noise predicted."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -10,7 +11,10 @@ from data_gen import render, sample_scene
 from labkit.course.explorers import back_projection as widgets
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base, back_projection_noise, transform_points
-from labkit.learning.network import load_model, weights_path
+from labkit.labels import OBSTACLE, TARGET
+from labkit.learning.channels import CHANNELS
+from labkit.learning.network import TorchEngine, load_model, weights_path
+from labkit.learning.view import held
 
 K = np.array([[60.0, 0.0, 33.0], [0.0, 66.0, 20.0], [0.0, 0.0, 1.0]])
 # The camera stands at (1, 0.2, 0.8) and looks at the base, tilted down.
@@ -108,3 +112,23 @@ def test_the_canonical_view_holds_its_score_when_the_camera_is_turned_over():
     as_it_is, in_view = zip(*(scores[roll] for roll in (0, 180)), strict=True)
     assert as_it_is[1] < as_it_is[0] - 0.3 and in_view[1] == pytest.approx(in_view[0], abs=0.03)
     assert np.array_equal(explorer.figure(roll=0, width=160).axes[0].images[0].get_array(), frame.rgb)
+
+
+def test_turned_over_or_with_the_wrong_sign_of_away_most_targets_look_like_obstacles():
+    network = load_model(weights_path("unet_rgbd"))
+    engine, takes, away = TorchEngine(network), replace(network.takes, pixel=None), CHANNELS.index("away")
+
+    def taken_for_obstacles(image, geometry, labels):
+        logits = engine.forward(*(array.transpose(2, 0, 1)[None] for array in (image, geometry)))[0]
+        return np.mean(logits.argmax(axis=0)[labels == TARGET] == OBSTACLE)
+
+    shares = []
+    for seed in range(600001, 600007):
+        frame = render(sample_scene(seed, "test"), (320, 240))
+        over = held(frame, np.pi, frame.K, frame.size)
+        upright, turned = takes.build(frame), takes.build(over)
+        shares.append([taken_for_obstacles(*upright, frame.labels), taken_for_obstacles(*turned, over.labels)])
+        upright[1][..., away] = 1.0 - upright[1][..., away]
+        shares[-1].append(taken_for_obstacles(*upright, frame.labels))
+    as_it_is, turned, wrong_sign = np.median(shares, axis=0)
+    assert as_it_is < 0.05 and turned > 0.5 and wrong_sign > 0.5
