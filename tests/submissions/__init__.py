@@ -1,6 +1,7 @@
 """Submissions as students hand them in: honest ones to 04_iou.iou in honest.txt, to other tasks in labs.txt."""
 
-from dataclasses import dataclass
+import ast
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 FUNCTION = "iou"
@@ -72,3 +73,30 @@ def as_editors_save_it(right: Honest) -> dict[str, dict]:
     odd = right.notebook()
     odd["cells"] += [{"cell_type": "markdown", "metadata": {}, "source": "iou"}, {"cell_type": "raw"}, {}, None]
     return {"Colab": colab, "lines": lines, "VS Code": code_editor, "CRLF": windows, "other cells": odd}
+
+
+def as_students_leave_it(right: Honest) -> dict[str, dict]:
+    """A notebook whose first cell is the setup, with cells and their grade ids in other places."""
+    setup, *answers = right.cells
+    sources, ids = zip(*answers, strict=True)
+    pieces = [
+        (part, name if part is parts[-1] else "")
+        for text, name in answers
+        for parts in [parts_of(text)]
+        for part in parts
+    ]
+    kinds = {
+        "in reverse order": right.cells[::-1],
+        "grade ids lost": [(text, "") for text, _ in right.cells],
+        "grade ids of other cells": [setup, *zip(sources, ids[1:] + ids[:1], strict=True)],
+        "all in one cell without a grade id": [setup, ("\n".join(sources), "")],
+        "all in the first answer's cell": [setup, ("\n".join(sources), ids[0])],
+        "copied cells": [setup, *(cell for cell in answers for _ in range(2))],
+        "a cell for each definition": [setup, *pieces],
+    }
+    return {kind: replace(right, cells=tuple(cells)).notebook() for kind, cells in kinds.items()}
+
+
+def parts_of(source: str) -> list[str]:
+    """The statements of a cell."""
+    return [ast.get_source_segment(source, statement) for statement in ast.parse(source).body]

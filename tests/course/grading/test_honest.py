@@ -2,7 +2,7 @@
 
 import grading_course as kit
 import pytest
-from submissions import Honest, in_other_labs
+from submissions import OWN, Honest, as_editors_save_it, as_students_leave_it, in_other_labs
 
 from labkit.course.checker.program import cells_of
 from labkit.course.checking_file import CheckedLab
@@ -29,6 +29,26 @@ def test_what_is_honest_is_right_and_the_file_check_says_the_same_before(topic, 
             assert submission.refused in result.says and before.problem.says == result.says, submission.name
         else:
             assert result.right and before.passed, (submission.name, result.says, before.problem)
+
+
+def whole_lab(topic: str) -> Honest:
+    """A lab with a right answer to each question in its cell."""
+    return Honest(topic, (*OWN["setup"], *((answer, name) for name, answer in kit.right_answers(topic).items())))
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_whole_labs_are_right_however_an_editor_saves_them_and_wherever_the_cells_went(topic, tmp_path):
+    """Each lab takes every fifth of the ways."""
+    right = whole_lab(topic)
+    ways = as_editors_save_it(right) | as_students_leave_it(right)
+    mine = list(ways.items())[TOPICS.index(topic) :: len(TOPICS)]
+    kit.write_lab(tmp_path, topic)
+    for way, notebook in mine:
+        kit.submit(tmp_path, way, topic, notebook)
+    records = grade_course(topic, tmp_path, seed="secret", workers=2, progress=False).records
+    assert len(records) == len(mine) >= 2
+    for record in records:
+        assert not record.reason and all(result.right for result in record.results), (record.student, record)
 
 
 def question_of(submission: Honest) -> str:
