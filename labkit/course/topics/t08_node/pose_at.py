@@ -29,7 +29,7 @@ def _stream(rng):
     """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way.
 
     In some streams they are nanoseconds apart. In some the turns beside t are equal, and of length 1 but for rounding;
-    some times are before or after all.
+    some times are before or after all, some the first or the last one's.
     """
     stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20, 80, 5)) * rng.choice([1, 1_000_000])
     quaternions = rng.normal(size=(5, 4))
@@ -41,6 +41,8 @@ def _stream(rng):
         quaternions[i : i + 2] = quaternions[i] * (1 + 4e-16), quaternions[i] * rng.choice([-1, 1]) * (1 + 4e-16)
     elif kind < 0.6:
         t = rng.choice([stamps[0] - rng.integers(1, 10**8), stamps[-1] + rng.integers(1, 10**8)])
+    elif kind < 0.85:
+        t = rng.choice(stamps[[0, -1]])
     return stamps, rng.uniform(-1.0, 1.0, (5, 3)), quaternions, int(t)
 
 
