@@ -69,7 +69,7 @@ def test_the_table_outlasts_the_kernel_and_tells_other_cases(tmp_path):
 
 def test_ctrl_c_stops_a_round_whose_answer_never_ends(tmp_path):
     script = """
-        import sys, time
+        import signal, sys, time
         from pathlib import Path
         from labkit.course.attempts import Attempts
 
@@ -79,6 +79,7 @@ def test_ctrl_c_stops_a_round_whose_answer_never_ends(tmp_path):
                 time.sleep(0.01)
 
         if __name__ == "__main__":
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # which background jobs ignore
             attempts = Attempts(lambda answer, case: answer(case), range(4), sum, str, workers=2)
             try:
                 attempts.score("forever", forever)
