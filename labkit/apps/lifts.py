@@ -1,7 +1,7 @@
 """How many hard scenes does a planner of one's own lift? Lab 07's open task asks it again and again.
 
 The depth is noisy and the camera's pose is off, the objects hide one another, and the masks are the true ones, so that
-what fails is the grasp's fault.
+no failure is the mask's fault.
 """
 
 import traceback
