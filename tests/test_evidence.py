@@ -48,7 +48,7 @@ def test_notebooks_quote_the_target_iou_that_was_measured():
     without, with_depth, trained, refined = (
         f"{json.loads((ROOT / 'docs' / 'results' / f'{file}.json').read_text())['iou']['target']:.2f}" for file in files
     )
-    quoted = f"target's IoU is {without} for the U-Net, and {with_depth} for `unet_rgbd` with the CRF of topic 02"
+    quoted = f"target's IoU is {without} for the U-Net alone, and {with_depth} for `unet_rgbd` with the CRF of topic 02"
     assert quoted in (ROOT / "lessons" / "03_gradient_network.ipynb").read_text()
     on_average = f"target IoU is {trained} on its own and {refined} with the CRF"
     assert on_average in (ROOT / "lessons" / "02_crf_bounds.ipynb").read_text()
