@@ -16,6 +16,18 @@ def random_logits(rng: np.random.Generator) -> np.ndarray:
     return z
 
 
+def random_possible_classes(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Draw logits (H, W, C), and which classes can occur (C,), at least one and in most draws not all of them.
+
+    The impossible ones have the largest logits of pixel (0, 2), by far.
+    """
+    z = random_logits(rng)
+    possible = rng.random(z.shape[-1]) < 0.6
+    possible[rng.integers(z.shape[-1])] = True
+    z[0, 2, ~possible] += 2000.0
+    return z, possible
+
+
 def random_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw logits (H, W, C) and labels (H, W), at least one of them ignored; the surest pixel is wrong."""
     z = random_logits(rng)
@@ -46,6 +58,11 @@ EPSILONS = tuple(10.0**-digits for digits in (6, 7, 8, 9, 10, 12, 15, 16))  # wh
 
 
 TRUE_CLASSES = np.array([0, 255], np.uint8)
+
+
+def softmax_over_classes(z):
+    e = np.exp(z - z.max(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
 
 
 def softmax_over_pixels(z):

@@ -3,8 +3,15 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, wrong
-from labkit.course.topics.t03_gradient import EPSILONS, SURE, TOY, TRUE_CLASSES, random_smoothed_pixels, targets
-from labkit.course.topics.t03_gradient.softmax import softmax
+from labkit.course.topics.t03_gradient import (
+    EPSILONS,
+    SURE,
+    TOY,
+    TRUE_CLASSES,
+    random_smoothed_pixels,
+    softmax_over_classes,
+    targets,
+)
 
 
 def cross_entropy(z, y, s):
@@ -106,7 +113,7 @@ def cross_entropy_with(z, y, s, epsilon):
 
 @wrong("z holds logits, and the loss makes probabilities of them itself: does yours do so twice?")
 def cross_entropy_softmax_twice(z, y, s):
-    return cross_entropy(softmax(z), y, s)
+    return cross_entropy(softmax_over_classes(z), y, s)
 
 
 @wrong("Yours uses logits alone: log p is z - lse(z), and lse depends on the logits of all classes.")

@@ -3,8 +3,14 @@
 import numpy as np
 
 from labkit.course.checker.question import Question, holds, wrong
-from labkit.course.topics.t03_gradient import SURE, TOY, random_smoothed_pixels, softmax_over_pixels, targets
-from labkit.course.topics.t03_gradient.softmax import softmax
+from labkit.course.topics.t03_gradient import (
+    SURE,
+    TOY,
+    random_smoothed_pixels,
+    softmax_over_classes,
+    softmax_over_pixels,
+    targets,
+)
 
 
 def cross_entropy_grad(z, y, s):
@@ -48,7 +54,7 @@ def grad_of_the_lesson(z, y, s):
 
 @wrong("That is the lesson's p less a one-hot. Here a share s is spread over all classes, and 255 has no gradient.")
 def grad_of_the_lesson_of_all_pixels(z, y, s):
-    return softmax(z) - target(z, y, 0.0)
+    return softmax_over_classes(z) - target(z, y, 0.0)
 
 
 @wrong("(1 - s)(p - Y) is the slope of the true class's share. The share s is a loss, too: what is its slope?")
@@ -60,7 +66,7 @@ def grad_of_the_true_share_alone(z, y, s):
 def grad_spread_over_the_others(z, y, s):
     one_hot = target(z, y, 0.0)
     t = (1.0 - s) * one_hot + s / (z.shape[-1] - 1) * (1.0 - one_hot)
-    return (softmax(z) - t) * (y != 255)[..., None]
+    return (softmax_over_classes(z) - t) * (y != 255)[..., None]
 
 
 @wrong(
@@ -69,13 +75,13 @@ def grad_spread_over_the_others(z, y, s):
 def grad_of_targets_that_do_not_sum_to_1(z, y, s, true):
     one_hot, C = target(z, y, 0.0), z.shape[-1]
     t = (1.0 - s if true == "1-s" else 1.0) * one_hot + s / C * (1.0 - one_hot)
-    return (softmax(z) - t) * (y != 255)[..., None]
+    return (softmax_over_classes(z) - t) * (y != 255)[..., None]
 
 
 @wrong("The targets of a pixel sum to 1, like its probabilities: do your 1 - s and s do so?", part=("s", "none"))
 def grad_of_a_share_that_is_not_divided(z, y, s, part):
     t = (1.0 - s) * target(z, y, 0.0) + (s if part == "s" else 0.0)
-    return (softmax(z) - t) * (y != 255)[..., None]
+    return (softmax_over_classes(z) - t) * (y != 255)[..., None]
 
 
 @wrong("The shares are exchanged: 1 - s of a pixel belongs to its true class.")
@@ -85,7 +91,7 @@ def grad_with_shares_exchanged(z, y, s):
 
 @wrong("p keeps its factor 1: it comes from lse, which the targets multiply by their sum, 1.")
 def grad_with_less_of_p(z, y, s):
-    return (((1.0 - s) * softmax(z)) - target(z, y, s)) * (y != 255)[..., None]
+    return (((1.0 - s) * softmax_over_classes(z)) - target(z, y, s)) * (y != 255)[..., None]
 
 
 @wrong("A pixel of 255 has no gradient in any class: its one-hot is zeros, and what of its share s?")
@@ -95,7 +101,7 @@ def grad_leaves_the_share_of_ignored(z, y, s):
 
 @wrong("A pixel that adds no loss has no gradient: look at 255.")
 def grad_counts_ignored(z, y, s):
-    return softmax(z) - target(z, y, s)
+    return softmax_over_classes(z) - target(z, y, s)
 
 
 @wrong("Normalise over the classes, the last axis.")
@@ -110,7 +116,7 @@ def grad_of_logits(z, y, s):
 
 @wrong("That is the gradient of half the squared error: with the logarithm the factor p in front cancels.")
 def grad_of_squared_error(z, y, s):
-    p = softmax(z)
+    p = softmax_over_classes(z)
     error = p - target(z, y, s)
     return p * (error - (p * error).sum(axis=-1, keepdims=True)) * (y != 255)[..., None]
 
@@ -118,17 +124,17 @@ def grad_of_squared_error(z, y, s):
 @wrong("That is the slope of -p[y]. What does the logarithm's derivative, 1 / p[y], make of it?")
 def grad_without_the_logarithm(z, y, s):
     Y = target(z, y, s)
-    return (softmax(z) * Y).sum(axis=-1, keepdims=True) * cross_entropy_grad(z, y, s)
+    return (softmax_over_classes(z) * Y).sum(axis=-1, keepdims=True) * cross_entropy_grad(z, y, s)
 
 
 @wrong("Your gradient sums to 1 over a pixel's classes: the target has not been taken off.")
 def grad_without_the_one_hot(z, y, s):
-    return softmax(z) * (y != 255)[..., None]
+    return softmax_over_classes(z) * (y != 255)[..., None]
 
 
 @wrong("The other classes move, too: where c is not the true class the slope is p[c] - s / C, not 0.")
 def grad_of_the_true_class_alone(z, y, s):
-    return (softmax(z) - target(z, y, s)) * target(z, y, 0.0)
+    return (softmax_over_classes(z) - target(z, y, s)) * target(z, y, 0.0)
 
 
 def targets_of_the_surest(z, s):
@@ -137,7 +143,7 @@ def targets_of_the_surest(z, s):
 
 @wrong("1 - s is taken off at one class of each pixel: at the one of the largest logit, or at the true one?")
 def grad_at_the_surest_class(z, y, s):
-    return (softmax(z) - targets_of_the_surest(z, s)) * (y != 255)[..., None]
+    return (softmax_over_classes(z) - targets_of_the_surest(z, s)) * (y != 255)[..., None]
 
 
 @wrong("Yours compares the target with the class of the largest logit: do the probabilities themselves enter?")
@@ -169,5 +175,5 @@ def grad_of_a_softmax_over_everything(z, y, s):
 
 @wrong("In the lesson a factor p cancels with the 1 / p of the logarithm. Which factor of yours should have cancelled?")
 def grad_times_the_slope_of_a_sigmoid(z, y, s):
-    p = softmax(z)
+    p = softmax_over_classes(z)
     return cross_entropy_grad(z, y, s) * p * (1.0 - p)
