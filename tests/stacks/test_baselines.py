@@ -48,7 +48,7 @@ def test_in_how_many_of_twenty_scenes_a_tables_range_holds(twenty_scenes):
     said = prose(ROOT / "lessons/09_other_stacks_colour.ipynb")
     assert f"Of twenty tables, {half} keep an IoU of 0.9 at half the light, and {quarter} at a quarter." in said
     assert f"Under the yellow lamp {yellow} do." in said
-    assert f"Used on the next of the twenty tables, {holds(np.copy, shift=1)} of the ranges do." in said
+    assert f"If each range is used on the next table of the twenty, {holds(np.copy, shift=1)} keep it." in said
 
 
 def test_how_many_labels_of_twenty_scenes_are_right_by_luck(twenty_scenes):
