@@ -5,6 +5,7 @@ That they run, and give the outputs that are committed, is nbval's part of `make
 
 import ast
 import base64
+import doctest
 import importlib
 import os
 import re
@@ -216,6 +217,14 @@ def test_every_solution_passes_under_another_seed_than_the_checks(path):
     for function, question in of_topic(path.stem).items():
         verdict = judge(question, answer(path, function), 20_260_102)
         assert verdict.passed and not verdict.notes, (function, verdict)
+
+
+@each(SOLUTIONS)
+def test_a_right_answer_prints_what_its_docstring_shows(path):
+    for function in of_topic(path.stem):
+        right = answer(path, function)
+        examples = doctest.DocTestFinder(recurse=False).find(right, function, module=False, globs=right.__globals__)
+        assert [doctest.DocTestRunner().run(example).failed for example in examples] == [0], function
 
 
 def cells_to_first_check(path: Path) -> str:
