@@ -5,6 +5,7 @@ import pytest
 
 from labkit.course.explorers import grasp as widgets
 from labkit.grasp import principal_axis_grasp
+from labkit.sim.world import World
 
 
 def stick(length=0.1, breadth=0.02, yaw=0.6):
@@ -70,6 +71,23 @@ def test_two_pads_carry_twice_the_friction_of_their_force():
     limit = 2.0 * friction * force / 9.81
     assert widgets.lift_can(0.0, friction, 0.8 * limit)[0].success
     assert not widgets.lift_can(0.0, friction, 1.05 * limit)[0].success
+
+
+def test_a_can_9_mm_off_meets_the_pads_with_a_facet_that_leans_by_half_a_32nd_of_a_turn(monkeypatch):
+    """Lesson 07, mechanics: the simulated can is a prism, so it slips where a circle of the same radius would hold."""
+    leans = []
+
+    def step_and_look(self, *arguments):
+        step(self, *arguments)
+        for contact in self.client.getContactPoints(self.robot, self.bodies["can"]):
+            if contact[9] > 5.0:  # the normal force, N
+                leans.append(np.degrees(np.arccos(abs(contact[7][1]))))
+
+    step = World.step
+    monkeypatch.setattr(World, "step", step_and_look)
+    assert widgets.lift_can(0.009, 0.1)[0].reason == "slipped"
+    assert abs(np.median(leans) - 360 / 32 / 2) < 0.2 and np.degrees(widgets.contact_angle(0.009)) < 0.7
+    assert widgets.lift_can(0.009, 0.1, 0.03)[0].success
 
 
 @pytest.mark.parametrize("offset, friction, said", [(8, 0.1, "inside, it holds"), (20, 0.2, "outside, it slips")])
