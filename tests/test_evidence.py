@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import evidence
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -53,3 +54,26 @@ def test_notebooks_quote_the_target_iou_that_was_measured():
     on_average = f"target IoU is {trained} on its own and {refined} with the CRF"
     assert on_average in (ROOT / "lessons" / "02_crf_bounds.ipynb").read_text()
     assert f"target IoU is {trained}" in (ROOT / "labs" / "04_iou" / "04_iou.ipynb").read_text()
+
+
+def test_lesson_03_and_the_card_say_what_depth_is_worth():
+    """Means over both trainings, of the network with depth, with colours alone, and with colours kept."""
+    rows = [row for row in evidence.cells("depth") if row[0] in ("test", "hard")]
+    means = {
+        kind: np.mean([[float(cell) for cell in row[3:6]] for row in rows if row[0] == kind], axis=0)
+        for kind in ("test", "hard")
+    }
+    (test, test_alone, test_kept), (hard, hard_alone, hard_kept) = ([f"{x:.2f}" for x in m] for m in means.values())
+    cells = json.loads((ROOT / "lessons" / "03_gradient_network.ipynb").read_text())["cells"]
+    lesson = "\n".join("".join(cell["source"]) for cell in cells)
+    assert f"targets is {hard} with depth and {hard_alone} without" in lesson
+    assert (
+        f"learned from it is {test} and {test_alone}" in lesson
+        and f"network without depth has {hard_kept} and {test_kept}." in lesson
+    )
+    card = " ".join((ROOT / "labkit/weights/MODEL_CARD.md").read_text().split())
+    assert f"{test} with depth, {test_alone} without; of `hard` {hard} and {hard_alone}" in card
+    assert f"the network without depth has {test_kept} and {hard_kept}" in card
+    gains = [re.fullmatch(r"(\S+) \((\S+) to (\S+)\)", cell).groups() for row in rows for cell in row[6:]]
+    assert all(float(high) - float(low) <= 0.08 for _, low, high in gains)  # "known to 0.04"
+    assert all(0.15 < float(gain) < 0.25 for gain, *_ in gains)  # "about 0.2"
