@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from data_gen import generate, load
+from labkit.apps.trials import in_order
 from labkit.labels import CLASSES, TARGET
 from labkit.learning import augment_depth
 from labkit.learning.network import TorchEngine, UNetRGBD, load_model
@@ -38,8 +39,9 @@ class ColoursAlone(UNetRGBD):
         return super().forward(image, torch.full_like(geometry, 0.5))
 
 
-def trained(arm: str, seed: int) -> dict[str, np.ndarray]:
-    """Train one arm; each scene's target IoU of `test` and `hard`, NaN where there is no target."""
+def trained(job: tuple[str, int]) -> dict[str, np.ndarray]:
+    """Train one arm with one seed; each scene's target IoU of `test` and `hard`, NaN where there is no target."""
+    arm, seed = job
     config = replace(RECIPES["unet_rgbd"], seed=seed, weights="none")
     model = UNetRGBD() if arm == "with depth" else ColoursAlone()
     model.load_state_dict(fresh_model(config).state_dict())
@@ -68,10 +70,11 @@ def gain(more: np.ndarray, less: np.ndarray) -> str:
 def main() -> str:
     """Make the scenes, train the networks that are not trained yet, score all, and return the table."""
     jobs = list(product(ARMS, TRAININGS))
-    with executor_for(min(os.cpu_count() or 1, len(jobs))) as executor:  # each trains on one thread
+    workers = min(os.cpu_count() or 1, len(jobs))
+    with executor_for(workers) as executor:
         for kind, seeds in SCENES.items():
             generate(FOLDER / kind, seeds, kind, executor=executor, progress=False)
-        found = dict(zip(jobs, (executor.map if executor else map)(trained, *zip(*jobs, strict=True)), strict=True))
+    found = dict(zip(jobs, in_order(trained, jobs, workers), strict=True))  # each on one thread
     rows = []
     for kind, seed in product(("test", "hard"), TRAININGS):
         scores = [found[arm, seed][kind] for arm in ARMS]
