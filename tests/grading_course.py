@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from alternatives import alternatives
 
-from labkit.course.checker.question import Question
-from labkit.course.grading.gradebook import opened
-from labkit.course.topics import of_topic
+from labgrader.checker.question import Question
+from labgrader.course import of_topic
+from labgrader.grading.gradebook import opened
 
 
 def code_cell(source: str, grade_id: str | None = None, **mark) -> dict:
@@ -175,7 +175,7 @@ def define(function: Callable, name: str, cell: str, done: dict[int, tuple[str, 
     return name
 
 
-OURS = ("labkit", "alternatives")  # packages whose functions are written out
+OURS = ("labkit", "labcourse", "alternatives")  # packages whose functions are written out
 
 
 class Renamed(ast.NodeTransformer):

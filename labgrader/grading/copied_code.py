@@ -1,0 +1,46 @@
+"""Copies of the kit's own code among answers: each student has the references, since `check` needs them."""
+
+import functools
+import inspect
+import threading
+from collections.abc import Callable, Iterable
+
+from labgrader.checker.ast_fingerprint import fingerprints
+from labgrader.course import course, files_of
+
+parsing = threading.Lock()  # Python 3.11's parser fails when two threads make syntax trees at a time
+
+
+def of_the_kit(prints: Iterable[str], reference: Callable) -> list[str]:
+    """Say of which functions of the kit there are copies: `prints` are the fingerprints of an answer's functions."""
+    known = known_functions() | fingerprints_of(reference)
+    return [f"has a copy of the kit's {known[found]}" for found in prints if found in known]
+
+
+def known_functions() -> dict[str, str]:
+    """The names of the library's functions that are long enough to be known by their fingerprint."""
+    with parsing:
+        return _known_functions()
+
+
+@functools.cache
+def _known_functions() -> dict[str, str]:
+    found = {}
+    for name, path in (entry for package in course().copied for entry in files_of(package)):
+        module = name.removesuffix(".py").replace("/", ".")
+        found |= {key: f"{module}.{name}" for key, name in fingerprints(path.read_text()).items()}
+    return found
+
+
+@functools.cache
+def fingerprints_of(reference: Callable) -> dict[str, str]:
+    """The fingerprints of a question's reference; not of the wrong answers beside it."""
+    with parsing:
+        return fingerprints(reference_source(reference))
+
+
+@functools.cache
+def reference_source(reference: Callable) -> str:
+    """A question's reference as a student would write it; it is complete in itself but for NumPy."""
+    source = inspect.getsource(inspect.unwrap(reference))
+    return "\n".join(["import numpy as np", *filter(str.strip, source.splitlines())]) + "\n"

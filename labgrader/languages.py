@@ -1,0 +1,42 @@
+"""Hints and statements of checks in another language: a file beside the question, `iou.de.toml` beside `iou.py`.
+
+    [hints]
+    dice = "Das ist Dice (F1), ein anderes Maß: ..."
+
+    [statements]
+    at_most_one = "der Wert ist höchstens 1"
+
+Each line is named like the function of the wrong answer, or of the property, that it belongs to. What the file does not
+say stays English, and so does a question without one. The language is that of `LABGRADER_LANGUAGE` in the environment,
+else `language` in [tool.labgrader]; for English no file is looked for.
+"""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+from labgrader.checker.question import Question
+
+CHOSEN = "LABGRADER_LANGUAGE"
+ENGLISH = "en"
+
+
+def translated(question: Question, module: Path, language: str) -> Question:
+    """A question with the hints and statements of its file in a language, where there are any.
+
+    Raises ValueError that names the file, if a line belongs to no wrong answer and no property of the question.
+    """
+    path = module.with_suffix(f".{language}.toml")
+    if language == ENGLISH or not path.is_file():
+        return question
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    hints, statements = said.pop("hints", {}), said.pop("statements", {})
+    wrong = {one.answer.__name__ for one in question.misconceptions}
+    unknown = said.keys() | hints.keys() - wrong | statements.keys() - {p.holds.__name__ for p in question.properties}
+    if unknown:
+        raise ValueError(f"{path}: expected lines named like functions of {module.name}, see {min(unknown)}")
+    return replace(
+        question,
+        misconceptions=[replace(one, hint=hints.get(one.answer.__name__, one.hint)) for one in question.misconceptions],
+        properties=[replace(one, says=statements.get(one.holds.__name__, one.says)) for one in question.properties],
+    )

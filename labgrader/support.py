@@ -1,0 +1,48 @@
+"""What several modules here need: files written whole or not at all, refusals in words, variables for a while."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+# What of a course's folder is about persons, for the instructor alone; folders end with a slash.
+PRIVATE = (
+    *("downloaded/", "submitted/", "autograded/", "feedback/", "grades/"),
+    *("gradebook.db*", "roster.csv", "course.toml", "changes.json"),
+)
+
+
+def write_atomically(path, data: bytes) -> None:
+    """Write bytes to `path` through a temporary file beside it: readers see the old file or the new one, whole.
+
+    Creates missing folders. On any failure (a full disk, say) the temporary file is removed; an OSError names `path`.
+    """
+    path = Path(path)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_bytes(data)
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise OSError(error.errno, f"could not write the file ({os.strerror(error.errno or 0)})", str(path)) from error
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def require(name: str, fits, expected: str, got) -> None:
+    """Raise a ValueError that names an argument, what was expected and what came, unless `fits`."""
+    if not fits:
+        raise ValueError(f"{name}: expected {expected}, got {got}")
+
+
+@contextmanager
+def inherited(variables: dict[str, str]) -> Iterator[None]:
+    """Processes that are started meanwhile have these environment variables; this one has its own again afterwards."""
+    before = {name: os.environ[name] for name in variables if name in os.environ}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name in variables:
+            os.environ.pop(name, None)
+        os.environ.update(before)

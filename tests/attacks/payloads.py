@@ -1,0 +1,31 @@
+"""Texts that would run a script, or ask another site for something, on a page that shows them as they are."""
+
+RUN = "window.attacked=1"
+PAYLOADS = (
+    f"<script>{RUN}</script>",
+    f'<img src="x" onerror="{RUN}">',
+    f'<svg onload="{RUN}"></svg>',
+    f'<details open ontoggle="{RUN}">x</details>',
+    f"<iframe srcdoc='<script>parent.{RUN}</script>'></iframe>",
+    f'<a href="javascript:{RUN}">x</a>',
+    f"[x](javascript:{RUN})",
+    f"[x](java&#115;cript:{RUN})",
+    f"[x](\x01javascript:{RUN})",
+    f"[x]\n\n[x]: javascript:{RUN}",
+    "![x](http://127.0.0.1:9/seen.png)",
+    "![x][y]\n\n[y]: http://127.0.0.1:9/seen.png",
+    f"<javascript:{RUN}>",
+    f'$x$ <img src="x" onerror="{RUN}"> $y$',
+    f'$$<img src="x" onerror="{RUN}">$$',
+    f'\\begin{{x}}<img src="x" onerror="{RUN}">\\end{{x}}',
+    f'```\n</code></pre><img src="x" onerror="{RUN}">\n```',
+    f'`</code><img src="x" onerror="{RUN}">`',
+    f'| a |\n|---|\n| <img src="x" onerror="{RUN}"> |',
+    f'<!--><img src="x" onerror="{RUN}">-->',
+    f'<<img src="x" onerror="{RUN}">',
+    f'\\<img src="x" onerror="{RUN}">',
+    f'<\x00img src="x" onerror="{RUN}">',
+    "<style>body{display:none}</style>",
+    '<meta http-equiv="refresh" content="0;url=http://127.0.0.1:9/">',
+    '<form action="/api/contents"><input name="type"></form>',
+)
