@@ -1,0 +1,114 @@
+"""Write an exam: a page to print per version, and one key for whoever corrects."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from labcourse.exam.draw import choose, draw
+from labcourse.exam.paper import Paper, PaperQuestion, shown
+from labkit.support.files import write_atomically
+
+MOST_VERSIONS = 3  # some questions draw a number of which there are only three or four
+
+STYLE = """
+@page { size: A4; margin: 18mm 20mm }
+body { font: 11.5pt/1.45 Georgia, "DejaVu Serif", serif; color: #000; background: #fff }
+body { max-width: 170mm; margin: 8mm auto }
+h1 { font-size: 17pt; margin: 0 } h2 { font-size: 12pt; margin: 9mm 0 1mm; break-after: avoid }
+h2 { display: flex; justify-content: space-between; gap: 6mm }
+h2 span { font-weight: normal; white-space: nowrap } p { margin: 2mm 0 }
+section { break-inside: avoid } .name { margin: 7mm 0; border-bottom: .3mm solid #000 }
+table { border-collapse: collapse; margin: 2mm 6mm 2mm 0; font-size: 11pt; display: inline-table }
+table { vertical-align: middle }
+td, th { border: .2mm solid #555; padding: .7mm 2.4mm; text-align: center; min-width: 6mm }
+th { font-weight: normal; background: #eee }
+.fill td { min-width: 13mm; height: 7mm } caption { font-style: italic; text-align: left } b { font-weight: normal }
+sup, sub { line-height: 0 }
+dl { display: grid; grid-template-columns: max-content 1fr; gap: 1mm 4mm; margin: 1mm 0 }
+dt, dd { margin: 0 } dt { font-style: italic }
+.how { color: #333 } ul { margin: 1mm 0; padding-left: 5mm }
+"""
+ROOM_MM = 9  # of paper for each minute that a question takes
+
+
+def write(topics: Sequence[str], minutes: int, seed: int, versions: int, out: Path) -> list[Path]:
+    """Write exam_A.html, exam_B.html, ... and key.html into a folder, and return their paths.
+
+    Raises ValueError if the minutes do not hold a question of each topic, or for more versions than there are numbers.
+    """
+    if not 1 <= versions <= MOST_VERSIONS:
+        raise ValueError(f"versions: expected 1 to {MOST_VERSIONS}, got {versions}; draw more with another seed")
+    questions = choose(topics, minutes, seed)
+    papers = [draw(question, seed, versions) for question in questions]
+    letters = "ABC"[:versions]
+    pages = {
+        f"exam_{letter}.html": exam_page(questions, [drawn[i] for drawn in papers], letter)
+        for i, letter in enumerate(letters)
+    }
+    pages["key.html"] = key_page(questions, papers, letters, seed)
+    for name, text in pages.items():
+        write_atomically(out / name, text.encode())
+    return [out / name for name in pages]
+
+
+def page(title: str, body: str) -> str:
+    """Wrap a page."""
+    head = f'<meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
+
+
+def exam_page(questions: Sequence[PaperQuestion], papers: Sequence[Paper], letter: str) -> str:
+    """What students get of a version; it does not say the seed, from which the key could be made."""
+    points, minutes = sum(q.points for q in questions), sum(q.minutes for q in questions)
+    parts = [
+        f"<h1>Exam, version {letter}</h1>",
+        f"<p>{len(questions)} questions, {minutes} minutes, {points} points. Fractions and roots may stay as they are; "
+        "say how you got there. Rows and columns, pixels and classes are counted from 0.</p>",
+        '<p class="name">Name</p>',
+    ]
+    for number, (question, paper) in enumerate(zip(questions, papers, strict=True), 1):
+        worth = f"<span>{count(question.points)}, {question.minutes} min</span>"
+        parts.append(
+            f"<section><h2>{number}. {question.about} {worth}</h2>\n"
+            f'{paper.text}\n<div style="height:{ROOM_MM * question.minutes}mm"></div></section>'
+        )
+    return page(f"Exam, version {letter}", "\n".join(parts))
+
+
+def key_page(questions: Sequence[PaperQuestion], papers: Sequence[Sequence[Paper]], letters: str, seed: int) -> str:
+    """The key of all versions, question by question, with the mistakes that wrong values tell."""
+    parts = [f"<h1>Key, seed {seed}</h1><p>{sum(q.points for q in questions)} points. Not for students.</p>"]
+    for number, (question, drawn) in enumerate(zip(questions, papers, strict=True), 1):
+        title = f"{number}. {question.about}<span>{question.topic}, {count(question.points)}</span>"
+        versions, ways = [], {paper.how for paper in drawn}
+        for letter, paper in zip(letters, drawn, strict=True):
+            answer = "".join(f"<dt>{name}</dt><dd>{shown(value)}</dd>" for name, value in paper.answer.items())
+            told = "".join(f"<li>{mistake_in_words(what, value)}</li>" for what, value in paper.mistakes.items())
+            versions.append(
+                f"<h3>{letter}</h3><dl>{answer}</dl>"
+                + (f'<p class="how">{paper.how}</p>' if len(ways) > 1 else "")
+                + (f"<ul>{told}</ul>" if told else "")
+            )
+        for_all = f'<p class="how">{drawn[0].how}</p>' if len(ways) == 1 else ""
+        parts.append(f"<section><h2>{title}</h2>\n{for_all}{''.join(versions)}</section>")
+    return page("Key", "\n".join(parts))
+
+
+def mistake_in_words(what: str, value) -> str:
+    """Say which mistake a wrong value tells.
+
+    >>> mistake_in_words("forgot the constant", {"constant": 0})
+    'constant 0: forgot the constant'
+    """
+    if isinstance(value, dict):
+        (name, wrong), *_ = value.items()
+        return f"{name} {shown(wrong)}: {what}"
+    return f"{shown(value)}: {what}"
+
+
+def count(points: int) -> str:
+    """Say how many points.
+
+    >>> count(1), count(3)
+    ('1 point', '3 points')
+    """
+    return f"{points} point" + "s" * (points != 1)

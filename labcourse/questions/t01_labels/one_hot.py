@@ -1,0 +1,76 @@
+"""01_labels.one_hot: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t01_labels import images_and_classes
+from labgrader.checker.question import Question, holds, wrong
+
+
+def one_hot(y, C):
+    """Turn a stack of label images into one-hot planes (N, C, H, W); a pixel that is ignored (255) is all zeros."""
+    return (y[:, None] == np.arange(C)[:, None, None]).astype(np.uint8)
+
+
+QUESTION = Question(
+    reference=one_hot,
+    inputs=images_and_classes,
+    by_hand=((np.array([[[0, 2]]], np.uint8), 3), (np.array([[[1, 255], [0, 3], [2, 2]]], np.uint8), 5)),
+    random_cases=6,
+    points=1,
+    forbidden=("sklearn",),
+)
+
+
+@holds("over the axis of the classes it sums to 1, and to 0 where the pixel is ignored")
+def sums_to_1(y, C, Y):
+    return np.array_equal(np.sum(Y, axis=1), y != 255)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def last(y, C):
+    """The lesson's one-hot tensor, classes last."""
+    return (y[..., None] == np.arange(C)).astype(np.uint8)
+
+
+@wrong("That is the lesson's tensor, with the classes last. Here they are the second axis: (N, C, H, W).")
+def classes_last(y, C):
+    return last(y, C)
+
+
+@wrong("Yours has the classes first. The images come first here, then the classes: (N, C, H, W).")
+def classes_first(y, C):
+    return np.moveaxis(last(y, C), -1, 0)
+
+
+@wrong("The numbers are right and stand in the wrong places: reshape does not move an axis.")
+def reshaped(y, C):
+    return last(y, C).reshape(len(y), C, *y.shape[1:])
+
+
+@wrong("Rows and columns are exchanged in yours: the last two axes are still H and W.")
+def rows_and_columns_exchanged(y, C):
+    return last(y, C).swapaxes(1, 3)
+
+
+@wrong("A pixel of 255 gets a 1 in the last class of yours: what should its C entries be?")
+def ignored_as_last_class(y, C):
+    return np.moveaxis(last(np.minimum(y, C - 1), C), -1, 1)
+
+
+@wrong("A class that is not in these images has a plane too, of zeros: there are always C of them.")
+def classes_that_occur(y, C):
+    return (y[:, None] == np.unique(y[y != 255])[:, None, None]).astype(np.uint8)
+
+
+@wrong("Add up the entries of a pixel that nobody judged, 255: what should come out, and what does in yours?")
+def ignored_is_shared_out(y, C):
+    return np.where((y == 255)[:, None], 1 / C, one_hot(y, C))
+
+
+@wrong("The function gets C, which need not be 4: how many of the C planes does yours fill?")
+def four_classes(y, C):
+    Y = one_hot(y, C)
+    Y[:, 4:] = 0
+    return Y

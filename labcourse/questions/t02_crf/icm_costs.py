@@ -1,0 +1,119 @@
+"""02_crf.icm_costs: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t02_crf import PAIRS, labelled_model
+from labgrader.checker.question import Question, wrong
+
+
+def icm_costs(y, psi, weights, v, u):
+    """Say what each class would cost pixel (v, u), whose neighbours keep their labels."""
+    H, W, C = psi.shape
+    costs = psi[v, u]
+    for w, (down, right) in zip(weights, ((0, 1), (1, 0), (1, 1), (1, -1)), strict=True):
+        for b, a in ((v + down, u + right), (v - down, u - right)):
+            if 0 <= b < H and 0 <= a < W:
+                pair = w[v, u] if b > v or (b == v and a > u) else w[b, a]
+                costs = costs + pair * (np.arange(C) != y[b, a])
+    return costs
+
+
+def _pixel_of_a_model(rng):
+    """Draw a labelled model and one of its pixels."""
+    return *labelled_model(rng), int(rng.integers(4)), int(rng.integers(6))
+
+
+_LABELS, *_REST = labelled_model(np.random.default_rng(2), 3, 4)
+
+
+_MODEL = tuple(part.round(1) for part in _REST)
+
+
+_PIXELS = ((1, 1), (1, 2), (0, 0), (2, 3), (0, 3), (2, 0), (1, 0), (0, 2))  # the inside, all corners, two sides
+
+
+QUESTION = Question(
+    reference=icm_costs,
+    inputs=_pixel_of_a_model,
+    by_hand=(
+        *((_LABELS, *_MODEL, v, u) for v, u in _PIXELS[:-1]),
+        (np.minimum(_LABELS, 1), *_MODEL, *_PIXELS[-1]),  # class 2 has a cost, though no pixel has it
+    ),
+    points=3,
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def pairs_of(weights, v, u):
+    """The pairs of a pixel, as (weight, row, column of the neighbour): those it owns, then those of its neighbours."""
+    H, W = weights.shape[1:]
+    own = [(w[v, u], v + down, u + right) for w, (down, right) in zip(weights, PAIRS, strict=True)]
+    owned = [(d, v - down, u - right) for d, (down, right) in enumerate(PAIRS)]
+    owned = [(weights[d, b, a], b, a) for d, b, a in owned if 0 <= b < H and 0 <= a < W]
+    return [pair for pair in own if 0 <= pair[1] < H and 0 <= pair[2] < W], owned
+
+
+def charged(pairs, y, psi, v, u):
+    """psi of a pixel and the weights of the pairs whose neighbour has another class."""
+    return psi[v, u] + sum((w * (np.arange(psi.shape[2]) != y[b, a]) for w, b, a in pairs), np.zeros(psi.shape[2]))
+
+
+@wrong("A class pays for each neighbour of another class: if all eight are of class 2, which class is cheapest?")
+def charged_for_agreeing(y, psi, weights, v, u):
+    """Every class pays for the neighbours that have it."""
+    own, owned = pairs_of(weights, v, u)
+    return 2 * psi[v, u] + sum(w for w, _, _ in own + owned) - charged(own + owned, y, psi, v, u)
+
+
+@wrong("The pair with the left neighbour belongs to that neighbour: at which pixel does its weight stand?")
+def own_weights(y, psi, weights, v, u):
+    """The weights stored at the pixel, also for the pairs that its neighbours own."""
+    H, W = y.shape
+    back = [(w[v, u], v - down, u - right) for w, (down, right) in zip(weights, PAIRS, strict=True)]
+    back = [(w, b, a) for w, b, a in back if 0 <= b < H and 0 <= a < W]
+    return charged(pairs_of(weights, v, u)[0] + back, y, psi, v, u)
+
+
+@wrong("A pixel in the middle belongs to eight pairs, and owns four: where do the weights of the others stand?")
+def ahead_only(y, psi, weights, v, u):
+    """Only the pairs that the energy's loop visits at this pixel."""
+    return charged(pairs_of(weights, v, u)[0], y, psi, v, u)
+
+
+@wrong("Neighbours touch at corners, too: how many pairs has a pixel in the middle?")
+def four_neighbours(y, psi, weights, v, u):
+    """The diagonals forgotten."""
+    straight = np.concatenate([weights[:2], np.zeros_like(weights[2:])])
+    own, owned = pairs_of(straight, v, u)
+    return charged(own + owned, y, psi, v, u)
+
+
+@wrong("Which label do you compare with the neighbours': the class c, or y[v, u] for all classes?")
+def label_of_now(y, psi, weights, v, u):
+    """Every class pays for the disagreements of the label that the pixel has."""
+    own, owned = pairs_of(weights, v, u)
+    return psi[v, u] + sum(w for w, b, a in own + owned if y[b, a] != y[v, u])
+
+
+@wrong("Each class is compared with the neighbours' labels: is yours compared with y[v, u], the pixel's own?")
+def compared_with_itself(y, psi, weights, v, u):
+    own, owned = pairs_of(weights, v, u)
+    return psi[v, u] + sum(w for w, _, _ in own + owned) * (np.arange(psi.shape[2]) != y[v, u])
+
+
+@wrong("Seen from the neighbour above to the right you lie below to the LEFT: which kind of pair is that?")
+def upper_diagonals_exchanged(y, psi, weights, v, u):
+    """weights[2] taken for the neighbour's own side, not for yours."""
+    own = pairs_of(weights, v, u)[0]
+    owned = pairs_of(weights[[0, 1, 3, 2]], v, u)[1]
+    return charged(own + owned, y, psi, v, u)
+
+
+@wrong("At the border there is no neighbour: which pixel does a row or column that you clip lead to?")
+def clipped_at_the_border(y, psi, weights, v, u):
+    (H, W), both = y.shape, []
+    for w, (down, right) in zip(weights, PAIRS, strict=True):
+        ahead, behind = ((int(np.clip(v + s * down, 0, H - 1)), int(np.clip(u + s * right, 0, W - 1))) for s in (1, -1))
+        both += [(w[v, u], *ahead), (w[behind], *behind)]
+    return charged(both, y, psi, v, u)

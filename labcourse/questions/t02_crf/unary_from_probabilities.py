@@ -1,0 +1,138 @@
+"""02_crf.unary_from_probabilities: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, holds, wrong
+
+
+def unary_from_probabilities(p, eps):
+    """Turn class probabilities into costs, if the network guesses blindly in a share `eps` of the pixels."""
+    return -np.log((1.0 - eps) * p + eps / p.shape[-1])
+
+
+def _probabilities(rng):
+    """Draw probabilities some of which are nearly 0."""
+    return rng.dirichlet((0.3, 0.4, 0.5), (4, 5)), float(rng.uniform(0.02, 0.2))
+
+
+QUESTION = Question(
+    reference=unary_from_probabilities,
+    inputs=_probabilities,
+    by_hand=(
+        (np.array([[[0.5, 0.25, 0.25], [1.0, 0.0, 0.0]]]), 0.03),
+        (np.array([[[0.7, 0.3]], [[0.05, 0.95]], [[0.1, 0.9]]]), 0.1),
+    ),
+    points=1,
+)
+
+
+@holds("exp(-psi) sums to 1 over each pixel's classes: the mixture is a distribution, too")
+def sums_to_1(p, eps, psi):
+    return np.allclose(np.exp(-psi).sum(axis=-1), 1.0, atol=1e-4)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def mixed(p, eps):
+    return (1.0 - eps) * p + eps / p.shape[-1]
+
+
+@wrong(
+    "That is the lesson's cost, with a floor. Here nothing is cut off: mix p with the blind guess, then take the log."
+)
+def floor_of_the_lesson(p, eps):
+    return -np.log(np.maximum(p, eps))
+
+
+@wrong(
+    "That is the lesson's cost, with a floor. Here nothing is cut off: mix p with the blind guess, then take the log."
+)
+def floor_of_one_class(p, eps):
+    return -np.log(np.maximum(p, eps / p.shape[-1]))
+
+
+@wrong("Nothing is cut off here, at neither end: mix p with the blind guess, then take the log.", end=("eps", "0"))
+def clipped(p, eps, end):
+    return -np.log(np.clip(p, eps, 1.0 - eps) if end == "eps" else np.where(p == 0.0, eps / p.shape[-1], p))
+
+
+@wrong("Scaled back to a sum of 1, your guess has the share C eps / (1 + C eps), not eps. Weigh the two cases instead.")
+def added_and_scaled(p, eps):
+    q = p + eps
+    return -np.log(q / q.sum(axis=-1, keepdims=True))
+
+
+@wrong("A blind guess may hit the class that the network has named, too: it is spread over all C classes.")
+def guess_of_the_others(p, eps):
+    return -np.log((1.0 - eps) * p + (1.0 - p) * eps / (p.shape[-1] - 1))
+
+
+@wrong("That is the lesson's -log p: a class of probability 0 costs infinity. Where does the blind guess come in?")
+def without_the_guess(p, eps):
+    with np.errstate(divide="ignore"):
+        return -np.log(p)
+
+
+@wrong("The softmax has been applied already: these numbers sum to one at each pixel.")
+def softmaxed_again(p, eps):
+    """Take the probabilities for logits."""
+    e = np.exp(p)
+    return -np.log(mixed(e / e.sum(axis=-1, keepdims=True), eps))
+
+
+@wrong("If the network guesses blindly, each class has the same probability: how much is that with C classes?")
+def guess_of_1(p, eps):
+    return -np.log((1.0 - eps) * p + eps)
+
+
+@wrong("The network's own answer counts only in the rest of the cases: which share is that?", per_class=(True, False))
+def whole_of_p(p, eps, per_class):
+    return -np.log(p + (eps / p.shape[-1] if per_class else eps))
+
+
+@wrong("The shares are exchanged: eps is the small one, that of the blind guess.")
+def shares_exchanged(p, eps):
+    return -np.log(eps * p + (1.0 - eps) / p.shape[-1])
+
+
+@wrong("Mix the probabilities, not their costs: a sum of logarithms is not the logarithm of the sum.")
+def costs_mixed(p, eps):
+    with np.errstate(divide="ignore"):
+        return -(1.0 - eps) * np.log(p) + eps * np.log(p.shape[-1])
+
+
+@wrong("The guess is spread over the classes: which axis of p counts them?", axis=(0, 1))
+def another_axis_counted(p, eps, axis):
+    return -np.log((1.0 - eps) * p + eps / p.shape[axis])
+
+
+@wrong("The guess is spread over the classes alone: p.size counts the pixels, too.")
+def everything_counted(p, eps):
+    return -np.log((1.0 - eps) * p + eps / p.size)
+
+
+@wrong("The course has four classes, these probabilities have C: which axis of p counts them?")
+def four_classes(p, eps):
+    return -np.log((1.0 - eps) * p + eps / 4)
+
+
+@wrong("A class costs -log p: where does the factor before your logarithm come from?")
+def entropies(p, eps):
+    return -mixed(p, eps) * np.log(mixed(p, eps))
+
+
+@wrong("Nothing is subtracted here: the cheapest class of a pixel costs -log of its probability, which need not be 0.")
+def cheapest_made_free(p, eps):
+    psi = -np.log(mixed(p, eps))
+    return psi - psi.min(axis=-1, keepdims=True)
+
+
+@wrong("np.log undoes np.exp: to which base is your logarithm?", base=(2, 10))
+def another_logarithm(p, eps, base):
+    return -np.log(mixed(p, eps)) / np.log(base)
+
+
+@wrong("A likely class is to be cheap: which sign has the logarithm of a number below 1?")
+def sign_forgotten(p, eps):
+    return np.log(mixed(p, eps))

@@ -1,0 +1,198 @@
+"""03_gradient.group: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t03_gradient import grouped, pointing, random_places
+from labgrader.checker.question import Question, holds, wrong
+
+
+def group(foreground, votes, cell, least):
+    """Number the things that pixels vote for: take the highest peak with its voters out, and look again."""
+    shape, numbers = -(-np.array(foreground.shape) // cell), np.zeros(foreground.shape, int)
+    v, u = np.nonzero(foreground > 0.5)
+    at = np.floor((np.stack([v, u]) + votes[v, u, ::-1].T) / cell).astype(int)  # (2, N), row and column of a cell
+    left = ((at >= 0) & (at < shape[:, None])).all(axis=0)
+    for number in range(1, len(v) + 2):
+        n = np.zeros(shape + 2)
+        np.add.at(n, tuple(at[:, left] + 1), 1)
+        n = n[:-2] + 2 * n[1:-1] + n[2:]
+        n = n[:, :-2] + 2 * n[:, 1:-1] + n[:, 2:]
+        near = left & (np.abs(at.T - np.unravel_index(n.argmax(), shape)) <= 1).all(axis=1)
+        if near.sum() < least:
+            return numbers
+        numbers[v[near], u[near]] = number
+        left &= ~near
+
+
+# Two things of 2 x 3 pixels that touch, cells of 2; each one's votes fall into several cells.
+_LEFT = {(0, 0): (1, 1), (0, 1): (1, 1), (0, 2): (2, 1), (1, 0): (1, 1), (1, 1): (1, 1), (1, 2): (2, 1)}
+_RIGHT = {(0, 3): (4, 3), (0, 4): (5, 3), (0, 5): (4, 2), (1, 3): (5, 2), (1, 4): (4, 3), (1, 5): (5, 3)}
+_TWO = pointing((4, 6), _LEFT | _RIGHT)
+# Votes that leave the picture at each side, and into cells that are cut by its lower and right border.
+_BEYOND = {(0, 0): (-0.5, 0), (0, 1): (0, -0.5), (0, 2): (6.5, 1), (0, 3): (1, 6.5), (1, 1): (-2, -3)}
+_OUT = pointing((5, 5), _BEYOND | {(4, 4): (4, 4), (4, 3): (4.5, 4.5), (3, 4): (4.5, 4)})
+# Eight votes in one cell, and eight in a row of four: one wins before it is smoothed, one after it.
+_SPREAD = pointing((12, 12), {(0, u): (2, 2) for u in range(6)} | {(11, u): (6 + u % 4, 9 + u // 4) for u in range(8)})
+
+QUESTION = Question(
+    reference=group,
+    inputs=random_places,
+    by_hand=(
+        (*_TWO, 2, 2),
+        (*_OUT, 2, 2),
+        (*_SPREAD, 1, 4),
+        (np.array([[0.5, 0.51], [0.4, 0.9]]), np.zeros((2, 2, 2)), 1, 1),
+        (np.zeros((2, 3)), np.ones((2, 3, 2)), 2, 1),  # nobody votes
+    ),
+    random_cases=10,
+    points=4,
+    forbidden=("scipy", "torch", "cv2", "skimage", "sklearn"),
+)
+
+
+@holds("a pixel whose foreground is 0.5 or less has the number 0")
+def none_without_foreground(foreground, votes, cell, least, numbers):
+    return not np.any(np.asarray(numbers)[foreground <= 0.5])
+
+
+@holds("each thing has at least `least` pixels")
+def none_is_too_small(foreground, votes, cell, least, numbers):
+    return (np.bincount(np.asarray(numbers).ravel())[1:] >= least).all()
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("You count arrows, not the places that they point to: where does an arrow (du, dv) at the pixel (u, v) end?")
+def arrows_without_their_pixels(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, place=lambda u, v, d: d)
+
+
+@wrong("The arrow leads from the pixel to the middle: is it added or taken off?")
+def arrows_turned_round(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, place=lambda u, v, d: np.stack([u, v], axis=1) - d)
+
+
+@wrong("votes[..., 0] is du, along the columns. Which of the two numbers moves a pixel to another row?")
+def rows_and_columns_exchanged(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, place=lambda u, v, d: np.stack([u, v], axis=1) + d[:, ::-1])
+
+
+@wrong("Pixels that are not on a thing have arrows, too, which mean nothing: who may vote?")
+def every_pixel_votes(foreground, votes, cell, least):
+    return grouped(np.ones(foreground.shape), votes, cell, least)
+
+
+@wrong("A pixel votes if its foreground is above 0.5. What of one that has 0.5?")
+def a_half_votes(foreground, votes, cell, least):
+    return grouped(np.where(foreground == 0.5, 1.0, foreground), votes, cell, least)
+
+
+@wrong("Cell 0 holds the places from 0 up to cell, cell 1 those from cell on: what does rounding to the nearest do?")
+def rounded(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, whole=np.round)
+
+
+@wrong("The place -0.5 lies before cell 0. In which cell is it after astype(int), which drops the fraction?")
+def truncated(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, whole=np.trunc)
+
+
+@wrong("A vote outside the picture's cells counts nowhere. You move it into a cell at the border.")
+def moved_to_the_border(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, outside="clip")
+
+
+@wrong("Cell -1 is before the first one. As an index, it is the last one: keep such votes out.")
+def cell_minus_1_is_the_last(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, outside="wrap")
+
+
+@wrong("A picture of 5 rows has 3 cells of 2 rows: how many has yours?")
+def cut_cells_left_out(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, sizes=lambda shape: np.maximum(np.array(shape) // cell, 1))
+
+
+@wrong("Several votes may fall into one cell. counts[row, column] += 1 counts an index that repeats once.")
+def repeated_votes_count_once(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, count=lambda n: np.minimum(n, 1))
+
+
+@wrong("The highest cell is that of the smoothed counts. Yours is that of the counts.")
+def not_smoothed(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, kernel=(0, 1, 0))
+
+
+@wrong("Your nine cells count alike. In the sum the middle one counts 4, its four neighbours 2, the corners 1.")
+def smoothed_with_equal_weights(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, kernel=(1, 1, 1))
+
+
+@wrong("np.roll puts the last row of cells beside the first. What lies beyond the border?")
+def smoothed_round_the_border(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, border="wrap")
+
+
+@wrong("Beyond the border there is no vote. What does your smoothing find there?")
+def smoothed_with_repeated_borders(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, border="edge")
+
+
+@wrong("A thing's pixels are those whose votes lie in the peak's cell or in one of the eight around it.")
+def the_peaks_own_cell_alone(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, reach=0)
+
+
+@wrong("Your things reach two cells from the peak: which cells touch it?")
+def two_cells_around(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, reach=2)
+
+
+@wrong("A thing with exactly `least` pixels is one.")
+def more_than_least(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least + 1)
+
+
+@wrong("`least` is a number of pixels, of the nine cells together. You compare it with a smoothed count.")
+def least_of_the_smoothed_count(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, enough="smoothed")
+
+
+@wrong("`least` is a number of pixels, of the nine cells together. You compare it with the peak's cell alone.")
+def least_of_the_peaks_cell(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, enough="cell")
+
+
+@wrong("You stop after one thing. Take its votes out, smooth what is left, and look again.")
+def one_thing_alone(foreground, votes, cell, least):
+    return np.minimum(grouped(foreground, votes, cell, least), 2) % 2
+
+
+@wrong("Take a thing's votes out before you look for the next peak: what is left there, and is it high enough?")
+def from_one_smoothing(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, again=False)
+
+
+@wrong("Things are numbered as they are found. Yours are numbered by their size.")
+def numbered_by_size(foreground, votes, cell, least):
+    numbers = grouped(foreground, votes, cell, least)
+    sizes = np.bincount(numbers.ravel())
+    order = np.argsort(-sizes[1:], kind="stable")
+    new = np.zeros(len(sizes), int)
+    new[1 + order] = np.arange(1, len(sizes))
+    return new[numbers]
+
+
+@wrong("The first thing has the number 1, since 0 is no thing.")
+def numbered_from_0(foreground, votes, cell, least):
+    return np.maximum(grouped(foreground, votes, cell, least) - 1, 0)
+
+
+@wrong("Of two peaks that are equally high, the first one in reading order counts. np.argmax finds it.")
+def the_last_of_equal_peaks(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, last=True)
+
+
+@wrong("You number connected regions. Two things that touch are one region: which pixels vote for one place?")
+def regions_that_touch(foreground, votes, cell, least):
+    return (foreground > 0.5).astype(int)

@@ -1,0 +1,95 @@
+"""03_gradient.softmax_backward: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def softmax_backward(p, g):
+    """Carry a gradient back through a softmax: g[k] = dL/dp[k] becomes dL/dz[c] = sum over k of g[k] dp[k]/dz[c]."""
+    return p * (g - (p * g).sum(axis=-1, keepdims=True))
+
+
+def draw(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Draw probabilities (H, W, C) and gradients of their shape."""
+    return rng.dirichlet(rng.uniform(0.5, 2.0, 4), (3, 5)), rng.normal(size=(3, 5, 4))
+
+
+QUESTION = Question(
+    reference=softmax_backward,
+    inputs=draw,
+    by_hand=(
+        (np.array([[0.5, 0.5]]), np.array([[1.0, 0.0]])),
+        (np.array([[0.2, 0.3, 0.5]]), np.array([[-1.0, 0.0, 2.0]])),
+        (np.array([[[0.0, 1.0], [0.1, 0.9]]]), np.array([[[4.0, -3.0], [4.0, -3.0]]])),
+    ),
+    points=3,
+    forbidden=("scipy", "torch"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("Each p depends on every logit: besides dp[c]/dz[c] there are the terms with k other than c.")
+def diagonal_only(p, g):
+    """Only the case k = c of the derivative."""
+    return p * (1.0 - p) * g
+
+
+@wrong("dp[k]/dz[c] is p[k] (1 - p[c]) only for k = c. What is it for the other k, and with which sign?")
+def other_terms_added(p, g):
+    """The sign of the terms with k other than c is wrong."""
+    return p * (1.0 - p) * g + p * ((p * g).sum(axis=-1, keepdims=True) - p * g)
+
+
+@wrong("The sum that is subtracted belongs to one pixel: over which axis do the classes lie?")
+def summed_over_everything(p, g):
+    """One sum for all pixels."""
+    return p * (g - (p * g).sum())
+
+
+@wrong("The derivative of a softmax by a logit has a factor p[c] in front: what happens to a class of p = 0?")
+def without_the_factor(p, g):
+    """The outer p forgotten."""
+    return g - (p * g).sum(axis=-1, keepdims=True)
+
+
+@wrong("You subtract the plain mean of g. In the right one each class counts by its probability.")
+def plain_mean(p, g):
+    """An unweighted mean of the gradients."""
+    return p * (g - g.mean(axis=-1, keepdims=True))
+
+
+@wrong("For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: where is the factor p[k]?")
+def others_unweighted(p, g):
+    """The terms with k other than c lack p[k]."""
+    return p * (1.0 - p) * g - p * (g.sum(axis=-1, keepdims=True) - g)
+
+
+@wrong("For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: yours has p[c] twice and no p[k].")
+def others_squared(p, g):
+    """The terms with k other than c have p[c] in the place of p[k]."""
+    return p * (1.0 - p) * g - p**2 * (g.sum(axis=-1, keepdims=True) - g)
+
+
+@wrong("p has been through the softmax already: do not put it through another one.")
+def softmax_of_p(p, g):
+    """p taken for logits."""
+    p = np.exp(p) / np.exp(p).sum(axis=-1, keepdims=True)
+    return p * (g - (p * g).sum(axis=-1, keepdims=True))
+
+
+@wrong("You subtract the sum of g. Each class counts by its probability: it is the sum of p g.")
+def plain_sum(p, g):
+    """An unweighted sum of the gradients."""
+    return p * (g - g.sum(axis=-1, keepdims=True))
+
+
+@wrong("p g is one part of it. If all of g rises by 1, the answer must stay the same: does yours?")
+def without_the_mean(p, g):
+    return p * g
+
+
+@wrong("p - Y is softmax and cross-entropy in one. Here any loss may follow, and g is its gradient by p.")
+def shortcut_of_the_cross_entropy(p, g):
+    return p - g

@@ -1,0 +1,40 @@
+"""Questions of topic 04: the confusion matrix and the scores that follow from it."""
+
+import numpy as np
+
+
+def counts(rng):
+    """Draw an asymmetric confusion matrix; in most one class is absent, and in most one is predicted and never true."""
+    C = int(rng.choice([4, 5, 6]))
+    n = rng.integers(1, 60, (C, C)) + np.diag(rng.integers(20, 400, C))
+    absent, never_true = rng.permutation(C)[:2]
+    if rng.random() < 0.7:
+        n[absent] = n[:, absent] = 0
+    if rng.random() < 0.7:
+        n[never_true] = 0
+    return (n.astype(np.int64),)
+
+
+# Two classes confused with each other; a class in neither image; a class that is predicted but never true; one perfect.
+SMALL_COUNTS = (
+    (np.array([[6, 2], [1, 4]]),),
+    (np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]]),),
+    (np.array([[5, 0, 3], [1, 2, 0], [0, 0, 0]]),),
+    (np.array([[0, 7], [2, 0]]),),
+    (np.diag([3, 0, 1]),),
+)
+
+
+def parts(n):
+    """The true positives, all that is predicted and all that is true, by class, as floats."""
+    n = np.asarray(n, np.float64)
+    return np.diagonal(n), n.sum(axis=0), n.sum(axis=1)
+
+
+def divide(part, whole, empty=np.nan):
+    return np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), empty)
+
+
+def iou_of(n, empty=np.nan):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true - correct, empty)

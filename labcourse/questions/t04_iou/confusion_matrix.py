@@ -1,0 +1,99 @@
+"""04_iou.confusion_matrix: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def confusion_matrix(y_true, y_pred, num_classes, ignore):
+    """Count n[i, j], the pixels of true class i that are predicted as j; those with y_true == ignore are left out."""
+    counted = y_true != ignore
+    n = np.zeros((num_classes, num_classes), np.int64)
+    np.add.at(n, (y_true[counted], y_pred[counted]), 1)
+    return n
+
+
+def _label_pair(rng):
+    """Two label images that agree on two pixels in three; what is ignored is 255 or one of the classes."""
+    num_classes = int(rng.choice([4, 20]))
+    p = rng.dirichlet(np.full(num_classes, 2.0))
+    p[-1] *= rng.random() < 0.5  # in some cases the last class is never true
+    y_true = rng.choice(num_classes, size=(9, 14), p=p / p.sum()).astype(np.uint8)
+    y_pred = np.where(rng.random(y_true.shape) < 0.65, y_true, rng.integers(num_classes, size=y_true.shape))
+    ignore = int(rng.choice([0, 255]))
+    y_true[rng.random(y_true.shape) < 0.15] = ignore
+    return y_true, y_pred.astype(np.uint8), num_classes, ignore
+
+
+QUESTION = Question(
+    reference=confusion_matrix,
+    inputs=_label_pair,
+    by_hand=(
+        (np.array([[0, 0, 1]], np.uint8), np.array([[0, 1, 1]], np.uint8), 2, 255),
+        (np.array([[2, 255], [2, 1], [0, 2]], np.uint8), np.array([[1, 0], [1, 1], [0, 2]], np.uint8), 3, 255),
+        (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),
+        (np.zeros((250, 280), np.uint8), np.ones((250, 280), np.uint8), 2, 255),  # more than two bytes can count
+        (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
+        (np.array([[254]], np.uint8), np.array([[253]], np.uint8), 255, 255),
+    ),
+    random_cases=10,
+    forbidden=("sklearn", "torchmetrics"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def counted_pairs(y_true, y_pred, ignore):
+    counted = y_true != ignore
+    return y_true[counted].astype(int), y_pred[counted].astype(int)
+
+
+def pair_count(rows, columns, num_classes):
+    return np.bincount(rows * num_classes + columns, minlength=num_classes**2).reshape(num_classes, num_classes)
+
+
+@wrong("Row 0 is too full: what became of the pixels whose true label is `ignore`?")
+def ignored_as_class_0(y_true, y_pred, num_classes, ignore):
+    rows = np.where(y_true == ignore, 0, y_true).astype(int)
+    return pair_count(rows.ravel(), y_pred.ravel().astype(int), num_classes)
+
+
+@wrong("Whether a pixel counts is up to the truth alone; one that is predicted as `ignore` still counts.")
+def prediction_ignored_too(y_true, y_pred, num_classes, ignore):
+    rows, columns = counted_pairs(y_true, y_pred, ignore)
+    return pair_count(rows[columns != ignore], columns[columns != ignore], num_classes)
+
+
+@wrong("`ignore` need not be 255: where it is the number of a class, that class's true pixels do not count.")
+def only_what_is_no_class_ignored(y_true, y_pred, num_classes, ignore):
+    return pair_count(*counted_pairs(y_true, y_pred, 255), num_classes)
+
+
+@wrong("n holds whole numbers of pixels: nothing is divided yet.")
+def shares_of_rows(y_true, y_pred, num_classes, ignore):
+    n = pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)
+    return n / np.maximum(n.sum(axis=1, keepdims=True), 1)
+
+
+@wrong("With 20 classes the numbers go wrong: what is 19 * 20 + 19 in uint8, which ends at 255?")
+def overflowing_bytes(y_true, y_pred, num_classes, ignore):
+    counted = y_true != ignore
+    pair = y_true[counted] * np.uint8(num_classes) + y_pred[counted]
+    return np.bincount(pair, minlength=num_classes**2)[: num_classes**2].reshape(num_classes, num_classes)
+
+
+@wrong("No cell is above 1: an index that occurs twice is written once, as in the lesson. What adds them up?")
+def written_once(y_true, y_pred, num_classes, ignore):
+    return np.minimum(pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes), 1)
+
+
+@wrong("np.bincount ends at the largest number that occurs: how long does its result have to be?")
+def as_long_as_the_largest_pair(y_true, y_pred, num_classes, ignore):
+    """ValueError, where the last pair of classes does not occur."""
+    rows, columns = counted_pairs(y_true, y_pred, ignore)
+    return np.bincount(rows * num_classes + columns).reshape(num_classes, num_classes)
+
+
+@wrong("np.histogram2d spreads its bins from the least label to the largest: where does class 1 begin?")
+def bins_between_the_extremes(y_true, y_pred, num_classes, ignore):
+    return np.histogram2d(*counted_pairs(y_true, y_pred, ignore), bins=num_classes)[0].astype(int)

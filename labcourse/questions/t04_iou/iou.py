@@ -1,0 +1,82 @@
+"""04_iou.iou: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t04_iou import SMALL_COUNTS, counts, divide, iou_of, parts
+from labgrader.checker.question import Question, wrong
+
+
+def iou(n):
+    """Score each class with TP / (TP + FP + FN); NaN where a class is neither true nor predicted."""
+    correct = np.diagonal(n)
+    with np.errstate(invalid="ignore"):
+        return correct / (n.sum(axis=0) + n.sum(axis=1) - correct)
+
+
+QUESTION = Question(
+    reference=iou,
+    inputs=counts,
+    by_hand=SMALL_COUNTS,
+    random_cases=6,
+    forbidden=("sklearn", "torchmetrics"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("The overlap stands in the row sum and in the column sum: how often is it in your union?")
+def overlap_twice_in_the_union(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true)
+
+
+@wrong("That is Dice (F1), another score: the overlap stands once in an IoU, not twice.")
+def dice(n):
+    correct, predicted, true = parts(n)
+    return divide(2.0 * correct, predicted + true)
+
+
+@wrong("A pixel of class 1 that is called 2 is in neither set of class 0: is it in your union of class 0?")
+def all_but_the_other_hits(n):
+    return divide(np.diagonal(n), n.sum() - np.trace(n) + np.diagonal(n))
+
+
+@wrong("FP is the column without the diagonal cell, FN the row without it: how often is it in your union?")
+def overlap_three_times_in_the_union(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, predicted + true + correct)
+
+
+@wrong("C classes have C scores: what stands at the place of a class that is neither true nor predicted?")
+def absent_classes_left_out(n):
+    scores = iou_of(n)
+    return scores[~np.isnan(scores)]
+
+
+@wrong("That is recall, the share of a class's true pixels that are found: where are the false positives?")
+def recall(n):
+    correct, _, true = parts(n)
+    return divide(correct, true)
+
+
+@wrong("That is precision, the share of a class's predictions that are right: where are the false negatives?")
+def precision(n):
+    correct, predicted, _ = parts(n)
+    return divide(correct, predicted)
+
+
+@wrong("A class that is predicted and never true has a union: how large is its overlap?")
+def nan_where_never_true(n):
+    return np.where(n.sum(axis=1) > 0, iou_of(n), np.nan)
+
+
+@wrong("Pixels that are neither true nor called class c count as right in yours: are they in its union?")
+def accuracy_by_class(n):
+    correct, predicted, true = parts(n)
+    return 1.0 - (predicted + true - 2.0 * correct) / n.sum()
+
+
+@wrong("You add 1 to both, so that nothing is 0 / 0: what should a class score that occurs nowhere?")
+def smoothed(n):
+    correct, predicted, true = parts(n)
+    return (correct + 1.0) / (predicted + true - correct + 1.0)

@@ -1,0 +1,83 @@
+"""04_iou.merge_classes: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def merge_classes(n, group):
+    """Give the confusion matrix that the pixels would have if class c were called group[c], in truth and prediction."""
+    member = (np.arange(group.max() + 1)[:, None] == group).astype(np.int64)
+    return member @ n @ member.T
+
+
+def _counts_and_groups(rng):
+    """Draw a matrix of 5 or 6 classes with large mistakes, and 3 groups; neighbours are in different groups."""
+    C = int(rng.choice([5, 6]))
+    n = rng.integers(0, 90, (C, C)) + np.diag(rng.integers(50, 400, C))
+    return n.astype(np.int64), rng.permutation(np.arange(C) % 3).astype(np.int64)
+
+
+QUESTION = Question(
+    reference=merge_classes,
+    inputs=_counts_and_groups,
+    by_hand=(
+        (np.array([[5, 1, 0], [0, 3, 2], [0, 4, 6]]), np.array([0, 1, 1])),
+        (np.array([[5, 1, 7], [0, 3, 2], [9, 4, 6]]), np.array([1, 0, 1])),  # groups need not be in order
+        (np.array([[5, 1], [2, 3]]), np.array([0, 0])),  # everything is one class
+        (np.array([[5, 1], [2, 3]]), np.array([1, 0])),
+    ),
+    points=3,
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("Some pixels are lost: an index that occurs twice is written once. What adds them up?")
+def written_once(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    merged[group[:, None], group] += n
+    return merged
+
+
+@wrong("Two classes have become one: where do the pixels go that were confused between them?")
+def mistakes_within_a_group_dropped(n, group):
+    mistake = (group[:, None] == group) & ~np.eye(len(n), dtype=bool)
+    return merge_classes(np.where(mistake, 0, n), group)
+
+
+@wrong("The rows are merged and the columns are not: a prediction has a group, too.")
+def rows_alone(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, group, n)
+    return merged
+
+
+@wrong("Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
+def old_columns(n, group):
+    return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
+
+
+@wrong("Your matrix still has C rows: an index array chooses rows, and does not add those of one group.")
+def rows_chosen(n, group):
+    return n[np.ix_(group, group)]
+
+
+@wrong("Only the diagonal of n comes into yours: where do the mistakes between two groups go?")
+def diagonal_alone(n, group):
+    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
+    np.add.at(merged, (group, group), np.diagonal(n))
+    return merged
+
+
+@wrong("The result has a row for each group, yours one for each old class: how many groups are there?")
+def as_large_as_before(n, group):
+    empty = len(n) - (group.max() + 1)
+    return np.pad(merge_classes(n, group), (0, empty))
+
+
+@wrong("A cell adds up rows and columns: how many columns has the other group, and how many do you take?")
+def first_column_of_other_groups(n, group):
+    first = [np.flatnonzero(group == g)[0] for g in range(group.max() + 1)]
+    own = group[:, None] == group
+    return merge_classes(np.where(own | np.isin(np.arange(len(n)), first), n, 0), group)

@@ -1,0 +1,143 @@
+"""04_iou.trimap_band: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def trimap_band(y, width):
+    """Mark the pixels within `width` rows and columns of a pixel of another class; 255 is no class."""
+    H, W = y.shape
+    framed = np.pad(y, width, constant_values=255)
+    band = np.zeros(y.shape, bool)
+    for down in range(2 * width + 1):
+        for right in range(2 * width + 1):
+            near = framed[down : down + H, right : right + W]
+            band |= (near != y) & (near != 255)
+    return band & (y != 255)
+
+
+def _labels(rng):
+    """Draw classes with a slanted edge, one lone pixel, and between two of them a strip that nobody judged; H != W."""
+    H, W = int(rng.integers(11, 14)), int(rng.integers(19, 24))
+    v, u = np.mgrid[0:H, 0:W]
+    y = np.where(0.5 * u + v < 0.25 * W + 0.3 * H, 2, 1).astype(np.uint8)
+    y[u > W - 7] = 3
+    y[:, W - int(rng.integers(6, 8))] = 255
+    y[int(rng.integers(1, H - 1)), int(rng.integers(9, 12))] = 0
+    y[y != 255] += np.uint8(rng.choice([0, 0, 4, 90, 251]))  # any number but 255 may be a class
+    return np.roll(y, int(rng.integers(-1, 2)), axis=1), int(rng.integers(1, 4))
+
+
+QUESTION = Question(
+    reference=trimap_band,
+    inputs=_labels,
+    by_hand=(
+        (np.array([[1, 1, 1, 2, 2], [1, 1, 1, 1, 1]], np.uint8), 1),
+        (np.full((4, 7), 3, np.uint8), 2),  # one class: no edge, at the image's border neither
+        (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 1),  # one step from 1 nothing was judged
+        (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 2),
+        (np.array([[0, 0, 255, 255]], np.uint8), 1),  # beside class 0, too, nothing was judged
+        (np.array([[4, 4, 4, 9, 9, 254]], np.uint8), 1),  # nor is 3 the last class
+        (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
+    ),
+    random_cases=8,
+    points=3,
+    forbidden=("cv2", "scipy", "skimage"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def square(width):
+    """The steps (rows, columns) to all places of the window."""
+    return [(v, u) for v in range(-width, width + 1) for u in range(-width, width + 1)]
+
+
+def banded(y, width, steps, differs=np.not_equal):
+    """The pixels from which one of some steps leads to another class; those of 255 are not left out."""
+    H, W = y.shape
+    framed = np.pad(y, width, constant_values=255)
+    near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in steps]
+    return np.any([differs(n, y) & (n != 255) for n in near], axis=0)
+
+
+@wrong("An image of one class has no edge: beyond its border there is no class, not class 0.")
+def border_is_an_edge(y, width):
+    return trimap_band(np.pad(y, width), width)[width:-width, width:-width]
+
+
+@wrong("255 is no class: a neighbour that nobody judged does not put a pixel into the band.")
+def unjudged_is_a_class(y, width):
+    return trimap_band(np.where(y == 255, 9, y), width) & (y != 255)
+
+
+@wrong("A step down and a step to the right at once: is that pixel within one row and one column?")
+def cross_window(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if v == 0 or u == 0]) & (y != 255)
+
+
+@wrong("The window is a square: is the pixel `width` rows down and `width` columns to the right in yours?")
+def diamond_window(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if abs(v) + abs(u) <= width]) & (y != 255)
+
+
+@wrong("Your window reaches further up and left than down and right: which number does range leave out?")
+def window_without_its_end(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if v < width and u < width]) & (y != 255)
+
+
+@wrong("Your window reaches only down and right: pixels above and to the left are neighbours, too.")
+def down_and_right_alone(y, width):
+    return banded(y, width, [(v, u) for v, u in square(width) if v >= 0 and u >= 0]) & (y != 255)
+
+
+@wrong("Your band is one pixel too wide: the pixels beside an edge are already 1 away. How much further does it go?")
+def grown_from_the_pixels_beside_the_edge(y, width):
+    beside = np.where(trimap_band(y, 1), 1, 255)
+    return banded(beside, width, square(width), lambda near, _: near == 1) & (y != 255)
+
+
+@wrong("Pixels of the opposite border come in, as by np.roll: beyond its border an image has no pixels.")
+def rolled_round(y, width):
+    near = [np.roll(y, step, axis=(0, 1)) for step in square(width)]
+    return (y != 255) & np.any([(n != y) & (n != 255) for n in near], axis=0)
+
+
+@wrong("An edge has two sides: the pixels of the lower class belong to the band, too.")
+def one_side(y, width):
+    return banded(y, width, square(width), np.less) & (y != 255)
+
+
+@wrong("An edge has two sides: must the number nearby be larger than the pixel's own, or just another?")
+def other_side(y, width):
+    return banded(y, width, square(width), np.greater) & (y != 255)
+
+
+@wrong("A window of one class is in your band if 255 or your frame is in it, too: which labels are classes?")
+def unjudged_and_frame_are_a_class(y, width):
+    framed = np.pad(np.where(y == 255, 9, y), width, constant_values=9)
+    return trimap_band(framed, width)[width:-width, width:-width] & (y != 255)
+
+
+@wrong("Near the border v - width is negative, and a slice counts such a start from the end of the axis.")
+def slices_from_negative_places(y, width):
+    out = np.zeros(y.shape, bool)
+    for v, u in np.argwhere(y != 255):
+        near = y[v - width : v + width + 1, u - width : u + width + 1]
+        out[v, u] = np.any((near != y[v, u]) & (near != 255))
+    return out
+
+
+@wrong("255 is no class: such a pixel is not in the band, and it puts no neighbour into the band.")
+def unjudged_like_any_class(y, width):
+    framed = np.pad(y, width, mode="edge")
+    H, W = y.shape
+    near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in square(width)]
+    return np.any([n != y for n in near], axis=0)
+
+
+@wrong("With 255 between them, two classes can be near and not touch: from where does your band grow?")
+def grown_from_where_classes_touch(y, width):
+    touching = np.where(trimap_band(y, 1), 1, 255)
+    return banded(touching, max(width - 1, 1), square(width - 1), lambda near, _: near == 1) & (y != 255)

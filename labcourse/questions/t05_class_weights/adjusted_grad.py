@@ -1,0 +1,116 @@
+"""05_class_weights.adjusted_grad: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t05_class_weights import SURE, TOY, draw_shares, some_labels, some_logits
+from labgrader.checker.question import Question, wrong
+
+
+def adjusted_grad(z, y, shares, tau):
+    """Differentiate the summed cross-entropy of the logits z + tau log(shares) by z; 0 where the label is 255."""
+    a = z + tau * np.log(shares)
+    e = np.exp(a - a.max(axis=-1, keepdims=True))
+    p = e / e.sum(axis=-1, keepdims=True)
+    Y = y[..., None] == np.arange(len(shares))
+    return (p - Y) * (y != 255)[..., None]
+
+
+def _pixels(rng):
+    """Logits (H, W, C), labels (H, W), shares of the classes, tau."""
+    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+    return (
+        some_logits(rng, H, W, C),
+        some_labels(rng, H, W, C),
+        draw_shares(rng, C),
+        float(rng.uniform(0.3, 1.7) * rng.choice([1.0, 1000.0])),
+    )
+
+
+QUESTION = Question(
+    reference=adjusted_grad,
+    inputs=_pixels,
+    by_hand=(
+        (np.zeros((1, 2)), np.array([1], np.uint8), np.array([0.9, 0.1]), 1.0),  # the softmax is the shares
+        (TOY, np.array([1], np.uint8), np.array([0.7, 0.1, 0.2]), 0.0),  # tau 0: the plain gradient
+        (SURE, np.array([0, 2], np.uint8), np.array([0.7, 0.1, 0.2]), 2.0),  # one maximum for both is not enough
+        (TOY, np.array([0], np.uint8), np.array([0.4, 0.4, 0.2]), 2000.0),  # all shifts are far below all logits
+    ),
+    random_cases=8,
+    atol=2e-4,  # logits near 1000 have errors of 3e-5 in single precision
+    points=3,
+    forbidden=("scipy", "torch"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def parts(z, y):
+    """Probabilities, one-hot labels and whether a pixel counts, with an axis for the classes."""
+    p = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True))
+    return p, (y[..., None] == np.arange(z.shape[-1])).astype(float), (y != 255)[..., None]
+
+
+@wrong("A share multiplies a probability. What does it do to a logit?")
+def shares_added(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * shares, y)
+    return (p - Y) * counted
+
+
+@wrong("The loss lowers the logit of a rare class by log(share). Yours raises it: which sign does the shift have?")
+def raised(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, -tau)
+
+
+@wrong("All logits of a pixel move, each by the share of its class: yours moves only the true one.")
+def true_logit_alone(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * np.log(shares) * parts(z, y)[1], y)
+    return (p - Y) * counted
+
+
+@wrong("You multiply the probabilities by powers of the shares: what do they sum to then?")
+def not_normalised_again(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p * shares**tau - Y) * counted
+
+
+@wrong("The labels are not adjusted: only the logits move.")
+def one_hot_adjusted(z, y, shares, tau):
+    p, Y, counted = parts(z + tau * np.log(shares), y)
+    return (p - Y * shares) * counted
+
+
+@wrong("You divide the gradient by the shares. Here the shares shift the logits, before the softmax.")
+def shares_as_weights(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
+
+
+@wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
+def one_maximum_for_all(z, y, shares, tau):
+    a = z + tau * np.log(shares)
+    e = np.exp(a - a.max())
+    Y = y[..., None] == np.arange(z.shape[-1])
+    return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
+
+
+@wrong("log(tau * shares) is log(shares) plus one number for all classes, which changes nothing. Where must tau stand?")
+def tau_inside_the_logarithm(z, y, shares, tau):
+    p, Y, counted = parts(z + np.log(tau * shares), y)
+    return (p - Y) * counted
+
+
+@wrong("Your gradient is multiplied by a share, like a weight. A share only shifts the logits, before the softmax.")
+def times_the_share(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]
+
+
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
+def that_overflows(z, y, shares, tau):
+    a = z + tau * np.log(shares)
+    p = np.exp(a) / np.exp(a).sum(axis=-1, keepdims=True)
+    return np.where(y[..., None] == 255, 0.0, p - parts(a, y)[1])
+
+
+@wrong("What is the derivative of z + constant by z? The shares do not depend on z.")
+def with_a_factor_of_the_shares(z, y, shares, tau):
+    return adjusted_grad(z, y, shares, tau) * (1.0 + tau * np.log(shares))

@@ -1,0 +1,82 @@
+"""05_class_weights.least_cost: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def least_cost(q, cost):
+    """Decide each pixel for the class of least expected cost; cost[i, j] is paid for saying j where i is true."""
+    return (q @ cost).argmin(axis=-1)
+
+
+def _probabilities_and_costs(rng):
+    """Draw probabilities (H, W, C) that are rarely sure, and costs that differ both ways; to be right costs, too."""
+    shape = int(rng.integers(5, 8)), int(rng.integers(9, 12)), int(rng.integers(4, 6))
+    q = rng.dirichlet(np.full(shape[-1], 1.5), shape[:2])
+    cost = np.exp(rng.uniform(-1.0, 2.5, (shape[-1], shape[-1])))
+    np.fill_diagonal(cost, rng.uniform(0.0, 2.0, shape[-1]))
+    return q, cost
+
+
+QUESTION = Question(
+    reference=least_cost,
+    inputs=_probabilities_and_costs,
+    by_hand=(
+        (np.array([0.8, 0.2]), np.array([[0.0, 1.0], [10.0, 0.0]])),  # 2 for saying 0, 0.8 for saying 1
+        (np.array([[0.5, 0.4, 0.1], [0.1, 0.4, 0.5]]), np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 9.0, 1.0]])),
+        (np.array([[0.5, 0.4, 0.1]]), np.array([[0.0, 4.0, 1.0], [1.0, 0.0, 2.0], [8.0, 1.0, 0.0]])),
+    ),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("That is the most likely class. Saying it may be the dearest mistake: where does `cost` come in?")
+def most_likely(q, cost):
+    return q.argmax(axis=-1)
+
+
+@wrong("Your price depends on the true class alone. Here it depends on the class that is said, too.")
+def one_weight_per_class(q, cost):
+    return (q * cost.sum(axis=1)).argmax(axis=-1)
+
+
+@wrong("With which probability do you pay cost[i, j]: with q[i], or with 1 - q[i]?")
+def saved_where_it_is_not_so(q, cost):
+    return ((1.0 - q) @ cost).argmax(axis=-1)
+
+
+@wrong("You decide for the class that costs most.")
+def dearest(q, cost):
+    return (q @ cost).argmax(axis=-1)
+
+
+@wrong("To be right may cost something, too: the diagonal of cost need not be 0.")
+def right_for_nothing(q, cost):
+    return (q @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)
+
+
+@wrong("You decide as if the most probable class were surely the true one. What does it cost if another one is?")
+def cheapest_for_the_most_likely(q, cost):
+    return cost[q.argmax(axis=-1)].argmin(axis=-1)
+
+
+@wrong("An expected cost is a sum over the true classes. You take the largest of its terms.")
+def least_of_the_worst(q, cost):
+    return (q[..., None] * cost).max(axis=-2).argmin(axis=-1)
+
+
+@wrong("For one j, q[i] cost[i, j] is added up over i: over which index does your sum run?")
+def summed_over_what_is_said(q, cost):
+    return (q[..., None] * cost).sum(axis=-1).argmin(axis=-1)
+
+
+@wrong("q[i] multiplies cost[i, j], the row of the true class: does it multiply a column in yours?")
+def rows_and_columns_exchanged(q, cost):
+    return (q @ cost.T).argmin(axis=-1)
+
+
+@wrong("That is what the best decision costs. Which class is it?")
+def the_least_price(q, cost):
+    return (q @ cost).min(axis=-1)

@@ -1,0 +1,120 @@
+"""05_class_weights.weight_for_recall: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def weight_for_recall(q1, y, recall):
+    """Find the smallest weight of class 1 with which at least this share of its pixels is found."""
+    found_first = np.sort(q1[y])[::-1]
+    last = found_first[int(np.ceil(recall * len(found_first))) - 1]
+    return float((1.0 - last) / last)
+
+
+def _pixels(rng):
+    """Draw probabilities of two overlapping classes, the second one rare, and a recall between two steps.
+
+    The last pixel that must be found is at q with (1 - q) / q * q < 1 - q, in floats. Class 1 is more or less sure: it
+    needs weights below 1, above 1, or of many thousands.
+    """
+    n, sure = int(rng.integers(7, 12)), rng.choice([1.0, -12.0])
+    y = rng.permutation(np.arange(int(rng.integers(40, 60))) < n)
+    must = int(rng.integers(2, n))
+    while True:
+        q1 = 1.0 / (1.0 + np.exp(-rng.normal(np.where(y, sure, -2.5), 1.0)))
+        last = np.sort(q1[y])[-must]
+        if (1.0 - last) / last * last < 1.0 - last:
+            return q1, y, float((must - rng.uniform(0.3, 0.7)) / n)
+
+
+QUESTION = Question(
+    reference=weight_for_recall,
+    inputs=_pixels,
+    by_hand=(
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
+        (np.array([1e-6, 0.2]), np.array([True, False]), 1.0),  # weight 999,999
+        # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
+        (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
+    ),
+    random_cases=12,
+    rtol=1e-5,  # weights tried one after the other come near, and not to the answer
+    points=3,
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("Recall is a share of the pixels that truly are of class 1: which of q1 do you sort?")
+def of_all_pixels(q1, y, recall):
+    return weight_for_recall(q1, np.ones_like(y), recall)
+
+
+@wrong("Pixels are found from the surest to the least sure; yours starts with the least sure one.")
+def from_below(q1, y, recall):
+    return 1.0 / weight_for_recall(1.0 - q1, y, recall)
+
+
+@wrong("0.4 of three pixels are 1.2 pixels. Is one found pixel enough for a share of at least 0.4?")
+def one_too_few(q1, y, recall):
+    found_first = np.sort(q1[y])[::-1]
+    last = found_first[max(int(recall * len(found_first)), 1) - 1]
+    return float((1.0 - last) / last)
+
+
+@wrong("You have the probability of the last pixel that must be found. Which w lifts w q1 to 1 - q1 there?")
+def the_threshold(q1, y, recall):
+    return 1.0 / (1.0 + weight_for_recall(q1, y, recall))
+
+
+@wrong("Class 1 is called where w q1 reaches 1 - q1: what must w q1 reach in yours?")
+def against_one(q1, y, recall):
+    return 1.0 + weight_for_recall(q1, y, recall)
+
+
+@wrong("A quantile may lie between two pixels; what decides is the last pixel that must be found.")
+def at_a_quantile(q1, y, recall):
+    last = np.quantile(q1[y], 1.0 - recall)
+    return float((1.0 - last) / last)
+
+
+@wrong("You find one pixel more than you promised: sorted from the surest, the k-th has the index k - 1.")
+def one_too_many(q1, y, recall):
+    found_first = np.sort(q1[y])[::-1]
+    last = found_first[min(int(np.ceil(recall * len(found_first))), len(found_first) - 1)]
+    return float((1.0 - last) / last)
+
+
+@wrong("A weight may be below 1: the surest pixels alone may keep the promise.")
+def at_least_one(q1, y, recall):
+    return max(weight_for_recall(q1, y, recall), 1.0)
+
+
+@wrong(
+    "By rounding, (1 - q) / q * q can be just below 1 - q. Give the limit a little room, or sort the pixels instead."
+)
+def tried_without_room(q1, y, recall):
+    odds = np.unique((1.0 - q1) / q1)
+    return next(w for w in odds if np.mean(w * q1[y] >= 1.0 - q1[y]) >= recall)
+
+
+@wrong(
+    "For a pixel of q1 = 0.000001 the weight is 999,999: where does your search end?",
+    limit=(10.0, 100.0, 1000.0, 10_000.0),
+)
+def searched_up_to_a(q1, y, recall, limit):
+    return min(weight_for_recall(q1, y, recall), limit)
+
+
+@wrong("Recall is a share of the pixels that truly are of class 1: which of q1 do you sort?")
+def as_many_of_all_pixels(q1, y, recall):
+    last = np.sort(q1)[::-1][int(np.ceil(recall * y.sum())) - 1]
+    return float((1.0 - last) / last)
+
+
+@wrong("You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
+def weight_for_precision(q1, y, recall):
+    odds = np.unique((1.0 - q1) / q1)
+    return float(next(w for w in odds if np.mean(y[w * q1 >= 1.0 - q1]) >= recall))

@@ -1,0 +1,213 @@
+"""07_grasp.closing_yaw: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t07_grasp import cloud
+from labgrader.checker.question import Question, holds, wrong
+
+
+def closing_yaw(Sigma, now):
+    """Find the direction, seen from above, in which a cloud is narrowest: of its angles from x the nearest to `now`."""
+    _, axes = np.linalg.eigh(Sigma[:2, :2])
+    x, y = axes[:, 0]
+    yaw = np.arctan2(y, x)
+    return yaw + np.pi * np.round((now - yaw) / np.pi)
+
+
+def _covariance_and_hand(rng):
+    """Draw a covariance and a yaw of the hand that is not a quarter turn away from the axis, in any of its turns."""
+    Sigma = np.cov(cloud(rng).T, bias=True)
+    return Sigma, float(closing_yaw(Sigma, rng.uniform(-12.0, 12.0)) + rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 1.4))
+
+
+QUESTION = Question(
+    reference=closing_yaw,
+    inputs=_covariance_and_hand,
+    by_hand=(
+        (np.diag([4.0, 1.0, 9.0]), -1.0),  # long in x: close along y
+        (np.diag([1.0, 4.0, 0.5]), 3.0),  # long in y, and flat: close along x
+        (np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]), 0.0),  # long along the diagonal
+        (np.array([[5.0, -2.0, 1.0], [-2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]), -7.0),  # more than a whole turn away
+    ),
+    random_cases=10,
+    atol=1e-4,
+    points=3,
+    forbidden=("sklearn", "cv2"),
+)
+
+
+@holds("modulo pi it is the angle of the narrowest direction, seen from above")
+def narrowest(Sigma, now, yaw):
+    return abs(np.sin(yaw - closing_yaw(Sigma, now))) < 1e-3
+
+
+@holds("it is at most a quarter turn away from `now`")
+def near_the_hand(Sigma, now, yaw):
+    return abs(yaw - now) < np.pi / 2 + 1e-3
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+AS_IT_COMES, FROM_0, ROUND_0, NEAREST = "as it comes", "from 0 to pi", "from -pi/2 to pi/2", "the nearest"
+
+
+def told(yaw, now, how):
+    """One of the angles of an axis: students with a wrong axis choose it in any of these ways."""
+    if how == NEAREST:
+        return yaw + np.pi * np.round((now - yaw) / np.pi)
+    if how == ROUND_0:
+        return (yaw + np.pi / 2) % np.pi - np.pi / 2
+    return yaw % np.pi if how == FROM_0 else yaw
+
+
+def yaw_of(axis):
+    return np.arctan2(axis[1], axis[0])
+
+
+@wrong(
+    "The axis is right, as in the lesson. Here its angle must be the one nearest to `now`: add half turns to it.",
+    how=(AS_IT_COMES, FROM_0, ROUND_0),
+)
+def whatever_the_hand_has_now(Sigma, now, how):
+    return told(yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]), now, how)
+
+
+@wrong("An axis comes back to itself after half a turn, pi, not after a whole one: which multiples may you add?")
+def nearest_by_whole_turns(Sigma, now):
+    yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
+    return yaw + 2 * np.pi * np.round((now - yaw) / (2 * np.pi))
+
+
+@wrong("You return how far the hand has to turn. The angle from the base's x axis is asked for.")
+def turn_of_the_hand(Sigma, now):
+    return closing_yaw(Sigma, now) - now
+
+
+FEW_TURNS = (
+    "The hand may have turned several times, either way: a fixed number of half turns need not bring you near `now`."
+)
+
+
+@wrong(FEW_TURNS, turns=((-1, 0, 1), (-2, -1, 0, 1, 2), (0, 1), (-1, 0)))
+def fixed_half_turns(Sigma, now, turns):
+    yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
+    return min((yaw + turn * np.pi for turn in turns), key=lambda angle: abs(angle - now))
+
+
+@wrong(FEW_TURNS, turn=(np.pi, -np.pi))
+def half_a_turn_where_it_is_far(Sigma, now, turn):
+    yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
+    return yaw + turn * (abs(yaw - now) > np.pi / 2)
+
+
+@wrong("That is the next angle above `now`, up to half a turn away: the one below may be nearer.")
+def next_one_above(Sigma, now):
+    return now + (yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) - now) % np.pi
+
+
+@wrong("That is the next angle below `now`, up to half a turn away: the one above may be nearer.")
+def next_one_below(Sigma, now):
+    return now - (now - yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])) % np.pi
+
+
+@wrong("Half a turn is pi: adding quarter turns takes closing along x for closing along y.")
+def nearest_by_quarter_turns(Sigma, now):
+    yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
+    return yaw + np.pi / 2 * np.round((now - yaw) / (np.pi / 2))
+
+
+@wrong(
+    "That is the direction in which the cloud is longest. The jaws close at right angles to it.",
+    how=(AS_IT_COMES, FROM_0, NEAREST),
+)
+def longest_direction(Sigma, now, how):
+    return told(yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 1]), now, how)
+
+
+@wrong(
+    "Check Sigma @ v against w * v for the v that you took: is an eigenvector a row or a column?",
+    how=(AS_IT_COMES, NEAREST),
+)
+def axes_as_rows(Sigma, now, how):
+    return told(yaw_of(np.linalg.eigh(Sigma)[1][0]), now, how)
+
+
+@wrong(
+    "np.linalg.eig promises no order: sometimes your first axis is the long one. Sort, or take eigh.",
+    how=(AS_IT_COMES, NEAREST),
+)
+def order_of_eig(Sigma, now, how):
+    return told(yaw_of(np.linalg.eig(Sigma[:2, :2])[1][:, 0]), now, how)
+
+
+@wrong(
+    "A flat thing is narrowest upwards, but the jaws close in the table's plane: which block of Sigma is that?",
+    how=(AS_IT_COMES, NEAREST),
+)
+def least_of_three(Sigma, now, how):
+    return told(yaw_of(np.linalg.eigh(Sigma)[1][:, 0]), now, how)
+
+
+@wrong(
+    "For a tall thing the upright axis has the most spread, not the least; look at x and y alone.",
+    how=(AS_IT_COMES, NEAREST),
+)
+def middle_of_three(Sigma, now, how):
+    return told(yaw_of(np.linalg.eigh(Sigma)[1][:, 1]), now, how)
+
+
+@wrong(
+    "For a cloud long in x the answer is 90 degrees, and yours is 0: which argument comes first in arctan2?",
+    how=(AS_IT_COMES, NEAREST),
+)
+def yaw_with_x_and_y_swapped(Sigma, now, how):
+    x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, 0]
+    return told(np.arctan2(x, y), now, how)
+
+
+@wrong(
+    "Turn the object by 10 degrees: your yaw turns by 20. The formula gives twice the angle.",
+    how=(AS_IT_COMES, NEAREST),
+)
+def double_angle_not_halved(Sigma, now, how):
+    return told(np.arctan2(2.0 * Sigma[0, 1], Sigma[0, 0] - Sigma[1, 1]) + np.pi / 2, now, how)
+
+
+@wrong(
+    "Your yaw does not see the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.",
+    how=(AS_IT_COMES, NEAREST),
+)
+def variances_as_a_direction(Sigma, now, how):
+    return told(np.arctan2(Sigma[1, 1], Sigma[0, 0]) + np.pi / 2, now, how)
+
+
+@wrong(
+    "Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?",
+    how=(AS_IT_COMES, NEAREST),
+)
+def smaller_of_the_two_variances(Sigma, now, how):
+    return told(0.0 if Sigma[0, 0] < Sigma[1, 1] else np.pi / 2, now, how)
+
+
+@wrong("From above one sees x and y: which rows and columns of Sigma are they?", how=(AS_IT_COMES, NEAREST))
+def seen_from_the_side(Sigma, now, how):
+    return told(yaw_of(np.linalg.eigh(Sigma[1:, 1:])[1][:, 0]), now, how)
+
+
+@wrong("Is the direction (1, -2) the same as (1, 2)? Only both signs together may change.", how=(AS_IT_COMES, NEAREST))
+def signs_dropped(Sigma, now, how):
+    return told(yaw_of(np.abs(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])), now, how)
+
+
+@wrong(
+    "Of -1 / -2 and 1 / 2, arctan sees the same quotient: which function takes both numbers?",
+    how=(AS_IT_COMES, NEAREST),
+)
+def arctan_of_the_quotient(Sigma, now, how):
+    with np.errstate(divide="ignore"):
+        return told(0.5 * np.arctan(2.0 * Sigma[0, 1] / (Sigma[0, 0] - Sigma[1, 1])) + np.pi / 2, now, how)
+
+
+@wrong("Modulo pi / 2 takes closing along x for closing along y: which turn brings an axis back to itself?")
+def modulo_a_right_angle(Sigma, now):
+    return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) % (np.pi / 2)

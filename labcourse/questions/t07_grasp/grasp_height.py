@@ -1,0 +1,103 @@
+"""07_grasp.grasp_height: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t07_grasp import cloud
+from labgrader.checker.question import Question, holds, wrong
+
+
+def grasp_height(P, table_z, palm, tips, clearance):
+    """Put the grasp as low as table and palm let it, and no lower than what was seen of the object."""
+    lowest_tips = max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance)
+    return lowest_tips + tips
+
+
+def _heights(rng):
+    """Draw a cloud of which each of the three bounds is sometimes the one that counts; half lie below the base."""
+    P, kind = cloud(rng) - (0.0, 0.0, rng.choice([0.0, 1.0])), rng.integers(3)
+    table_z = float(P[:, 2].min() - rng.uniform(0.01, 0.03)) if kind else float(P[:, 2].min() + 0.002)
+    high = np.ptp(P[:, 2])
+    palm = float(high * (0.6 if kind == 1 else 1.5))
+    return P, table_z, palm, float(rng.uniform(0.005, 0.012)), float(rng.uniform(0.003, 0.008))
+
+
+def _upright(low, high):
+    return np.array([[0.5, 0.1, low], [0.5, 0.1, high], [0.52, 0.1, 0.75 * low + 0.25 * high]])
+
+
+QUESTION = Question(
+    reference=grasp_height,
+    inputs=_heights,
+    by_hand=(
+        (_upright(0.1875, 0.75), 0.125, 0.25, 0.0625, 0.03125),  # tall, its foot hidden: the palm stops at its top
+        (_upright(0.125, 0.1875), 0.125, 0.25, 0.0625, 0.03125),  # a flat one: the tips stay off the table
+        (_upright(0.375, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # only its upper part was seen
+        (_upright(-0.5, -0.25), -0.5, 0.5, 0.0625, 0.03125),  # a table below the robot's base
+    ),
+    random_cases=16,
+    atol=1e-5,
+)
+
+
+@holds("the palm stays above the top of the object")
+def palm_is_above(P, table_z, palm, tips, clearance, z):
+    return z - tips + palm >= P[:, 2].max() - 1e-5
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("The centroid knows neither the table nor the palm: how low may the tips go, and what stops them?")
+def height_of_centroid(P, table_z, palm, tips, clearance):
+    return P[:, 2].mean()
+
+
+@wrong("A bottle is taller than the fingers are long: what does its top meet?")
+def palm_forgotten(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong("Only the upper part was seen, and you reach below it: nobody knows what is there.")
+def unseen_depth(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, table_z + clearance) + tips
+
+
+@wrong("All three bounds are heights of the tips, and you add tips to the table's alone.")
+def origin_from_the_table_alone(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance + tips)
+
+
+@wrong("The object's top is a height in the base frame. You take how tall the object is.")
+def tallness_for_the_top(P, table_z, palm, tips, clearance):
+    return max(np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong("clearance is air between the tips and the table: to which of the three bounds does it belong?")
+def clearance_below_the_palm_too(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm + clearance, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong("clearance is air above the table: at which height is the table?")
+def table_at_zero(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min(), clearance) + tips
+
+
+@wrong("A table may stand lower than the robot's base: what lies at height 0?")
+def never_below_the_base(P, table_z, palm, tips, clearance):
+    return max(0.0, P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
+
+
+@wrong("All three bounds are heights of the tips: to which of yours do you add no tips?")
+def origin_without_the_palms_bound(P, table_z, palm, tips, clearance):
+    return max(P[:, 2].max() - palm, P[:, 2].min() + tips, table_z + clearance + tips)
+
+
+@wrong("P has x and y as well: what is the largest number in all of it?")
+def extremes_of_all_coordinates(P, table_z, palm, tips, clearance):
+    return max(P.max() - palm, P.min(), table_z + clearance) + tips
+
+
+@wrong("A percentile leaves out the highest points: what does the palm meet?")
+def percentiles_for_the_ends(P, table_z, palm, tips, clearance):
+    low, high = np.percentile(P[:, 2], (2, 98))
+    return max(high - palm, low, table_z + clearance) + tips

@@ -1,0 +1,145 @@
+"""07_grasp.grasp_pose: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, holds, wrong
+
+
+def grasp_pose(position, approach, closing):
+    """Build T_base_grasp: z along the approach, y the part of closing at right angles to it, x = y cross z."""
+    z = approach / np.linalg.norm(approach)
+    y = closing - (closing @ z) * z
+    y = y / np.linalg.norm(y)
+    T = np.eye(4)
+    T[:3] = np.column_stack([np.cross(y, z), y, z, position])
+    return T
+
+
+def _same_for_both_ways(T):
+    """The jaws are alike: x and y may both be negated, and this stays."""
+    return np.outer(T[:3, 0], T[:3, 1]), np.outer(T[:3, 1], T[:3, 1]), T[:, 2:], T[3]
+
+
+def _position(rng):
+    return rng.uniform([0.4, -0.3, 0.01], [0.6, 0.3, 0.1])
+
+
+QUESTION = Question(
+    reference=grasp_pose,
+    inputs=lambda rng: (
+        _position(rng),
+        rng.uniform([0.3, -0.9, -1.6], [0.9, -0.3, -1.2]),
+        rng.uniform([0.5, 0.8, 0.3], [0.9, 1.2, 0.7]),
+    ),
+    by_hand=(
+        (np.array([0.5, -0.25, 0.125]), np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])),
+        (np.array([0.5, 0.25, 0.0]), np.array([0.0, 0.0, -2.0]), np.array([0.6, 0.8, 0.5])),
+        (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([0.0, 1.0, 0.0])),
+        (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([1.0, 0.0, 0.0])),
+    ),
+    atol=1e-5,
+    points=4,
+    canonical=_same_for_both_ways,
+    forbidden=("scipy",),
+)
+
+
+@holds("z is the direction of the approach")
+def z_is_the_approach(position, approach, closing, T):
+    return np.allclose(T[:3, 2], approach / np.linalg.norm(approach), atol=1e-4)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def unit(v):
+    return v / np.linalg.norm(v)
+
+
+def pose(x, y, z, origin):
+    T = np.eye(4)
+    T[:3] = np.column_stack([x, y, z, origin])
+    return T
+
+
+@wrong("Your determinant is -1, a mirror image that no hand can take: in which order does the cross product go?")
+def left_handed_pose(position, approach, closing):
+    _x, y, z = grasp_pose(position, approach, closing)[:3, :3].T
+    return pose(np.cross(z, y), y, z, position)
+
+
+@wrong("Is y dot z 0? What of the closing direction lies along the approach must be taken off first.")
+def closing_taken_as_it_is(position, approach, closing):
+    y, z = unit(closing), unit(approach)
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("A cross product with closing is at right angles to it: your jaws close a quarter turn off.")
+def closing_crossed_with_the_approach(position, approach, closing):
+    z = unit(approach)
+    y = unit(np.cross(z, closing))
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("Leaving out z suits a hand from above alone: take off what lies along the approach, wherever it points.")
+def closing_made_level(position, approach, closing):
+    y, z = unit(closing * (1.0, 1.0, 0.0)), unit(approach)
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("The hand goes where the approach says; it is the closing direction that gives way, not z.")
+def approach_bent(position, approach, closing):
+    y = unit(closing)
+    z = unit(approach - (approach @ y) * y)
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("How long is the approach that you are given? What is taken off must not depend on its length.")
+def projected_on_a_long_vector(position, approach, closing):
+    y, z = unit(closing - (closing @ approach) * approach), unit(approach)
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("y gets shorter when the part along z is taken off: which length has it at the end?")
+def closing_left_short(position, approach, closing):
+    y, z = unit(closing), unit(approach)
+    y = y - (y @ z) * z
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("The hand's axes are the columns of T_base_grasp, and yours are its rows.")
+def axes_as_rows(position, approach, closing):
+    T = grasp_pose(position, approach, closing)
+    T[:3, :3] = T[:3, :3].T.copy()
+    return T
+
+
+@wrong("T_base_grasp takes the grasp's origin to its place in the base frame: what is its last column?")
+def position_of_the_inverse(position, approach, closing):
+    T = grasp_pose(position, approach, closing)
+    T[:3, 3] = -T[:3, :3].T @ position
+    return T
+
+
+@wrong("That is the base in the grasp frame, the inverse: where does T_base_grasp take (0, 0, 0)?")
+def inverse_of_the_pose(position, approach, closing):
+    return np.linalg.inv(grasp_pose(position, approach, closing))
+
+
+@wrong("T times (0, 0, 0, 1) is the grasp's origin: does it pick a row of T, or a column?")
+def position_in_the_last_row(position, approach, closing):
+    T = grasp_pose(position, approach, closing)
+    T[:3, 3], T[3, :3] = 0.0, position
+    return T
+
+
+@wrong("Leaving out z suits a hand from above alone: take off what lies along the approach, wherever it points.")
+def closing_made_level_and_x_a_unit(position, approach, closing):
+    y, z = unit(closing * (1.0, 1.0, 0.0)), unit(approach)
+    return pose(unit(np.cross(y, z)), y, z, position)
+
+
+@wrong("How long is the approach that you are given, and how long must z be?")
+def approach_left_long(position, approach, closing):
+    y = unit(closing - (closing @ approach) / (approach @ approach) * approach)
+    return pose(np.cross(y, approach), y, approach, position)

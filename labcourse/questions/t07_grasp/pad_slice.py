@@ -1,0 +1,169 @@
+"""07_grasp.pad_slice: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t07_grasp import FACING_X, cloud, leaning_grasp
+from labgrader.checker.question import Question, wrong
+
+
+def pad_slice(P, T_base_grasp, half):
+    """Give the middle and the width, along y of the grasp frame, of the points within half of the pads' middle."""
+    x, y, _ = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    touched = y[np.abs(x) <= half]
+    if len(touched) == 0:
+        return 0.0, 0.0
+    return (touched.min() + touched.max()) / 2, touched.max() - touched.min()
+
+
+def _cloud_and_grasp(rng):
+    if rng.random() < 0.3:  # multiples of an eighth, so that points lie on the pads' edges
+        return rng.integers(-3, 4, (12, 3)) / 8.0 + FACING_X[:3, 3], FACING_X.copy(), float(rng.choice([0.125, 0.25]))
+    P, T = cloud(rng), leaning_grasp(rng)
+    P -= P.mean(axis=0)  # near the base's origin: whoever forgets the grasp's place still meets some points
+    T[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3)
+    T[:3, 3] += rng.choice([0.0, 0.1]) * T[:3, 1]  # in some cases all of it lies on one side
+    x, y, _ = ((P - T[:3, 3]) @ T[:3, :3]).T
+    nearest = np.sort(np.abs(x))
+    kind = rng.random()
+    if kind < 0.3:  # nothing between the pads
+        return P, T, float(nearest[0] / 2.0)
+    if kind < 0.6:  # one point
+        return P, T, float(nearest[:2].mean())
+    half = np.abs(x)[np.abs(y).argsort()[2]] + 0.003  # three points at least, but seldom the outermost
+    return P, T, float(half)
+
+
+# In the frame FACING_X, whose y is the base's x and whose x is the base's y: an L.
+_L = np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.5], [1.75, 0.5, 0.5], [5.0, 1.5, 0.5], [2.5, 0.75, 0.0]])
+
+
+QUESTION = Question(
+    reference=pad_slice,
+    inputs=_cloud_and_grasp,
+    by_hand=(
+        (_L, FACING_X, 0.25),  # the point at the edge of the pads counts
+        (_L, FACING_X, 0.125),
+        (_L, FACING_X, 0.5),
+        (_L[:1], FACING_X, 0.25),
+        (np.array([[3.0, 1.0, 0.5], [5.0, 1.0, 0.5], [2.0, 5.0, 0.5]]), FACING_X, 0.25),  # all on one side
+        (_L[3:4], FACING_X, 0.25),  # nothing between the pads
+    ),
+    random_cases=14,
+    points=4,
+    forbidden=("scipy", "cv2"),
+    outputs=("middle", "width"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def in_grasp(P, T):
+    return ((P - T[:3, 3]) @ T[:3, :3]).T
+
+
+def middle_and_width(y):
+    return ((y.min() + y.max()) / 2, np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
+@wrong("What lies beside the pads touches nothing: which of the points lie between them?")
+def whole_cloud(P, T_base_grasp, half):
+    return middle_and_width(in_grasp(P, T_base_grasp)[1])
+
+
+@wrong("A median leans to the side that shows more points; the jaws meet the two outermost ones.")
+def median_for_the_middle(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return (np.median(y), np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
+@wrong("A mean leans to the side that shows more points; the jaws meet the two outermost ones.")
+def mean_for_the_middle(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return (y.mean(), np.ptp(y)) if len(y) else (0.0, 0.0)
+
+
+@wrong("The jaws close along y of the grasp frame, and the pads are broad along x.")
+def x_for_y(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(x[np.abs(y) <= half])
+
+
+@wrong("Cut the points in the grasp frame: does a pad know where the base's axes point?")
+def cut_in_the_base_frame(P, T_base_grasp, half):
+    x, y, _ = (P - T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong("A pad reaches half of its breadth to either side of the middle.")
+def one_side_of_the_pad(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[(x >= 0.0) & (x <= half)])
+
+
+@wrong("A single point between the pads is a slice, too: its middle is that point, and only its width is 0.")
+def one_point_is_nothing(P, T_base_grasp, half):
+    middle, width = pad_slice(P, T_base_grasp, half)
+    return (middle if width > 0.0 else 0.0), width
+
+
+@wrong("Half of the width is a length, not a place: what is the mean of the outermost two?")
+def half_of_the_width(P, T_base_grasp, half):
+    width = pad_slice(P, T_base_grasp, half)[1]
+    return width / 2, width
+
+
+@wrong("The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong("Beside the pads your y becomes 0: may a point that is not in the slice be one of the outermost?")
+def zero_beside_the_pads(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y * (np.abs(x) <= half))
+
+
+@wrong("Your middle is a y of the base frame. In which frame do the jaws close along y?")
+def middle_in_the_base_frame(P, T_base_grasp, half):
+    between = np.abs(in_grasp(P, T_base_grasp)[0]) <= half
+    return middle_and_width(P[between, 1])[0], pad_slice(P, T_base_grasp, half)[1]
+
+
+@wrong("Twice the largest |y|: is the thing as wide on one side of the middle of the jaws as on the other?")
+def twice_the_larger_side(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return middle_and_width(y)[0], 2.0 * np.abs(y).max(initial=0.0)
+
+
+@wrong("The pads are broad along x: which coordinate says whether a point lies between them?")
+def cut_along_y(P, T_base_grasp, half):
+    _, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[np.abs(y) <= half])
+
+
+@wrong("The points are in the base frame: which transform takes base coordinates to the grasp frame?")
+def transform_not_inverted(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3].T + T_base_grasp[:3, 3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong("You turn the points: where is the origin of the grasp frame, and where is it for you?")
+def position_not_taken_off(P, T_base_grasp, half):
+    x, y, _ = (P @ T_base_grasp[:3, :3]).T
+    return middle_and_width(y[np.abs(x) <= half])
+
+
+@wrong("A point at the very edge of a pad is touched, too: is x < half true of it?")
+def edges_left_out(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[np.abs(x) < half])
+
+
+@wrong("x has two signs: what does x <= half say of a point far away on the negative side?")
+def one_edge_alone(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[x <= half])

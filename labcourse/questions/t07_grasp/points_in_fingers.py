@@ -1,0 +1,162 @@
+"""07_grasp.points_in_fingers: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t07_grasp import FACING_X, leaning_grasp
+from labgrader.checker.question import Question, wrong
+
+
+def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
+    """Count the points of the base frame that lie where the two open fingers would be."""
+    x, y, z = ((P - T_base_grasp[:3, 3]) @ T_base_grasp[:3, :3]).T
+    out = np.abs(y) - width / 2
+    return int(np.count_nonzero((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)))
+
+
+def _scene_round_a_grasp(rng):
+    """Draw a grasp that leans near the base's origin, and points all round it, more on one side than on the other.
+
+    In half of the draws the grasp faces x and all is a multiple of an eighth, so that many points lie on a border.
+    """
+    if rng.random() < 0.5:
+        P = rng.integers((-8, -8, -4), (9, 7, 12), (120, 3)) / 8.0 + FACING_X[:3, 3]
+        return P, FACING_X.copy(), 1.0, 0.25, 0.25, float(rng.choice([0.125, 0.25]))
+    T = leaning_grasp(rng)
+    T[:3, 3] = rng.uniform(0.005, 0.02, 3)  # little: whoever forgets it or takes it off too late still counts some
+    in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (120, 3))
+    P = in_grasp @ T[:3, :3].T + T[:3, 3]
+    width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
+    return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
+
+
+# Beside the jaws along the base's x. Those that count: at the pad, a finger's thickness outside it, three at the tips,
+# high above, and in the other finger. How many lie on a border tells the borders apart.
+_AT_TIPS = [[2.625, 1.0, 0.25], [2.625, 0.875, 0.25], [2.5625, 1.0, 0.25]]
+_IN = [[2.5, 1.0, 0.5], [2.75, 1.0, 0.5], *_AT_TIPS, [2.625, 1.25, 1.5], [1.375, 0.75, 0.5]]
+# Those that do not: just inside the pad, beyond the finger, beside it, and below the tips.
+_OUT = [[2.25, 1.0, 0.5], [3.0, 1.0, 0.5], [2.625, 1.5, 0.5], [2.625, 1.0, 0.125]]
+
+
+QUESTION = Question(
+    reference=points_in_fingers,
+    inputs=_scene_round_a_grasp,
+    by_hand=(
+        (np.array([_OUT[0], *_IN, *_OUT[1:]]), FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.array(_IN[:1]), FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
+    ),
+    random_cases=12,
+    points=3,
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def in_boxes(x, y, z, width, half, thickness, tips):
+    return points_in_fingers(np.stack([x, y, z], axis=1), np.eye(4), width, half, thickness, tips)
+
+
+def moved(P, T):
+    return (P @ T[:3, :3].T + T[:3, 3]).T
+
+
+@wrong("The points are in the base frame: which transform takes base coordinates to the grasp frame?")
+def transform_not_inverted(P, T_base_grasp, *boxes):
+    return in_boxes(*moved(P, T_base_grasp), *boxes)
+
+
+@wrong("The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(P, T_base_grasp, *boxes):
+    return in_boxes(*(P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T, *boxes)
+
+
+@wrong("What lies lower than the tips is in nobody's way. The frame's z points down.")
+def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
+
+
+@wrong("z of the grasp frame points down: the tips are at z = tips, and what is above them has smaller z.")
+def z_taken_for_upwards(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, -z, *boxes)
+
+
+@wrong("You count what is under the tips: the grasp frame's z points down, so above is smaller z.")
+def below_the_tips_alone(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, -z, width, half, thickness, -tips)
+
+
+@wrong("There are two fingers, at y and at -y.")
+def one_finger(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, np.maximum(y, 0.0), z, width, half, thickness, tips)
+
+
+@wrong("What stands between the pads is what you want to hold: it is not in the way.")
+def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    inside = (np.abs(x) <= half) & (np.abs(y) <= width / 2 + thickness) & (z <= tips)
+    return int(inside.sum())
+
+
+@wrong("The fingers reach up from the tips without end: a point with z far below 0 is in their way, too.")
+def near_the_tips_alone(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, np.abs(z), *boxes)
+
+
+@wrong("The borders belong to the boxes: what lies on one counts, with <= and >=.")
+def borders_left_out(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out = np.abs(y) - width / 2
+    return int(((np.abs(x) < half) & (out > 0.0) & (out < thickness) & (z < tips)).sum())
+
+
+@wrong("The hand may lean: what is above the tips is so along z of the grasp frame, not of the base.")
+def heights_of_the_base_frame(P, T_base_grasp, width, half, thickness, tips):
+    x, y, _ = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, T_base_grasp[2, 3] - P[:, 2], width, half, thickness, tips)
+
+
+@wrong("A finger begins at its pad and reaches outwards; yours has the pad in its middle.")
+def fingers_astride_their_pads(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width - thickness, half, thickness, tips)
+
+
+@wrong("A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
+def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width, half, np.inf, tips)
+
+
+@wrong("That is a share of the points: how many are they?")
+def share_of_the_points(P, *others):
+    return points_in_fingers(P, *others) / len(P) if len(P) else np.nan
+
+
+@wrong("You return the points themselves: how many are they?")
+def the_points(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out = np.abs(y) - width / 2
+    return P[(np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)]
+
+
+@wrong("thickness counts from the pad outwards: from where does |y| count?")
+def thickness_from_the_middle(P, T_base_grasp, width, half, thickness, tips):
+    return points_in_fingers(P, T_base_grasp, width, half, thickness - width / 2, tips)
+
+
+@wrong("The borders belong to the boxes: what lies on one counts, with <= and >=.")
+def pads_and_outer_sides_left_out(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out = np.abs(y) - width / 2
+    return int(((np.abs(x) <= half) & (out > 0.0) & (out < thickness) & (z <= tips)).sum())
+
+
+@wrong("Python reads & before |, as it reads * before +: which finger do x and z cut in yours?", first=(1.0, -1.0))
+def or_after_and(P, T_base_grasp, width, half, thickness, tips, first):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    out, near = first * y - width / 2, (np.abs(x) <= half) & (z <= tips)
+    other = -first * y - width / 2
+    return int((((out >= 0.0) & (out <= thickness)) | ((other >= 0.0) & (other <= thickness) & near)).sum())

@@ -1,0 +1,110 @@
+"""07_grasp.slip_across: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t07_grasp import FACING_X, leaning_grasp
+from labgrader.checker.question import Question, wrong
+
+
+def slip_across(T_base_grasp, middle):
+    """Split the way from the grasp to a thing's middle, millimetres: what the jaws push, and what they leave."""
+    off = T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
+    return 1000 * np.abs(off[1]), 1000 * np.abs(off[0])
+
+
+def _grasp_and_middle(rng):
+    T = leaning_grasp(rng)
+    return T, T[:3, 3] + T[:3, :3] @ (
+        rng.choice([-1.0, 1.0], 3) * rng.uniform([0.005, 0.02, 0.04], [0.015, 0.03, 0.06])
+    )
+
+
+QUESTION = Question(
+    reference=slip_across,
+    inputs=_grasp_and_middle,
+    by_hand=(
+        (FACING_X, np.array([2.0, 1.0, 0.4])),  # only the height is off
+        (FACING_X, np.array([2.03, 1.02, 0.4])),
+        (FACING_X, np.array([1.97, 0.98, 0.5])),
+    ),
+    random_cases=6,
+    atol=1e-4,
+    forbidden=("scipy",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+@wrong("Turn the hand by 90 degrees: which of the two errors do the jaws undo then? Which frame knows?")
+def in_the_base_frame(T_base_grasp, middle):
+    off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
+    return off[1], off[0]
+
+
+@wrong("Height is no slip: what is left is along the pads, the x axis of the grasp frame.")
+def height_counted_too(T_base_grasp, middle):
+    off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
+    return np.abs(off[1]), np.hypot(off[0], off[2])
+
+
+@wrong("You turned by R where R transposed is needed: from the base's axes to the hand's.")
+def turned_the_wrong_way(T_base_grasp, middle):
+    off = 1000.0 * np.abs(T_base_grasp[:3, :3] @ (middle - T_base_grasp[:3, 3]))
+    return off[1], off[0]
+
+
+@wrong("The hand may lean: the error and its axes have three components each, and you drop the third.")
+def seen_from_above(T_base_grasp, middle):
+    off = 1000.0 * np.abs((middle - T_base_grasp[:3, 3])[:2] @ T_base_grasp[:2, :2])
+    return off[1], off[0]
+
+
+@wrong("The hand may lean: its pads need not lie in the table's plane. What is left is along the pads.")
+def left_in_the_tables_plane(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3]) * (1.0, 1.0, 0.0)
+    pushed = np.abs(off @ T_base_grasp[:3, 1])
+    return pushed, np.sqrt(np.maximum(off @ off - pushed**2, 0.0))
+
+
+@wrong("The base's x is where the jaws close in the example only: which column of T says so for any hand?")
+def in_the_base_frame_of_the_example(T_base_grasp, middle):
+    off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
+    return off[0], off[1]
+
+
+@wrong("The position is a point of the base frame: take it off before you turn, not after.")
+def position_taken_off_after_the_turn(T_base_grasp, middle):
+    off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ middle - T_base_grasp[:3, 3])
+    return off[1], off[0]
+
+
+@wrong("Distances at right angles add as squares: the whole less the pushed part is not the slip.")
+def lengths_subtracted(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    pushed = np.abs(off @ T_base_grasp[:3, 1])
+    return pushed, np.linalg.norm(off[:2]) - pushed
+
+
+@wrong("The hand may lean: your slip is what is left over in the base's x and y, not along the hand's pads.")
+def left_of_the_way_seen_from_above(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    pushed = np.abs(off @ T_base_grasp[:3, 1])
+    return pushed, np.sqrt(np.maximum(off[0] ** 2 + off[1] ** 2 - pushed**2, 0.0))
+
+
+@wrong("Your distances are 1000 times too small: the points are in metres, and which unit is asked for?")
+def in_metres(T_base_grasp, middle):
+    off = np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
+    return off[1], off[0]
+
+
+@wrong("The jaws close along y of the grasp frame: that part is pushed, and it is asked for first.")
+def exchanged(T_base_grasp, middle):
+    off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
+    return off[0], off[1]
+
+
+@wrong("A slip is a distance: what do yours say if the middle lies on the other side of the hand?")
+def with_signs(T_base_grasp, middle):
+    off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
+    return off[1], off[0]

@@ -1,0 +1,261 @@
+"""08_node.pose_at: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def pose_at(stamps, positions, quaternions, t):
+    """Where a frame stood at a time between its stamped poses; NaN outside of what is known."""
+    if t < stamps[0] or t > stamps[-1]:
+        return np.full(3, np.nan), np.full(4, np.nan)
+    i = max(np.searchsorted(stamps, t), 1)
+    share = (t - stamps[i - 1]) / (stamps[i] - stamps[i - 1])
+    a, b = quaternions[i - 1], quaternions[i]
+    if a @ b < 0:
+        b = -b
+    angle = max(np.arccos(min(a @ b, 1.0)), 1e-6)
+    q = np.sin((1 - share) * angle) * a + np.sin(share * angle) * b
+    return (1 - share) * positions[i - 1] + share * positions[i], q / np.linalg.norm(q)
+
+
+def turned(axis, angle):
+    """The unit quaternion (x, y, z, w) of a turn by an angle about an axis."""
+    axis = np.asarray(axis, float)
+    return np.array([*(np.sin(angle / 2) * axis / np.linalg.norm(axis)), np.cos(angle / 2)])
+
+
+def _stream(rng):
+    """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way.
+
+    In some streams they are nanoseconds apart. In some the turns beside t are equal, and of length 1 but for rounding;
+    some times are before or after all, some the first or the last one's.
+    """
+    stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20, 80, 5)) * rng.choice([1, 1_000_000])
+    quaternions = rng.normal(size=(5, 4))
+    quaternions = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+    i = int(rng.integers(4))
+    t = stamps[i] + int(rng.uniform(0.1, 0.4) * (stamps[i + 1] - stamps[i]))
+    kind = rng.random()
+    if kind < 0.24:
+        quaternions[i : i + 2] = quaternions[i] * (1 + 4e-16), quaternions[i] * rng.choice([-1, 1]) * (1 + 4e-16)
+    elif kind < 0.46:
+        t = rng.choice([stamps[0] - rng.integers(1, 10**8), stamps[-1] + rng.integers(1, 10**8)])
+    elif kind < 0.68:
+        t = rng.choice(stamps[[0, -1]])
+    return stamps, rng.uniform(-1.0, 1.0, (5, 3)), quaternions, int(t)
+
+
+def one_of_two(output):
+    """A place, and the one of q and -q whose largest component is positive."""
+    p, q = (np.asarray(part, float) for part in output)
+    return p, q * np.sign(q[np.abs(q).argmax()])
+
+
+_STAMPS = np.array([0, 40, 80, 200])
+_PLACES = np.array([[0.5, 0.0, 0.4], [0.6, 0.2, 0.4], [0.6, 0.2, 0.8], [0.2, 0.0, 0.8]])
+_TURNS = np.array([turned((0, 0, 1), a) for a in (0.0, 1.6, 1.6, 3.0)])
+_TURNS[3] = -_TURNS[3]  # the same rotation
+_TURNS[1:3] *= 1 + 4e-16  # equal, of length 1 but for rounding; the dot product is above 1
+_FURTHER = np.array([turned((0, 0, 1), np.radians(a)) for a in (0.0, 170.0, 190.0, 300.0)])
+_HARDLY = np.array([turned((0, 0, 1), 0.006 * k) for k in range(4)])
+
+
+QUESTION = Question(
+    reference=pose_at,
+    inputs=_stream,
+    by_hand=(
+        (_STAMPS, _PLACES, _TURNS, 10),  # a quarter of the first way, and of its turn
+        (_STAMPS, _PLACES, _TURNS, 40),  # one that was published
+        (_STAMPS, _PLACES, _TURNS, 60),  # no turn
+        (_STAMPS, _PLACES, _TURNS, 110),  # the last quaternion has the other sign
+        (_STAMPS, _PLACES, _TURNS, 0),
+        (_STAMPS, _PLACES, _TURNS, 200),
+        (_STAMPS, _PLACES, _TURNS, 201),
+        (_STAMPS, _PLACES, _TURNS, -1),
+        (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
+        (_STAMPS, _PLACES, _HARDLY, 50),  # a small turn, but not none
+        (_STAMPS + 1_700_000_000_000_000_000, _PLACES, _TURNS, 1_700_000_000_000_000_010),  # one float64 holds both
+    ),
+    random_cases=56,
+    atol=1e-5,
+    points=4,
+    canonical=one_of_two,
+    forbidden=("scipy",),
+    outputs=("position", "turn"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def neighbours(stamps, t, side="left"):
+    """The number of the pose before a time, and the share of the way to the next; "right": at a stamp, that one's."""
+    i = int(np.clip(np.searchsorted(stamps, t, side) - 1, 0, len(stamps) - 2))
+    return i, (t - stamps[i]) / (stamps[i + 1] - stamps[i])
+
+
+def outside(stamps, t):
+    return (np.full(3, np.nan), np.full(4, np.nan)) if t < stamps[0] or t > stamps[-1] else None
+
+
+def between(stamps, positions, quaternions, t, turn, side="left"):
+    """The right place, and a turn of one's own, turn(a, b, share)."""
+    i, share = neighbours(stamps, t, side)
+    place = (1 - share) * positions[i] + share * positions[i + 1]
+    return place, turn(quaternions[i], quaternions[i + 1], share)
+
+
+def with_turn(stamps, positions, quaternions, t, turn, side="left"):
+    return outside(stamps, t) or between(stamps, positions, quaternions, t, turn, side)
+
+
+def nearer(a, b):
+    return b if a @ b >= 0 else -b
+
+
+def unit(q):
+    return q / np.linalg.norm(q)
+
+
+def slerp(a, b, share):
+    angle = max(np.arccos(np.clip(a @ b, -1.0, 1.0)), 1e-6)
+    return unit(np.sin((1 - share) * angle) * a + np.sin(share * angle) * b)
+
+
+def arc(a, b, first, second, sine=np.sin, divided=True):
+    """sine(first omega) a + sine(second omega) b; a, if both are one turn."""
+    omega = np.arccos(np.clip(a @ b, -1.0, 1.0))
+    if np.sin(omega) < 1e-12:
+        return a
+    return (sine(first * omega) * a + sine(second * omega) * b) / (sine(omega) if divided else 1.0)
+
+
+STRAIGHT = "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?"
+
+
+@wrong(STRAIGHT, scaled=(unit, np.asarray))
+def turn_by_the_chord(*given, scaled):
+    return with_turn(*given, lambda a, b, share: scaled((1 - share) * a + share * nearer(a, b)))
+
+
+@wrong(STRAIGHT)
+def each_number_of_the_turn_on_its_own(*given):
+    return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * b))
+
+
+LONG = "A small turn has become a large one the other way round: which of b and -b is nearer to a?"
+
+
+@wrong(LONG)
+def the_long_way_round(*given):
+    return with_turn(*given, slerp)
+
+
+@wrong(LONG, side=("left", "right"))
+def the_long_way_by_the_arc(*given, side):
+    return with_turn(*given, lambda a, b, share: arc(a, b, 1 - share, share), side)
+
+
+@wrong("The camera moved between the two poses: where was it when the image was taken?")
+def the_last_one_before(stamps, positions, quaternions, t):
+    i = max(int(np.searchsorted(stamps, t, side="right")) - 1, 0)
+    return outside(stamps, t) or (positions[i], quaternions[i])
+
+
+OUTSIDE = "Nobody knows where the camera is after the last pose: what should a node say then?"
+
+
+@wrong(OUTSIDE)
+def held_at_the_ends(stamps, positions, quaternions, t):
+    return pose_at(stamps, positions, quaternions, min(max(t, stamps[0]), stamps[-1]))
+
+
+@wrong(OUTSIDE)
+def gone_on_beyond_the_ends(*given):
+    return between(*given, lambda a, b, share: slerp(a, nearer(a, b), share))
+
+
+@wrong("Exactly at the first and at the last stamp the pose is known: does your comparison let these two through?")
+def unknown_at_the_ends(stamps, positions, quaternions, t):
+    known = stamps[0] < t < stamps[-1]
+    return pose_at(stamps, positions, quaternions, t if known else stamps[-1] + 1)
+
+
+@wrong("Outside the stamps both outputs keep their shapes: how many numbers has a place, and how many has a turn?")
+def one_nan_each(stamps, positions, quaternions, t):
+    return pose_at(stamps, positions, quaternions, t) if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
+
+
+@wrong("At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
+def share_of_the_whole_recording(stamps, positions, quaternions, t):
+    i, share = neighbours(stamps, t)[0], (t - stamps[0]) / (stamps[-1] - stamps[0])
+    a, b = quaternions[i], quaternions[i + 1]
+    turn = slerp(a, nearer(a, b), share)
+    return outside(stamps, t) or ((1 - share) * positions[i] + share * positions[i + 1], turn)
+
+
+@wrong("A stamp has 19 digits and a float64 keeps 16: what do you do to stamps before you subtract?")
+def stamps_in_seconds(stamps, positions, quaternions, t):
+    with np.errstate(invalid="ignore"):
+        return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
+
+
+@wrong("The places are right. The turn is that of a published pose: which turn lies between the two poses?")
+def turn_of_the_one_before(*given):
+    return with_turn(*given, lambda a, b, share: b if share >= 1 else a)
+
+
+@wrong(
+    "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?",
+    side=("left", "right"),  # at a stamp it goes on from the pose before, or from that one
+)
+def shares_exchanged(stamps, positions, quaternions, t, side):
+    i, _ = neighbours(stamps, t, side)
+    then = stamps[i] + stamps[i + 1] - t
+    return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
+
+
+@wrong("The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
+def only_the_angle_made_shorter(*given):
+    def turn(a, b, share):
+        angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
+        return (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+
+    return with_turn(*given, turn)
+
+
+@wrong("There are poses between the first and the last: which two stand round t?")
+def from_the_first_to_the_last(stamps, positions, quaternions, t):
+    return pose_at(stamps[[0, -1]], positions[[0, -1]], quaternions[[0, -1]], t)
+
+
+@wrong("Two turns are equal, yours is NaN: by 0 / 0, or as arccos of a dot b, which rounding lifts above 1?")
+def nan_between_equal_turns(stamps, positions, quaternions, t):
+    i, _ = neighbours(stamps, t)
+    p, q = pose_at(stamps, positions, quaternions, t)
+    return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)
+
+
+@wrong("Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?")
+def angle_of_the_turn(*given):
+    return with_turn(*given, lambda a, b, s: arc(a, nearer(a, b), 1 - s, s, sine=lambda omega: np.sin(2 * omega)))
+
+
+@wrong(
+    "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?", side=("left", "right")
+)
+def not_divided_by_the_sine(*given, side):
+    return with_turn(*given, lambda a, b, share: arc(a, nearer(a, b), 1 - share, share, divided=False), side)
+
+
+@wrong(
+    "The places are right. At s = 0 the turn must be a: which of a and b has the factor 0 in yours?",
+    side=("left", "right"),
+)
+def shares_of_the_turn_exchanged(*given, side):
+    return with_turn(*given, lambda a, b, share: arc(a, nearer(a, b), share, 1 - share), side)
+
+
+@wrong("Take the one of b and -b that is nearer to a. Does the sign of b's w tell which one that is?")
+def sign_of_w(*given):
+    return with_turn(*given, lambda a, b, share: arc(a, b if b[3] >= 0 else -b, 1 - share, share))

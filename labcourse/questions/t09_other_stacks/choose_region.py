@@ -1,0 +1,170 @@
+"""09_other_stacks.choose_region: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def choose_region(features, mean, covariance, allowed):
+    """Number, from 1, of the allowed piece with the least Mahalanobis distance to the mean; 0 if none is allowed."""
+    off = features - mean
+    squared = (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+    squared[~allowed] = np.inf
+    return squared.argmin() + 1 if allowed.any() else 0
+
+
+def _features(rng):
+    """Draw pieces that are nearly equally far from the mean, so that any other distance chooses another one.
+
+    In some draws all features are small, in some all pieces are far away, and in some no piece is allowed.
+    """
+    n, unit = int(rng.integers(5, 9)), rng.choice([1.0, 1e-4])
+    A = rng.normal(size=(3, 3)) * (3.0, 0.4, 1.0)
+    covariance = (A.T @ A + np.diag((0.3, 0.02, 0.1))) * unit**2
+    mean = rng.normal(size=3) * (4.0, 1.0, 2.0) * unit
+    off = rng.normal(size=(n, 3))
+    off *= rng.uniform(1.0, 1.2, (n, 1)) / np.linalg.norm(off, axis=1, keepdims=True) * rng.choice([1.0, 50.0])
+    allowed = rng.random(n) < 0.5
+    allowed[rng.integers(n)] = True
+    allowed &= rng.random() < 0.65
+    return mean + off @ np.linalg.cholesky(covariance).T, mean, covariance, allowed
+
+
+_LINE = np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.9, 1.9, 0.0]])
+
+
+_TILTED = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+QUESTION = Question(
+    reference=choose_region,
+    inputs=_features,
+    by_hand=(
+        (_LINE, np.zeros(3), np.eye(3), np.array([True, True, True])),
+        (1e10 * _LINE[::-1], np.zeros(3), np.eye(3), np.array([True, False, True])),  # all very far away
+        (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
+        (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
+        (_LINE, np.zeros(3), np.diag([0.9, 0.3, 1.0]), np.array([True, True, True])),  # the inverse twice: 1, not 2
+        (0.01 * _LINE, np.zeros(3), np.diag([1e-4, 2e-5, 1e-4]), np.ones(3, bool)),  # 1, small as all variances are
+        (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
+        (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
+        (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
+        (
+            _LINE - _LINE[0],
+            np.zeros(3),
+            np.diag([1.0, 4.0, 1.0]),
+            np.array([False, True, True]),
+        ),  # a forbidden one at the mean
+    ),
+    random_cases=24,
+    points=3,
+    forbidden=("scipy", "sklearn"),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def distances(features, mean, covariance):
+    off = features - mean
+    return (off @ np.linalg.inv(covariance) * off).sum(axis=1)
+
+
+def chosen(distance, allowed):
+    return 1 + int(np.where(allowed, distance, np.inf).argmin()) if np.any(allowed) else 0
+
+
+@wrong("Your distance does not know that two features go together: what stands off the diagonal?")
+def chosen_by_spread(features, mean, covariance, allowed):
+    return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
+
+
+@wrong("A piece at the image's edge may not be chosen.")
+def chosen_although_forbidden(features, mean, covariance, allowed):
+    return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0
+
+
+@wrong("In features[allowed] the rows have new numbers. Which number has the piece in the image of pieces?")
+def chosen_among_the_allowed(features, mean, covariance, allowed):
+    return 1 + int(distances(features[allowed], mean, covariance).argmin()) if allowed.any() else 0
+
+
+@wrong("If no piece is allowed, the answer is 0: what is argmin of all inf?")
+def chosen_always(features, mean, covariance, allowed):
+    return 1 + int(np.where(allowed, distances(features, mean, covariance), np.inf).argmin())
+
+
+@wrong("The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
+def inverse_twice(features, mean, covariance, allowed):
+    squared = (((features - mean) @ np.linalg.inv(covariance)) ** 2).sum(axis=1)
+    return chosen(squared, allowed)
+
+
+@wrong("If no piece is allowed, the answer is 0, which is no piece's number.")
+def none_is_minus_one(features, mean, covariance, allowed):
+    return choose_region(features, mean, covariance, allowed) or -1
+
+
+@wrong("The diagonal holds variances, squares already, and two features go together: what is off it?")
+def divided_by_variances(features, mean, covariance, allowed):
+    return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)
+
+
+@wrong(
+    "You add to the diagonal. What does that do to a variance of 0.0001? It is invertible as it is.",
+    more=(1e-2, 1e-3, 1e-4, 1e-6),
+)
+def variances_made_larger(features, mean, covariance, allowed, more):
+    return choose_region(features, mean, covariance + more * np.eye(3), allowed)
+
+
+@wrong("1 / covariance divides entry by entry: is its matrix product with covariance the identity?")
+def inverse_entry_by_entry(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen((off @ (1.0 / (covariance + 1e-12)) * off).sum(axis=1), allowed)
+
+
+@wrong("off @ inverse @ off.T is n x n: which of its entries is piece i's own distance?")
+def first_row_of_all_products(features, mean, covariance, allowed):
+    off = features - mean
+    return chosen((off @ np.linalg.inv(covariance) @ off.T)[0], allowed)
+
+
+@wrong("The density is largest where the distance is least: is argmin its best piece?")
+def least_density(features, mean, covariance, allowed):
+    return chosen(np.exp(-0.5 * distances(features, mean, covariance)), allowed)
+
+
+@wrong("An allowed piece may be farther away than what you give the others: which number is never less?")
+def others_at_1000(features, mean, covariance, allowed):
+    squared = np.where(allowed, distances(features, mean, covariance), 1000.0)
+    return int(squared.argmin()) + 1 if allowed.any() else 0
+
+
+@wrong("A spread of 0.1 should count for more than one of 10: do you multiply by the covariance, or divide?")
+def covariance_without_its_inverse(features, mean, covariance, allowed):
+    return chosen(((features - mean) @ covariance * (features - mean)).sum(axis=1), allowed)
+
+
+@wrong("What is the covariance for? Area and hue have units of their own, and your distance adds them up.")
+def euclidean(features, mean, covariance, allowed):
+    return chosen(((features - mean) ** 2).sum(axis=1), allowed)
+
+
+@wrong("A forbidden piece has distance 0 in yours, and wins: which distance never wins?")
+def forbidden_ones_at_the_mean(features, mean, covariance, allowed):
+    return 1 + int((distances(features, mean, covariance) * allowed).argmin()) if allowed.any() else 0
+
+
+@wrong("Yours is the allowed piece farthest from the mean: do you want argmax?")
+def farthest(features, mean, covariance, allowed):
+    return chosen(-distances(features, mean, covariance), allowed)
+
+
+@wrong("Row 0 holds piece 1: which number has your best row?")
+def row_in_place_of_the_number(features, mean, covariance, allowed):
+    return max(choose_region(features, mean, covariance, allowed) - 1, 0)
+
+
+@wrong("How far is a piece from the mean target? You never subtract the mean.")
+def distances_from_zero(features, mean, covariance, allowed):
+    return choose_region(features, 0.0 * mean, covariance, allowed)

@@ -1,0 +1,179 @@
+"""09_other_stacks.hsv_mask: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labgrader.checker.question import Question, wrong
+
+
+def hsv_mask(hsv, lower, upper):
+    """Mark the pixels within the bounds, both included; a lower hue above the upper one goes round through red."""
+    h, rest = hsv[..., 0], (hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])
+    above, below = h >= lower[0], h <= upper[0]
+    hue = above & below if lower[0] <= upper[0] else above | below
+    return hue & rest.all(axis=-1)
+
+
+def _colours_and_bounds(rng):
+    hsv = np.stack([rng.integers(0, n, (7, 12)) for n in (180, 256, 256)], axis=-1).astype(np.uint8)
+    ends = np.sort(rng.integers((0, 10, 10), (180, 246, 246), (2, 3)), axis=0)
+    ends[1, 1:] = np.maximum(ends[1, 1:], ends[0, 1:] + 60).clip(max=255)
+    lower, upper = ends
+    if rng.random() < 0.5:
+        lower[0], upper[0] = max(upper[0], lower[0] + 1), lower[0]
+    if rng.random() < 0.3:  # one hue
+        upper[0] = lower[0]
+    if rng.random() < 0.25:  # no saturation
+        lower[1], upper[1] = upper[1], lower[1]
+    hsv[0, :3], hsv[1, :3] = lower, upper  # pixels on the bounds
+    hsv[0, 1, 1:], hsv[1, 1, 1:] = upper[1:], lower[1:]
+    return hsv, lower.astype(np.uint8), upper.astype(np.uint8)
+
+
+def _pixels(*pixels):
+    return np.array([pixels], np.uint8)
+
+
+QUESTION = Question(
+    reference=hsv_mask,
+    inputs=_colours_and_bounds,
+    by_hand=(
+        (
+            _pixels((5, 50, 50), (20, 255, 255), (4, 90, 90), (12, 49, 90), (12, 90, 49), (21, 90, 90)),
+            np.array([5, 50, 50], np.uint8),
+            np.array([20, 255, 255], np.uint8),
+        ),
+        (
+            _pixels(
+                *((175, 90, 90), (3, 90, 90), (170, 60, 70), (10, 200, 210), (90, 90, 90), (175, 59, 90)),
+                *((179, 90, 90), (0, 90, 90)),  # the last hue and the first
+            ),
+            np.array([170, 60, 70], np.uint8),
+            np.array([10, 200, 210], np.uint8),
+        ),
+        (
+            _pixels((30, 100, 100), (29, 100, 100), (31, 100, 100), (30, 101, 100), (30, 100, 99)),
+            np.array([30, 100, 100], np.uint8),
+            np.array([30, 100, 100], np.uint8),
+        ),
+        (
+            _pixels((10, 250, 90), (10, 50, 90), (10, 150, 90)),  # only the hue goes round
+            np.array([5, 200, 50], np.uint8),
+            np.array([20, 100, 255], np.uint8),
+        ),
+    ),
+    random_cases=24,
+    forbidden=("cv2",),
+)
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def between(hsv, lower, upper):
+    return (hsv >= np.asarray(lower)) & (hsv <= np.asarray(upper))
+
+
+def inside(hsv, lower, upper):
+    """Which channels of which pixels are right, (H, W, 3)."""
+    found = between(hsv, lower, upper)
+    if lower[0] > upper[0]:
+        found[..., 0] = (hsv[..., 0] >= lower[0]) | (hsv[..., 0] <= upper[0])
+    return found
+
+
+@wrong("Try red, from 170 to 10: can any hue be above the one and below the other?")
+def mask_without_going_round(hsv, lower, upper):
+    return between(hsv, lower, upper).all(axis=-1)
+
+
+@wrong("A pixel is inside only if all three channels are.")
+def mask_of_any_channel(hsv, lower, upper):
+    return inside(hsv, lower, upper).any(axis=-1)
+
+
+@wrong("A pixel that equals a bound is inside, as in OpenCV.")
+def mask_without_bounds(hsv, lower, upper):
+    h, rest = hsv[..., 0], (hsv[..., 1:] > lower[1:]) & (hsv[..., 1:] < upper[1:])
+    hue = (h > lower[0]) & (h < upper[0]) if lower[0] <= upper[0] else (h > lower[0]) | (h < upper[0])
+    return hue & rest.all(axis=-1)
+
+
+@wrong("Sorting the hues turns red into everything but red: which way round does the circle go?")
+def mask_with_swapped_bounds(hsv, lower, upper):
+    h, (low, high) = hsv[..., 0], sorted((lower[0], upper[0]))
+    return (h >= low) & (h <= high) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong("Grey pixels have a hue, too, which can be any number. Which bounds keep them out?")
+def mask_of_hue(hsv, lower, upper):
+    return inside(hsv, lower, upper)[..., 0]
+
+
+@wrong("OpenCV's hue goes to 179: the bounds are in the same unit.")
+def mask_in_degrees(hsv, lower, upper):
+    doubled = hsv.astype(int) * (2, 1, 1)
+    return hsv_mask(doubled, lower, upper)
+
+
+@wrong("The bounds and the hues are bytes: 10 - 170 wraps round at 256, not at 180.")
+def hue_by_a_remainder_of_bytes(hsv, lower, upper):
+    hue = (hsv[..., 0] - lower[0]) % 180 <= (upper[0] - lower[0]) % 180
+    return hue & ((hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])).all(axis=-1)
+
+
+@wrong("With a range from 5 to 20 you mark nearly every hue. When is `or` right?")
+def mask_always_round(hsv, lower, upper):
+    h = hsv[..., 0]
+    return ((h >= lower[0]) | (h <= upper[0])) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong("Only the hue goes round: a saturation from 200 to 100 holds nothing.")
+def all_three_go_round(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    return np.where(lower > upper, above | below, above & below).all(axis=-1)
+
+
+@wrong("When the hue goes round, saturation and value do not: `or` is for the hue alone.")
+def all_three_go_with_the_hue(hsv, lower, upper):
+    above, below = hsv >= lower, hsv <= upper
+    return (above | below if lower[0] > upper[0] else above & below).all(axis=-1)
+
+
+@wrong("Saturation and value have an upper bound, too.")
+def mask_without_upper_bounds(hsv, lower, upper):
+    return hsv_mask(hsv, lower, np.array([upper[0], 255, 255]))
+
+
+@wrong("Sorting the hues turns red into everything but red: which way round does the circle go?")
+def all_three_bounds_sorted(hsv, lower, upper):
+    return between(hsv, np.minimum(lower, upper), np.maximum(lower, upper)).all(axis=-1)
+
+
+@wrong("If both bounds are one hue, only that hue is inside: do you ask `>` or `>=`?")
+def one_hue_goes_round(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    above, below = h >= lower[0], h <= upper[0]
+    return (above | below if lower[0] >= upper[0] else above & below) & rest
+
+
+@wrong("Python reads & before |, as it reads * before +: which hues does your & belong to?")
+def or_after_and(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    above, below = h >= lower[0], h <= upper[0]
+    return above | below & rest if lower[0] > upper[0] else above & below & rest
+
+
+@wrong("There are three channels: which of them has no bounds in yours?")
+def value_forgotten(hsv, lower, upper):
+    return hsv_mask(hsv, np.array([*lower[:2], 0]), np.array([*upper[:2], 255]))
+
+
+@wrong("A mask has a truth value per pixel, (H, W): along which axis do hue, saturation and value stand?")
+def all_along_the_rows(hsv, lower, upper):
+    return inside(hsv, lower, upper).all(axis=0)
+
+
+@wrong("A hue that equals a bound is inside: what does your `not` make of `>=` and `<=` there?")
+def not_between_the_bounds(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    above, below = h >= lower[0], h <= upper[0]
+    return (above & below if lower[0] <= upper[0] else ~((h >= upper[0]) & (h <= lower[0]))) & rest

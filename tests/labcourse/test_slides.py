@@ -1,0 +1,63 @@
+"""The slides of `make slides`: each sentence is the lesson's own, and each deck fits an hour and a room."""
+
+import re
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "docs" / "slides"))
+import deck  # noqa: E402  beside the templates that it fills
+
+TOPICS = deck.topics()
+
+
+def words(text: str) -> str:
+    """Letters and digits of a text, all small."""
+    return "".join(re.findall(r"\w", re.sub(r"<!--.*?-->|</?\w+>|\]\([^)]*\)", "", text, flags=re.DOTALL))).lower()
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_every_sentence_of_a_deck_stands_in_the_lessons(topic):
+    lessons = {path: nbformat.read(path, as_version=4) for path in TOPICS[topic]}
+    said = words(" ".join(cell.source for book in lessons.values() for cell in book.cells))
+    shown = [cell for cell in deck.deck(topic, TOPICS[topic]).cells if cell.cell_type == "markdown"]
+    for cell in shown:
+        if cell.metadata.slideshow.slide_type != "notes":
+            body = re.sub(
+                r"^#+ (?:Question|Look|Formula|Answer)$|!\[[^]]*\]\([^)]*\)", "", cell.source, flags=re.MULTILINE
+            )
+            for line in body.splitlines():
+                assert words(line) in said, line
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_a_deck_fits_an_hour_and_its_slides_the_back_of_a_room(topic):
+    slides = [slide for lesson in TOPICS[topic] for slide in deck.slides_of(lesson)]
+    assert 15 <= len(slides) <= 25
+    assert {slide["kind"] for slide in slides} == set(deck.KINDS)
+    assert sum(slide["minutes"] for slide in slides) <= 60
+    for slide in slides:
+        spoken = re.sub(r"\$.*?\$|!\[[^]]*\]\([^)]*\)", " x ", slide["text"], flags=re.DOTALL)
+        assert len(spoken.split()) <= 75, slide["text"]
+        assert slide["kind"] == "picture" or slide["words"], slide
+        assert re.search(r"!\[|\$\$", slide["text"]) or slide["picture"] is not None or slide["words"]
+    assert sum(bool(slide["ask"]) for slide in slides) >= 0.7 * len(slides)
+    assert sum(bool(slide["wrong"]) for slide in slides) >= 3
+
+
+def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
+    book = nbformat.v4.new_notebook(
+        cells=[nbformat.v4.new_markdown_cell("# Masks\n\nA mask is an image. A mask is not.")]
+    )
+    path = tmp_path / "04_iou.ipynb"
+    for begin, many in (("A cup", 0), ("A mask is", 2)):
+        book.cells[0].metadata.slides = [{"kind": "question", "begin": [begin], "minutes": 1}]
+        nbformat.write(book, path)
+        with pytest.raises(ValueError, match=rf"cell 0: begin: .*{many} are '{begin}'"):
+            deck.slides_of(path)
+    book.cells[0].metadata.slides[0]["begin"] = ["A mask is not"]
+    nbformat.write(book, path)
+    assert deck.slides_of(path)[0]["text"] == "A mask is not."
