@@ -1,0 +1,83 @@
+"""`labkit evaluate`: scores of masks and lifts over random scenes, or of things in pictures of one's own."""
+
+import inspect
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from labcli.commands.options import Dask, Model, Refine, Workers
+
+
+def evaluate(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Your own pictures: color/, depth/ and mask/ of numbered things; else scenes.")
+    ] = None,
+    scenes: Annotated[int, typer.Option(help="How many scenes; each is one trial.", min=1)] = 100,
+    first_seed: Annotated[int, typer.Option(help="Seed of the first scene; the others follow.", min=0)] = 900_000,
+    config: Annotated[Literal["test", "hard", "other", "train"], typer.Option(help="Which kind of scenes.")] = "test",
+    masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
+        "predicted"
+    ),
+    model: Model = "unet_rgbd",
+    crf: Refine = None,
+    perturb: Annotated[
+        bool, typer.Option("--perturb", help="Depth as a sensor measures it, pose off by 5 mm and 0.5 degree.")
+    ] = False,
+    json: Annotated[Path | None, typer.Option(help="Write the scores, and a row per trial, to this file, too.")] = None,
+    worst: Annotated[int, typer.Option(help="Show so many of the worst in OUT/worst.html.", min=0)] = 0,
+    out: Annotated[Path, typer.Option(help="Folder for worst.html.")] = Path("out"),
+    anything: Annotated[bool, typer.Option("--anything", help="With FOLDER: things of any class, each apart.")] = False,
+    depth_scale: Annotated[
+        float | None, typer.Option(help="Metres per unit of FOLDER's depth; else the camera file's, or 0.001.")
+    ] = None,
+    workers: Workers = 1,
+    dask: Dask = None,
+) -> None:
+    """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target.
+
+    With FOLDER, score how well the things in pictures of your own are told apart, and nothing is simulated.
+    """
+    options = inspect.signature(evaluate).parameters
+    given = {name for name, value in locals().items() if name in options and value != options[name].default}
+    of_scenes = {"scenes", "first_seed", "config", "masks", "crf", "perturb", "workers", "dask"}
+    wrong = sorted(given & ({"anything", "depth_scale"} if folder is None else of_scenes))
+    if wrong:
+        raise ValueError(f"{wrong[0]}: expected {'FOLDER beside it' if folder is None else 'no FOLDER beside it'}")
+    if folder is not None:
+        _of_a_folder(folder, model, anything, depth_scale, json, worst, out)
+        return
+    from data_gen import sample_scene
+    from labcli.evaluation import as_json, run_trials, summarise, table
+    from labcli.worst import page
+    from labkit.learning.network import load_model, weights_path
+    from labkit.support.files import write_atomically
+
+    weights = None if masks == "truth" else weights_path(model)
+    if weights is not None:
+        load_model(weights)  # so that wrong weights are said before anything is simulated
+    specs = [sample_scene(seed, config) for seed in range(first_seed, first_seed + scenes)]
+    trials = run_trials(specs, weights, crf=crf, perturb=perturb, workers=workers, dask=dask)
+    report = summarise(trials)
+    typer.echo(table(report))
+    if json is not None:
+        write_atomically(json, as_json(report).encode())
+    if worst:
+        write_atomically(out / "worst.html", page(specs, trials, worst, weights, (320, 240), crf, perturb).encode())
+        typer.echo(f"wrote {out / 'worst.html'}")
+
+
+def _of_a_folder(folder: Path, model: str, things: bool, depth_scale, json: Path | None, worst: int, out: Path) -> None:
+    from labcli import evaluate_folder as own
+    from labkit.learning.network import load_model, weights_path
+    from labkit.pipeline import anything
+    from labkit.support.files import write_atomically
+
+    true, network = own.TrueThings(folder, depth_scale), load_model(weights_path(model))
+    judged = own.judge(true, anything(network) if things else own.things_by_class(network))
+    typer.echo(own.table(judged, true.alone))
+    if json is not None:
+        write_atomically(json, own.as_json(judged, true.alone).encode())
+    if worst:
+        write_atomically(out / "worst.html", own.page(judged, worst, true.alone).encode())
+        typer.echo(f"wrote {out / 'worst.html'}")

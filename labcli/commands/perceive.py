@@ -1,0 +1,98 @@
+"""`labkit perceive`: targets and grasps in a picture of one's own camera."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from labcli.commands.options import Model
+
+
+def perceive(
+    color: Annotated[Path, typer.Argument(help="Colour picture, 8 bit.")],
+    depth: Annotated[Path, typer.Argument(help="Depth picture aligned to it, 16-bit PNG; 0 is no reading.")],
+    intrinsics: Annotated[
+        str, typer.Option(help='The camera: "fx fy cx cy", or a file of librealsense, BOP, Open3D or ROS.')
+    ],
+    camera_pose: Annotated[
+        str | None, typer.Option(help='Where the camera stands in the base frame: "x y z qx qy qz qw".')
+    ] = None,
+    plane: Annotated[
+        Literal["auto"] | None, typer.Option(help="Find the table and lay the base frame on it; so without a pose.")
+    ] = None,
+    table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
+    depth_scale: Annotated[
+        float | None, typer.Option(help="Metres per unit of the depth file; else the camera file's, or 0.001.")
+    ] = None,
+    model: Model = "unet_rgbd",
+    mask: Annotated[
+        Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
+    ] = None,
+    instances: Annotated[
+        bool, typer.Option("--instances", help="Each value above 0 of --mask is an object, and each object a target.")
+    ] = False,
+    anything: Annotated[
+        bool, typer.Option("--anything", help="Whatever stands on the table is a target, of any class.")
+    ] = False,
+    at: Annotated[
+        str, typer.Option(help='A pixel "U,V", column and row: the thing there is the target, whatever its class.')
+    ] = "",
+    target: Annotated[
+        int | None, typer.Option(help="The class to grasp, 2 if none is given; with --mask, its value that says so.")
+    ] = None,
+    gripper: Annotated[
+        str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON file.')
+    ] = "",
+    workspace: Annotated[
+        str,
+        typer.Option(
+            help="What the arm can meet: from and to in x, y and z of the base frame, z from the table; if not given, "
+            "what stands on the table."
+        ),
+    ] = "",
+    out: Annotated[
+        Path, typer.Option(help="Folder for overlay.png, targets.png, clouds, grasps.json, report.html.")
+    ] = Path("out"),
+) -> None:
+    """Find targets and grasps in a picture of your own camera; no target is an answer, too."""
+    from dataclasses import replace
+
+    from labcli import perceive as own
+    from labcli.cameras import read_intrinsics, read_pose
+    from labcli.report import save
+    from labkit.labels import TARGET
+    from labkit.learning.network import load_model, weights_path
+    from labkit.pipeline import Pipeline
+    from labkit.pipeline import anything as things_of
+    from labkit.support.files import check_writable
+
+    if plane is not None and camera_pose is not None:
+        raise ValueError("plane: expected either --plane auto or --camera-pose, got both")
+    if anything and (mask is not None or target is not None):
+        raise ValueError("anything: expected neither --mask nor --target beside it; it takes each object for a target")
+    if instances and (mask is None or target is not None):
+        raise ValueError("instances: expected --mask FILE beside it, and no --target; each value is one")
+    check_writable(out)  # before anything that takes its time
+    T_base_cam = read_pose(camera_pose) if camera_pose else None
+    camera = read_intrinsics(intrinsics)
+    frame = own.read_frame(color, depth, camera, depth_scale)
+    if camera.distortion:
+        typer.echo("the lens's distortion is undone first: what is written is of the rectified picture")
+    planning = {"gripper": own.read_gripper(gripper)}
+    planning["workspace"] = own.read_workspace(workspace) if workspace else None
+    pixel = own.read_pixel(at) if at else None
+    labels, numbers, said = None, None, ""
+    if mask is not None:
+        pipeline = Pipeline(**planning)
+        labels, numbers, said = own.read_mask(mask, frame.size, target, instances, camera)
+    elif anything:
+        pipeline = Pipeline(find_objects=things_of(load_model(weights_path(model))), **planning)
+    else:
+        pipeline = Pipeline(
+            load_model(weights_path(model)), target_class=TARGET if target is None else target, **planning
+        )
+    seen = own.perceive(frame, pipeline, labels, numbers, T_base_cam, table_z, pixel)
+    seen = replace(seen, notices=(said, *seen.notices)) if said else seen
+    typer.echo(own.describe(seen))
+    for path in save(seen, out):
+        typer.echo(f"wrote {path}")

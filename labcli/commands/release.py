@@ -1,0 +1,37 @@
+"""`labkit release`: labs from solutions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labcli.commands.options import of_course
+
+
+def release(
+    topics: Annotated[list[str] | None, typer.Argument(help="Topics such as 04_iou; all if none is given.")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; exit status 1 if something would change.")
+    ] = False,
+    bundle: Annotated[
+        Path | None, typer.Option(help="Write a zip of what students get of these topics: no solutions, no tests.")
+    ] = None,
+    week: Annotated[int | None, typer.Option(help="The topics of a week of the syllabus, in place of names.")] = None,
+    course: Annotated[
+        Path, typer.Option(help="Folder that holds lessons, solutions and labs.", callback=of_course)
+    ] = Path("."),
+) -> None:
+    """Generate labs/ from solutions/ with nbgrader, and tidy the notebooks of solutions/ and lessons/."""
+    from labgrader import bundle as bundling
+    from labgrader import release as releasing
+
+    if week is not None:
+        topics = [*(topics or []), *bundling.topics_of_week(week)]
+    changed = releasing.release(course, topics or (), check=check)
+    for path in changed:
+        typer.echo(f"{path}: not what `labkit release` makes of it" if check else f"changed {path}")
+    if not changed:
+        typer.echo("labs, solutions and lessons are as they should be")
+    if bundle is not None:
+        typer.echo(f"wrote {bundle}: {len(bundling.bundle(course, bundle, topics or ()))} files")
+    raise typer.Exit(1 if check and changed else 0)

@@ -1,0 +1,22 @@
+"""`labkit renumber`: lessons run again, and their marked numbers written anew."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def renumber(
+    lessons: Annotated[list[Path] | None, typer.Argument(help="Notebooks; all lessons if none is named.")] = None,
+) -> None:
+    """Run lessons again, write their marked numbers anew, and list the sentences whose claim may no longer hold.
+
+    For a camera of your own (`camera` in [tool.labcourse], LABKIT_CAMERA), other scenes, or new versions. The notebooks
+    are changed in place; git shows how. Exits with 1 if a sentence has to be read.
+    """
+    from labcli import renumber as again
+
+    paths = lessons or sorted(Path("lessons").glob("*.ipynb"))
+    if not paths:
+        raise ValueError("lessons: expected notebooks, or a folder lessons/ here, found neither")
+    raise typer.Exit(0 if again.all_of(paths, typer.echo) else 1)

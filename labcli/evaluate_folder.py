@@ -1,0 +1,228 @@
+"""`labkit evaluate FOLDER`: how well are the things in somebody's own pictures told apart, and which went worst?"""
+
+import html
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Integer, UInt8
+from matplotlib import colormaps
+from tqdm.auto import tqdm
+
+from labcli.cameras import read_intrinsics, rectify
+from labcli.perceive import on_table, read_frame
+from labcli.report import PAGE, figures
+from labkit.frame import RGBDFrame, read_image
+from labkit.geometry import back_project_to_base
+from labkit.instance_metrics import InstanceScores, pool, score_instances
+from labkit.labels import OBSTACLE, TARGET
+from labkit.learning.things import Things
+from labkit.metrics import wilson_interval
+from labkit.pipeline import Pipeline, separate_objects
+
+# The number of the thing at each pixel, 0 for none; or an object with such `instances`, as `Pipeline(find_objects)`.
+Finder = Callable[[RGBDFrame], Integer[np.ndarray, "H W"] | Things]
+HALF = 0.5  # of the picture: a larger thing is more likely a table, and the mask one of classes
+COLOURS = np.rint(255 * np.array(colormaps["tab20"].colors)).astype(np.uint8)
+
+
+def things_by_class(network) -> Finder:
+    """What a network's classes say of things: all that is target or obstacle, cut apart by empty space.
+
+    A labelled pixel without depth goes to the nearest thing, so that the things together are what was labelled.
+    """
+    pipeline = Pipeline(network)
+
+    def find(frame: RGBDFrame) -> Integer[np.ndarray, "H W"]:
+        labels, _ = pipeline.perceive(frame)
+        thing = np.isin(labels, (TARGET, OBSTACLE))
+        P = back_project_to_base(frame.depth, frame.K, frame.T_base_cam).reshape(-1, 3)
+        placed = np.flatnonzero(thing.ravel() & np.isfinite(P[:, 2]))
+        apart = [placed[group] for group in separate_objects(P[placed])]
+        numbers = np.zeros(thing.size, np.int32)
+        for number, pixels in enumerate(apart, start=1):
+            numbers[pixels] = number
+        if not apart:
+            return thing.astype(np.int32)
+        away = (numbers == 0).astype(np.uint8).reshape(thing.shape)
+        _, nearest = cv2.distanceTransformWithLabels(away, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+        number_of = np.zeros(nearest.max() + 1, np.int32)
+        number_of[nearest[away == 0]] = numbers[numbers > 0]
+        return np.where(thing, number_of[nearest], 0)
+
+    return find
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One picture, its true things and those that were found, how they score, and why nothing could be looked for.
+
+    true: 0 is no thing. ignore: the number that does not count.
+    """
+
+    name: str
+    rgb: UInt8[np.ndarray, "H W 3"]
+    true: Integer[np.ndarray, "H W"]
+    found: Integer[np.ndarray, "H W"]
+    ignore: int
+    scores: InstanceScores
+    said: str = ""
+
+
+class TrueThings(Sequence):
+    """FOLDER/color/NAME.png (or .jpg) and depth/NAME.png with the true things in mask/NAME.png, and FOLDER/camera.json.
+
+    A mask has 8 or 16 bits: 0 where there is no thing, the greatest number, 255 or 65535, where nobody knows, and
+    another number for each thing. Masks of 0 and one other number alone do not tell things apart, and neither does a
+    folder foreground/ in place of mask/, not 0 where a thing is: then `alone` is True. depth_scale and the camera's
+    file as for `labcli.own_data.PictureFolder`.
+
+    An item is a frame in the camera's own frame, whose instances are the true things. Raises FileNotFoundError or
+    ValueError naming the file that is missing or does not fit.
+    """
+
+    def __init__(self, folder, depth_scale: float | None = None):
+        folder = Path(folder)
+        self.depth_scale = depth_scale
+        self.colors = sorted(path for path in (folder / "color").glob("*") if path.is_file())
+        kind = "mask" if (folder / "mask").is_dir() else "foreground"
+        self.masks = [folder / kind / f"{path.stem}.png" for path in self.colors]
+        cameras = [path for end in (".json", ".yaml", ".txt") if (path := folder / f"camera{end}").is_file()]
+        if not self.colors or not self.masks[0].parent.is_dir() or not cameras:
+            raise FileNotFoundError(
+                f"folder: expected pictures in color/, depth/ and mask/ (or foreground/), and camera.json, in {folder}"
+            )
+        self.camera = read_intrinsics(str(cameras[0]))
+        numbers = {*np.concatenate([np.unique(_numbers(path)) for path in self.masks]).tolist()} - {0}
+        self.alone = kind == "foreground" or len(numbers) <= 1
+
+    def __len__(self) -> int:
+        return len(self.colors)
+
+    def __getitem__(self, index: int) -> RGBDFrame:
+        color, mask = self.colors[index], self.masks[index]
+        depth = mask.parent.parent / "depth" / f"{color.stem}.png"
+        frame, true = read_frame(color, depth, self.camera, self.depth_scale), _numbers(mask)
+        if true.shape[::-1] != frame.size:
+            (h, w), (width, height) = true.shape, frame.size
+            raise ValueError(f"mask: expected the colour picture's size, {width} x {height}, in {mask}, got {w} x {h}")
+        if self.alone:
+            true = (true > 0).astype(np.uint8)
+        return replace(frame, instances=rectify(true, self.camera, outside=self.ignore(index)))
+
+    def ignore(self, index: int) -> int:
+        """The number of the mask's pixels that nobody knows, the greatest of its kind."""
+        return 255 if self.alone else int(np.iinfo(_numbers(self.masks[index]).dtype).max)
+
+
+def _numbers(path: Path) -> Integer[np.ndarray, "H W"]:
+    """The numbers of things in a file of 8 or 16 bits."""
+    return read_image("mask", path, (np.uint8, np.uint16))
+
+
+def judge(things: TrueThings, find: Finder) -> list[Judged]:
+    """Find the things of each picture on the table that its depth shows, and score them.
+
+    In a picture without a table nothing is found, which counts, and is said.
+    """
+    judged = []
+    for index, frame in enumerate(tqdm(things, desc="pictures", unit="picture")):
+        ignore, true, said = things.ignore(index), frame.instances, ""
+        try:
+            seen, _ = on_table(replace(frame, instances=None))
+        except ValueError as error:
+            seen, said = None, f"nothing was looked for: {error}"
+        found = np.zeros(true.shape, np.int32) if seen is None else find(seen)
+        found = getattr(found, "instances", found)
+        counted = true[true != ignore]
+        largest = np.bincount(counted[counted > 0]).max(initial=0) / max(1, counted.size)
+        if not said and not things.alone and largest > HALF:
+            said = f"one true thing covers {largest:.0%} of the picture: are these numbers of classes, not of things?"
+        scores = score_instances(true, np.where(found > 0, 1, 0) if things.alone else found, ignore)
+        judged.append(Judged(things.colors[index].stem, frame.rgb, true, found, ignore, scores, said))
+    return judged
+
+
+def table(judged: Sequence[Judged], alone: bool) -> str:
+    """The scores as text for a terminal. alone: the truth does not tell things apart, so only foreground is scored."""
+    scores = pool([picture.scores for picture in judged])
+    lines = [f"{picture.name}: {picture.said}" for picture in judged if picture.said]
+    foreground = f"foreground IoU {scores.foreground_iou:.3f}"
+    if alone:
+        return "\n".join([*lines, f"{scores.pictures} pictures whose truth does not tell things apart", foreground])
+    lines += [f"{scores.pictures} pictures, {scores.true} things, {scores.found} found"]
+    for what, count in (
+        ("found as one piece, IoU over 0.5", scores.over_half),
+        ("the same, IoU over 0.75", scores.over_three_quarters),
+        ("F over 0.75", scores.detected),
+    ):
+        share = ""
+        if scores.true:
+            low, high = wilson_interval(count, scores.true)
+            share = f" ({count / scores.true:.0%}, 95 % interval {low:.0%} to {high:.0%})"
+        lines += [f"{what}: {count} of {scores.true}{share}"]
+    lines += ["", f"{'mean over pictures':<20}{'precision':>10}{'recall':>8}{'F':>8}"]
+    for what in ("overlap", "boundary"):
+        P, R, F = getattr(scores, what)
+        lines += [f"{what:<20}{P:>10.3f}{R:>8.3f}{F:>8.3f}"]
+    return "\n".join([*lines, "", foreground])
+
+
+def as_json(judged: Sequence[Judged], alone: bool) -> str:
+    """The pooled scores and, as `rows`, each picture's; null where there is none, as for things if truth has none."""
+    whole = asdict(pool([picture.scores for picture in judged]))
+    rows = [
+        {"name": one.name, "said": one.said, "foreground_iou": one.scores.foreground_iou, **asdict(one.scores)}
+        for one in judged
+    ]
+    if alone:
+        kept = {"pictures", "name", "said", "foreground", "foreground_iou"}
+        whole, *rows = ({key: facts[key] for key in facts if key in kept} for facts in (whole, *rows))
+    facts = whole | {"rows": rows}
+    return json.dumps(_without_nan(facts), indent=1, allow_nan=False) + "\n"
+
+
+def _without_nan(facts):
+    if isinstance(facts, dict):
+        return {key: _without_nan(value) for key, value in facts.items()}
+    if isinstance(facts, (list, tuple)):
+        return [_without_nan(value) for value in facts]
+    return None if isinstance(facts, float) and np.isnan(facts) else facts
+
+
+def worst(judged: Sequence[Judged], count: int, alone: bool) -> list[Judged]:
+    """The pictures of the lowest F of overlap, or if truth does not tell things apart of the lowest foreground IoU."""
+
+    def goodness(picture: Judged) -> float:
+        return np.nan_to_num(picture.scores.foreground_iou, nan=1.0) if alone else picture.scores.overlap[2]
+
+    return sorted(judged, key=goodness)[:count]
+
+
+def page(judged: Sequence[Judged], count: int, alone: bool) -> str:
+    """HTML of the worst pictures: each with its true things, with those that were found, and how they score."""
+    body = []
+    for picture in worst(judged, count, alone):
+        scores, true = picture.scores, np.where(picture.true == picture.ignore, 0, picture.true)
+        said = [] if alone else [f"{scores.over(0.5)} of {scores.true} things found as one piece, {scores.found} found"]
+        said += [] if alone else [f"overlap F {scores.overlap[2]:.3f}, boundary F {scores.boundary[2]:.3f}"]
+        said += [f"foreground IoU {scores.foreground_iou:.3f}", picture.said]
+        pictures = {"true things": painted(picture.rgb, true), "found": painted(picture.rgb, picture.found)}
+        body += [f"<h2>{html.escape(picture.name)}</h2>", figures(pictures)]
+        body += [f"<pre>{html.escape(chr(10).join(filter(None, said)))}</pre>"]
+    title = f"The worst {min(count, len(judged))} of {len(judged)} pictures"
+    return PAGE.format(title=title, body="\n".join(body))
+
+
+def painted(rgb: UInt8[np.ndarray, "H W 3"], numbers: Integer[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
+    """The picture with a colour over each thing, and a white outline around it."""
+    image = rgb.copy()
+    for place, number in enumerate(np.unique(numbers[numbers > 0])):
+        mask = numbers == number
+        image[mask] = image[mask] // 2 + COLOURS[place % len(COLOURS)] // 2
+        outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(image, outlines, -1, (255, 255, 255), max(1, round(rgb.shape[1] / 640)))
+    return image
