@@ -18,14 +18,14 @@ __version__ = "0.2.0"
 
 
 def check(name: str, answer: object) -> Callable:
-    """Check a student's answer, show the result, and return the function to go on with (`labkit.course.checking`)."""
-    from labkit.course.checking import check
+    """Check a student's answer, show the result, and return the function to go on with (`labgrader.check`)."""
+    from labgrader.check import check
 
     return check(name, answer)
 
 
-def check_file(path: str) -> None:
-    """Check a saved lab as the grader will, and print the results (`labkit.course.checking_file`)."""
-    from labkit.course.checking_file import check_file
+def check_file(path: str | None = None) -> None:
+    """Check a saved lab, or the one that runs, as the grader will; print the results (`labgrader.file_check`)."""
+    from labgrader.file_check import check_file
 
     check_file(path)

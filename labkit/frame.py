@@ -27,9 +27,9 @@ class RGBDFrame:
 
     rgb: uint8 (H, W, 3), RGB. depth: metres, float32 (H, W); 0 or NaN where there is no reading. K: intrinsics, (3, 3),
     pixel centres at integers. T_base_cam: (4, 4), maps camera coordinates (x right, y down, z forward) to base
-    coordinates. labels: true classes, uint8 (H, W), if known; 255 is "ignore". instances: uint8 (H, W), 0 or the number
-    of the object, if known. table_z: height of the table in the base frame, metres, if known. Raises ValueError naming
-    the argument that does not fit. Topics 01 and 06.
+    coordinates. labels: true classes, uint8 (H, W), if known; 255 is "ignore". instances: (H, W), 0 or the object's
+    number, if known: uint8, or uint16 if a number is above 255. table_z: height of the table in the base frame, metres,
+    if known. Raises ValueError naming the argument that does not fit. Topics 01 and 06.
 
     >>> rgb, depth = np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), np.float32)
     >>> frame = RGBDFrame(rgb, depth, K=np.diag([9.0, 9.0, 1.0]), T_base_cam=np.eye(4))
@@ -56,11 +56,11 @@ class RGBDFrame:
         check_same_size("rgb", self.rgb, "depth", self.depth)
         put("K", check_K("K", self.K))
         put("T_base_cam", check_T("T_base_cam", self.T_base_cam))
-        for name, count in (("labels", IGNORE), ("instances", 256)):
+        for name, count in (("labels", IGNORE), ("instances", 65_536)):
             if getattr(self, name) is not None:
                 image = check_shape(name, check_labels(name, getattr(self, name), count), (None, None))
                 check_same_size("rgb", self.rgb, name, image)
-                put(name, image.astype(np.uint8, copy=False))
+                put(name, image.astype(np.uint8 if image.max(initial=0) <= 255 else np.uint16, copy=False))
         if self.table_z is not None:
             put("table_z", check_height("table_z", self.table_z))
 
@@ -78,7 +78,7 @@ class RGBDFrame:
     def from_files(
         cls, rgb, depth, K, T_base_cam, labels=None, instances=None, depth_scale: float = 0.001, table_z=None
     ) -> "RGBDFrame":
-        """Read a frame from image files: 8-bit RGB, 16-bit PNG depth, and 8-bit PNG labels and instances if given.
+        """Read a frame from image files: 8-bit RGB, 16-bit PNG depth; if given, 8-bit labels, 8- or 16-bit instances.
 
         depth_scale: metres for one unit of the depth file (0.001 for millimetres); 0 in the file is "no reading".
         Raises FileNotFoundError for a missing file, ValueError for one that is not such an image.
@@ -91,7 +91,7 @@ class RGBDFrame:
             K=K,
             T_base_cam=T_base_cam,
             labels=None if labels is None else read_image("labels", labels, np.uint8),
-            instances=None if instances is None else read_image("instances", instances, np.uint8),
+            instances=None if instances is None else read_image("instances", instances, (np.uint8, np.uint16)),
             table_z=table_z,
         )
 
@@ -99,8 +99,8 @@ class RGBDFrame:
 def read_image(name: str, path, dtype, colour: bool = False) -> np.ndarray:
     """Read an image file as RGB (H, W, 3) if `colour`, else as one channel (H, W), without any conversion of values.
 
-    `name` is the argument that the errors speak of. Raises FileNotFoundError, or ValueError if the file is damaged
-    or holds another kind of image.
+    `name` is the argument that the errors speak of. dtype: the file's, or a tuple of those that will do. Raises
+    FileNotFoundError, or ValueError if the file is damaged or holds another kind of image.
     """
     data = np.frombuffer(Path(path).read_bytes(), np.uint8)
     how = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH if colour else cv2.IMREAD_UNCHANGED  # else it squeezes 16 bits into 8
@@ -108,7 +108,8 @@ def read_image(name: str, path, dtype, colour: bool = False) -> np.ndarray:
     if image is None:
         raise ValueError(f"{name}: {path} is not an image that can be read (damaged or truncated?)")
     channels, hint = (3, "; are colour and depth swapped?") if colour else (1, "")
-    expected = f"{np.dtype(dtype).name} with {channels} channel(s) in {path}"
-    fits = image.dtype == dtype and (colour or image.ndim == 2)
+    dtypes = dtype if isinstance(dtype, tuple) else (dtype,)
+    expected = f"{' or '.join(np.dtype(kind).name for kind in dtypes)} with {channels} channel(s) in {path}"
+    fits = image.dtype in dtypes and (colour or image.ndim == 2)
     require(name, fits, expected, f"{image.dtype} with shape {image.shape}{hint}")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if colour else image

@@ -3,7 +3,15 @@
 import numpy as np
 from jaxtyping import Integer, Num, UInt8
 
-from labkit.support.validation import check_labels, check_rgb, check_same_size, check_shape, require
+from labkit.support.validation import (
+    as_array,
+    check_labels,
+    check_rgb,
+    check_same_size,
+    check_shape,
+    check_whole,
+    require,
+)
 
 CLASSES = ("background", "surface", "target", "obstacle")
 BACKGROUND, SURFACE, TARGET, OBSTACLE = range(4)
@@ -22,7 +30,7 @@ def one_hot(y: Integer[np.ndarray, "*shape"], C: int = len(CLASSES)) -> UInt8[np
     >>> one_hot(np.array([[0, 2]]), 3)
     array([[[1, 0, 0], [0, 0, 1]]], dtype=uint8)
     """
-    y = check_labels("y", y, C)
+    y = check_labels("y", y, check_whole("C", C, 1, IGNORE))
     return (y[..., None] == np.arange(C)).astype(np.uint8)
 
 
@@ -34,7 +42,7 @@ def from_one_hot(Y: Num[np.ndarray, "*shape C"]) -> UInt8[np.ndarray, "*shape"]:
     >>> from_one_hot(np.array([[1, 0], [0, 1], [0, 0]]))
     array([  0,   1, 255], dtype=uint8)
     """
-    Y = np.asarray(Y)
+    Y = as_array("Y", Y)
     if Y.ndim < 1 or not 1 <= Y.shape[-1] <= IGNORE:
         raise ValueError(f"Y: expected classes on its last axis, 1 to {IGNORE} of them, got shape {Y.shape}")
     if not np.isin(Y, (0, 1)).all():

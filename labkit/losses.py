@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64, Integer, Num
 
 from labkit.labels import IGNORE, one_hot
-from labkit.support.validation import check_finite, check_labels, check_shape, require
+from labkit.support.validation import as_array, check_finite, check_labels, check_shape, require
 
 if TYPE_CHECKING:
     import torch
@@ -170,7 +170,7 @@ def _check_weights(name: str, w, num_classes: int) -> np.ndarray:
 
 def _check_pixels(z, y, weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the logits, the one-hot tensor Y (all zeros where ignored) and one weight per class."""
-    z, y = _check_logits(z), np.asarray(y)
+    z, y = _check_logits(z), as_array("y", y)
     require("y", y.shape == z.shape[:-1], f"one label for each pixel of z, shape {z.shape[:-1]}", y.shape)
     num_classes = z.shape[-1]
     w = np.ones(num_classes) if weights is None else _check_weights("weights", weights, num_classes)

@@ -4,32 +4,16 @@ What cannot be right is refused (`labkit.support.validation`). A calibration tha
 does not fit the table, or a picture unlike the training's can be meant so; then the result stands, and this is said.
 """
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Integer, UInt8
 
 from labkit.frame import RGBDFrame
-from labkit.geometry import back_project_to_base, fit_plane
+from labkit.geometry import Plane, back_project_to_base, find_tables, fit_plane
+from labkit.geometry.tables import THICK, height_of, table_at
 from labkit.labels import CLASSES, SURFACE, TARGET
-from labkit.stacks.objects import colour_regions, colour_shares
-
-NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
-RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
-UNITS = (0.001, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 1000.0)  # by which depth is often wrong
-FLAT = 0.3  # share of the points near the table's height that lie on it, at least
-OFF = 0.2  # of half the picture's width or height: where the principal point of a calibrated camera may lie
-NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see small things
-TOP = 0.25  # metres: of a plane that is smaller, and over much else, nobody knows whether it is the table
-LONG = 0.12  # metres: longer things are seldom one thing to grasp
-PART = 0.15  # of a target's pixels: less is a label on it, or a shadow
-SHIFT = 3  # pixels between colour and depth that go unnoticed
-REACH = 16  # pixels within which a shift is looked for
-USUAL = {  # from least to most, of 200 scenes of the kinds train, any, test and hard
-    "millimetres of the table per pixel": (1.1, 5.5),
-    "millimetres of noise on the table's depth": (0.0, 4.0),
-    "mean of the colours": (39, 190),
-    "mean saturation": (27, 232),
-}
 
 
 def notices(frame: RGBDFrame, perception=None, distortion=()) -> tuple[str, ...]:
@@ -59,6 +43,9 @@ def notices(frame: RGBDFrame, perception=None, distortion=()) -> tuple[str, ...]
     return tuple(sentence for sentence in said if sentence)
 
 
+OFF = 0.2  # of half the picture's width or height: where the principal point of a calibrated camera may lie
+
+
 def _principal_point(K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> str:
     (cx, cy), (w, h) = K[:2, 2], size
     where = f"the principal point ({cx:.1f}, {cy:.1f}) lies"
@@ -72,101 +59,191 @@ def _principal_point(K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> str:
     return ""
 
 
+# ------------------------------------------------------------------------------------------------- the table
+
+NEAR = 0.25  # metres over or under the table's stated height, where the table is looked for
+FLAT = 0.3  # share of the points near the table's height that lie on it, at least
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The table as depth shows it.
+
+    P: the points near its stated height, (N, 3); plane: the likeliest table, or the largest plane among them. table_z:
+    the stated height. rise: how far the plane lies over that; away: its median depth; metres. labels: those of the
+    plane's pixels, if known.
+    """
+
+    P: Float[np.ndarray, "N 3"]
+    plane: Plane
+    table_z: float
+    rise: float
+    away: float
+    labels: UInt8[np.ndarray, "_"] | None
+
+
 def _table(frame: RGBDFrame, perception) -> list[str]:
-    """Compare the largest plane near the table's height with the pose, table_z and the labels."""
+    """Compare the likeliest table with the pose, table_z and the labels."""
+    camera, table_z = frame.T_base_cam[:3, 3], frame.table_z or 0.0
+    if camera[2] - table_z < LOW:
+        return [_camera_too_low(frame, camera[2] - table_z)]
     step = max(1, round(np.sqrt(frame.depth.size / 10_000)))
+    thinned = np.s_[::step, ::step]
     if perception is None:
-        points = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[::step, ::step].reshape(-1, 3)
+        points = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)
     else:
-        points = perception.points[::step, ::step].reshape(-1, 3)
-    table_z = frame.table_z or 0.0
+        points = perception.points
+    tables = perception.tables if perception is not None and perception.tables else ()
+    tables = tables or find_tables(points[thinned], camera, up=(0.0, 0.0, 1.0))
+    chosen = table_at(tables, table_z) or next(iter(tables), None)
+    points = points[thinned].reshape(-1, 3)
     near = np.abs(points[:, 2] - table_z) < NEAR  # NaN is not near
     P = points[near]
     if len(P) < 100:
-        said = f"only {len(P) / len(points):.0%} of the picture has depth within {NEAR} m of the table's height"
-        return [said + _unit(points[np.isfinite(points[:, 2])], frame.T_base_cam[:3, 3], table_z)]
-    try:
-        plane = fit_plane(P, tries=100, viewer=(0.0, 0.0, 1e3))
-    except ValueError:  # points on a line
-        return ["no plane fits the depth near the table's height"]
-    share, lean = plane.inliers.mean(), np.degrees(np.arccos(np.clip(plane.normal[2], -1.0, 1.0)))
-    if share < FLAT:
-        return [f"only {share:.0%} of the points near the table's height lie on one plane: is it noise, or no table?"]
-    said = []
+        return [_nothing_near(points, camera, table_z, share=len(P) / len(points))]
+    if chosen is not None and abs(height_of(chosen) - table_z) > NEAR - RISE:  # cut by the bounds of what is near
+        return [_off_the_pose(chosen.plane.normal, height_of(chosen) - table_z, table_z)]
+    if chosen is not None:
+        inliers = np.abs(P @ chosen.plane.normal + chosen.plane.offset) < THICK
+        plane = Plane(chosen.plane.normal, chosen.plane.offset, inliers, chosen.plane.residual)
+    else:
+        try:
+            plane = fit_plane(P, tries=100, viewer=(0.0, 0.0, 1e3))
+        except ValueError:  # points on a line
+            return ["no plane fits the depth near the table's height"]
+        share = plane.inliers.mean()
+        if share < FLAT:
+            said = f"only {share:.0%} of the points near the table's height lie on one plane"
+            return [f"{said}: is it noise, or no table?"]
     rise = float(P[plane.inliers, 2].mean()) - table_z
-    if lean > LEAN or abs(rise) > RISE:
-        likely = "T_base_cam is likely wrong" if lean > LEAN else f"table_z is likely {table_z + rise:.3f} m"
-        said.append(
-            f"the table that depth shows lies {1000.0 * rise:+.0f} mm off table_z = {table_z:.3f} m and leans by "
-            f"{lean:.1f} degrees: {likely}"
-        )
-    sides = np.sqrt(12.0 * np.linalg.eigvalsh(np.cov(P[plane.inliers, :2].T)))  # of a rectangle that spreads so
-    under = np.mean(P[:, 2] < table_z + rise - 0.02)
-    if sides[1] < TOP and under > 0.1:
-        said.append(
-            f"the plane taken for the table is {100.0 * sides[1]:.0f} x {100.0 * sides[0]:.0f} cm large, and "
-            f"{under:.0%} of the points around lie under it: is it the top of a box?"
-        )
-    away = float(np.median(frame.depth[::step, ::step].reshape(-1)[near][plane.inliers]))
-    if not NEAREST < away < FAR:
-        said.append(
-            f"the table is {away:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
-        )
-    if not said and perception is not None and perception.probabilities is not None:
-        labels = perception.labels[::step, ::step].reshape(-1)[near][plane.inliers]
-        surface = np.mean(labels == SURFACE)
-        if perception.probabilities.shape[2] == len(CLASSES) and surface < 0.5:
-            said.append(
-                f"this picture is unlike the training's: {surface:.0%} of the table's pixels are called surface; "
-                + _unusual(frame.rgb, 1000.0 * away / frame.K[0, 0], 1000.0 * plane.residual)
-            )
+    away = float(np.median(frame.depth[thinned].reshape(-1)[near][plane.inliers]))
+    labels = None if perception is None else perception.labels[thinned].reshape(-1)[near][plane.inliers]
+    table = Table(P, plane, table_z, rise, away, labels)
+    wrong = [_off_the_pose(plane.normal, rise, table_z), _too_near_or_far(table)]
+    wrong += [_not_the_likeliest(chosen, tables)]
+    if any(wrong) or perception is None or perception.probabilities is None:
+        return wrong
+    return [_unlike_training(frame, table)] if perception.probabilities.shape[2] == len(CLASSES) else []
+
+
+LOW = 0.05  # metres over the table: a camera that is lower sees no table
+
+
+def _camera_too_low(frame: RGBDFrame, height: float) -> str:
+    if np.array_equal(frame.T_base_cam, np.eye(4)):
+        return "T_base_cam is the identity, as if the camera were the base: no pose is known, and no table"
+    return (
+        f"the camera stands {height:.2f} m over the table by T_base_cam and table_z: is it T_cam_base, or another "
+        "table's height?"
+    )
+
+
+def _not_the_likeliest(chosen, tables) -> str:
+    """The plane at the stated height may be another than the one that things stand on."""
+    if chosen is None or chosen is tables[0] or tables[0].things < 4.0 * chosen.things:
+        return ""
+    rise = height_of(tables[0]) - height_of(chosen)
+    return f"things stand on another plane, {rise:+.2f} m from the one at the table's height: is it the table?"
+
+
+UNITS = (0.001, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 1000.0)  # by which depth is often wrong
+
+
+def _nothing_near(points: Float[np.ndarray, "N 3"], camera: Float[np.ndarray, "3"], table_z: float, share) -> str:
+    """Say how little is near the table's height, and by which usual factor depth is wrong if most then lies there."""
+    said = f"only {share:.0%} of the picture has depth within {NEAR} m of the table's height"
+    z = points[np.isfinite(points[:, 2]), 2]
+    for factor in UNITS:
+        if len(z) and np.mean(np.abs(camera[2] + factor * (z - camera[2]) - table_z) < RISE) > 0.5:
+            return f"{said}; of depth times {factor:g} most lies on the table: is depth_scale wrong?"
     return said
 
 
-def _unit(points: Float[np.ndarray, "N 3"], camera: Float[np.ndarray, "3"], table_z: float) -> str:
-    """Say by which usual factor depth is wrong, if most points then lie on the table."""
-    for factor in UNITS:
-        z = camera[2] + factor * (points[:, 2] - camera[2])
-        if np.mean(np.abs(z - table_z) < RISE) > 0.5:
-            return f"; of depth times {factor:g} most lies on the table: is depth_scale wrong?"
-    return ""
+RISE, LEAN = 0.010, 3.0  # metres and degrees that the table may lie off what pose and table_z say
 
 
-def _unusual(rgb: UInt8[np.ndarray, "H W 3"], pixel: float, noise: float) -> str:
-    """Say which of a picture's facts lie outside what the training's pictures have."""
-    facts = {
-        "millimetres of the table per pixel": pixel,
-        "millimetres of noise on the table's depth": noise,
-        "mean of the colours": rgb.mean(),
-        "mean saturation": cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[..., 1].mean(),
-    }
+def _off_the_pose(normal: Float[np.ndarray, "3"], rise: float, table_z: float) -> str:
+    lean = np.degrees(np.arccos(np.clip(normal[2], -1.0, 1.0)))
+    if lean <= LEAN and abs(rise) <= RISE:
+        return ""
+    likely = "T_base_cam is likely wrong" if lean > LEAN else f"table_z is likely {table_z + rise:.3f} m"
+    return (
+        f"the table that depth shows lies {1000.0 * rise:+.0f} mm off table_z = {table_z:.3f} m and leans "
+        f"by {lean:.1f} degrees: {likely}"
+    )
+
+
+NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see small things
+
+
+def _too_near_or_far(table: Table) -> str:
+    if NEAREST < table.away < FAR:
+        return ""
+    return f"the table is {table.away:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
+
+
+USUAL = {  # from least to most, of 200 scenes of the kinds train, any, test and hard
+    "millimetres of the table per pixel": (1.1, 5.5),
+    "millimetres of noise on the table's depth": (0.0, 4.0),
+    "mean of the colours": (39, 190),
+    "mean saturation": (27, 232),
+}
+
+
+def _unlike_training(frame: RGBDFrame, table: Table) -> str:
+    """Where little of the table is called surface: say which of the picture's facts the training's pictures lack."""
+    surface = np.mean(table.labels == SURFACE)
+    if surface >= 0.5:
+        return ""
+    saturation = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2HSV)[..., 1].mean()
+    noise = 1000.0 * table.plane.residual
+    facts = zip(USUAL, (1000.0 * table.away / frame.K[0, 0], noise, frame.rgb.mean(), saturation), strict=True)
     outside = [
         f"{value:.1f} {what} (training's are {USUAL[what][0]} to {USUAL[what][1]})"
-        for what, value in facts.items()
+        for what, value in facts
         if not USUAL[what][0] <= value <= USUAL[what][1]
     ]
-    return ", ".join(outside) or "size of pixels, noise, brightness and saturation are as the training's"
+    why = ", ".join(outside) or "size of pixels, noise, brightness and saturation are as the training's"
+    return f"this picture is unlike the training's: {surface:.0%} of the table's pixels are called surface; {why}"
+
+
+# ------------------------------------------------------------------------------------------ depth and targets
+
+SHIFT = 3  # pixels between colour and depth that go unnoticed
+REACH = 20  # pixels within which a shift is looked for
+JUMP = 0.12  # of the Sobel filter on the logarithm of depth: more is the edge of a thing
+HOLE = 12  # pixels that a thing's shadow, where a camera reads no depth, is wide at most
+PEAK, SURE = 4.0, 1.5  # a shift fits that much better: than usual ones, in standard deviations; than none, as a factor
 
 
 def _shifted(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"]) -> str:
-    """Look for the shift at which jumps of depth lie on edges of colour best."""
+    """Look for the shift at which jumps of depth lie on edges of colour that run the same way."""
     step = max(1, round(rgb.shape[1] / 640))
     smooth = cv2.GaussianBlur(rgb, (0, 0), float(step)).astype(np.float32)[::step, ::step]
-    colour = np.sqrt(sum((cv2.Sobel(smooth, cv2.CV_32F, *way) ** 2).sum(axis=2) for way in ((1, 0), (0, 1))))
-    colour = np.minimum(colour, np.percentile(colour, 97))
-    d = np.ascontiguousarray(np.nan_to_num(depth[::step, ::step]))
-    around = np.ones((3, 3), np.uint8)
-    near, far = cv2.erode(np.where(d > 0.0, d, d.max()), around), cv2.dilate(d, around)
-    jumps = (far > 1.03 * near).astype(np.float32)[REACH:-REACH, REACH:-REACH]
-    if jumps.sum() < 100:
+    if min(smooth.shape[:2]) < 4 * REACH:  # too small to shift about in
         return ""
-    score = cv2.matchTemplate(colour, jumps, cv2.TM_CCORR)  # [REACH, REACH] is no shift
+    filled, around = np.ascontiguousarray(np.nan_to_num(depth[::step, ::step])), np.ones((3, 3), np.uint8)
+    if min(filled.shape) <= 4 * REACH:
+        return ""  # too small to tell a shift from anything else
+    for _ in range(HOLE):  # what is hidden is behind: it is as far as the farthest that is seen close by
+        filled = np.where(filled > 0.0, filled, cv2.dilate(filled, around))
+    filled = np.log(np.where(filled > 0.0, filled, filled.max()))
+    score, count = 0.0, 0
+    for way in ((1, 0), (0, 1)):
+        colour = np.sqrt((cv2.Sobel(smooth, cv2.CV_32F, *way) ** 2).sum(axis=2))
+        colour = np.minimum(colour, np.percentile(colour, 97))
+        colour -= cv2.blur(colour, (2 * REACH + 1, 2 * REACH + 1))  # edges, not textures
+        jumps = (np.abs(cv2.Sobel(filled, cv2.CV_32F, *way)) > JUMP).astype(np.float32)[REACH:-REACH, REACH:-REACH]
+        count += jumps.sum()
+        score = score + cv2.matchTemplate(colour, jumps, cv2.TM_CCORR)  # [REACH, REACH] is no shift
+    if count < 100:
+        return ""
     score -= np.median(score)
     dy, dx = np.array(np.unravel_index(score.argmax(), score.shape)) - REACH
-    if max(abs(dx), abs(dy)) == REACH or score.max() < 4.0 * score.std():  # a slope, or noise, and no peak
+    if max(abs(dx), abs(dy)) == REACH or score.max() < PEAK * score.std():  # a slope, or noise, and no peak
         return ""
     here = score[REACH - 2 : REACH + 3, REACH - 2 : REACH + 3].max()
-    if max(abs(dx), abs(dy)) * step <= SHIFT or score.max() < 1.15 * here:
+    if max(abs(dx), abs(dy)) * step <= SHIFT or score.max() < SURE * here:
         return ""
     return f"depth lies ({-dx * step}, {-dy * step}) pixels off the colours: is it aligned to colour, of one moment?"
 
@@ -177,22 +254,25 @@ def _blind(frame: RGBDFrame, perception) -> str:
     return f"{blind} of {count} pixels labelled target have no depth" if blind > 0.5 * count else ""
 
 
+LUMP = 0.35  # metres: nothing that a hand grasps is longer
+WAYS = np.radians(np.arange(0.0, 180.0, 10.0))  # directions along which a target is measured
+
+
 def _targets(perception) -> list[str]:
-    said, (w, h) = [], perception.frame.size
-    rgb = colour_shares(perception.frame.rgb)
-    ways = np.radians(np.arange(0.0, 180.0, 10.0))
-    ways = np.stack([np.cos(ways), np.sin(ways)])
+    said = [*perception.left_out]
     for number, (pixels, cloud) in enumerate(zip(perception.pixels, perception.clouds, strict=True), start=1):
-        v, u = np.divmod(pixels, w)
-        if u.min() == 0 or v.min() == 0 or u.max() == w - 1 or v.max() == h - 1:
-            said.append(f"target {number} touches the picture's border: a part of it is unseen")
-        box = np.s_[v.min() : v.max() + 1, u.min() : u.max() + 1]
-        mask = np.zeros(rgb[box].shape[:2], bool)
-        mask[v - v.min(), u - u.min()] = True
-        parts = [part for part in colour_regions(mask, rgb[box]) if part.sum() > PART * len(pixels)]
-        length = np.ptp(np.percentile(cloud[:, :2] @ ways, [1, 99], axis=0), axis=0).max()
-        if length > LONG:
-            said.append(f"target {number} is {100.0 * length:.0f} cm long: is it two things that touch?")
-        elif len(parts) > 1:
-            said.append(f"target {number} falls into {len(parts)} regions of colour: is it two things that touch?")
+        what = _cut_off(pixels, perception.frame.size), _lump(cloud)
+        said += [f"target {number} {sentence}" for sentence in what if sentence]
     return said
+
+
+def _cut_off(pixels: Integer[np.ndarray, "_"], size: tuple[int, int]) -> str:
+    (w, h), (v, u) = size, np.divmod(pixels, size[0])
+    inside = min(u.min(), v.min()) > 0 and u.max() < w - 1 and v.max() < h - 1
+    return "" if inside else "touches the picture's border: a part of it is unseen"
+
+
+def _lump(cloud: Float[np.ndarray, "N 3"]) -> str:
+    along = cloud[:, :2] @ np.stack([np.cos(WAYS), np.sin(WAYS)])
+    length = np.ptp(np.percentile(along, [1, 99], axis=0), axis=0).max()
+    return f"is one lump of {100.0 * length:.0f} cm: things that were not told apart?" if length > LUMP else ""

@@ -1,6 +1,7 @@
 """The whole chain: RGBDFrame -> class probabilities -> labels -> target clouds in the base frame -> grasps."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -11,9 +12,10 @@ import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
 from labkit.frame import RGBDFrame
-from labkit.geometry import back_project_to_base, cluster_indices, inliers
+from labkit.geometry import Table, back_project_to_base, cluster_indices, find_tables, inliers
+from labkit.geometry.tables import reasons_against, table_at
 from labkit.grasp import Grasp, GraspPlan, Gripper, plan_grasps
-from labkit.labels import IGNORE, TARGET
+from labkit.labels import IGNORE, OBSTACLE, TARGET
 from labkit.learning.engines import open_engine
 from labkit.learning.inference import Engine, FunctionEngine, check_probabilities
 from labkit.notices import notices
@@ -29,6 +31,8 @@ from labkit.support.validation import (
 
 # What the Panda can reach and meet, in front of it: x, y from its base, z from the table; metres.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
+# Where nothing is said: what was seen over the table, and a little under it for the noise.
+EVERYWHERE = ((-20.0, 20.0), (-20.0, 20.0), (-0.02, 0.5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +43,10 @@ class Perception:
     (H, W). probabilities: (H, W, C) in 0..1, or None where labels came without. points: every pixel in the base frame,
     (H, W, 3), metres, NaN without depth. pixels: the pixels of each target, indices v * W + u, the largest target
     first. clouds: their points, an (N, 3) for each target. scene: all points of the workspace, (M, 3). certainty: for
-    each target the mean probability of its class over its pixels, 1 without probabilities. plan: the grasps ranked by
-    their score times that certainty, or the reason why there is none. seconds: time spent by stage.
+    each target the mean probability of its class over its pixels, or that of the thing if things were found, 1 without
+    either. plan: the grasps ranked by their score times that certainty, or the reason why there is none. seconds: time
+    spent by stage. left_out: what was labelled target and is none, and why, in sentences. tables: without a workspace,
+    the planes that could be the table, the likeliest first.
     """
 
     frame: RGBDFrame
@@ -54,6 +60,8 @@ class Perception:
     certainty: tuple[float, ...]
     plan: GraspPlan
     seconds: dict[str, float] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
 
     @cached_property
     def notices(self) -> tuple[str, ...]:
@@ -66,15 +74,31 @@ class Perception:
         return f"Perception({self.labels.shape[1]} x {self.labels.shape[0]}, {targets}, {grasps})"
 
 
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """What is seen in a frame pixel by pixel: labels, and what they were chosen by, if anything.
+
+    probabilities: (H, W, C), of a network; instances: numbers of objects, (H, W), 0 for none; certainty: of each of
+    these, number 1 first. nothing: why no target stands where one was asked for.
+    """
+
+    labels: UInt8[np.ndarray, "H W"]
+    probabilities: Float[np.ndarray, "H W C"] | None = None
+    instances: Integer[np.ndarray, "H W"] | None = None
+    certainty: tuple[float, ...] | None = None
+    nothing: str = ""
+
+
 class Pipeline:
     """The chain as one object: `Pipeline(model).run(frame)`, which is `perceive` and then `locate`.
 
     model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes), or any function from an
-    RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1; or any function from a frame to the
-    numbers of objects, integers (H, W), 0 for none, whose attribute `gives_instances` is True, such as
-    `labkit.stacks.objects.on_the_table`: then each object is a target. None if labels come from elsewhere, and only
-    `locate` is used. table_z: height of the table in the base frame, metres; None takes the frame's own, or else 0.
-    target_class: what to grasp.
+    RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1. None if labels come from elsewhere, and
+    only `locate` is used. table_z: height of the table in the base frame, metres; None takes the frame's own, or else
+    0. target_class: what to grasp.
+    find_objects: in place of a model, any function from a frame to the numbers of objects, integers (H, W), 0 for none,
+    or to such things as `labkit.learning.things.find_things` gives, which have these numbers and a certainty each: then
+    each object is a target. `anything` makes such a function of a network.
     mirror: let a network look at the image and at its mirror image, and average: a little better, at twice its time;
     None does so for a network that sees the canonical view, whose size, and so its time, no picture changes.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.learning.engines): equal numbers, other
@@ -82,7 +106,9 @@ class Pipeline:
     crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
     refines those of a network, and leaves those of a plain function, which decides for itself.
     workspace: ((x, x), (y, y), (z, z)), from and to, metres in the base frame, z from the table: what the arm can meet;
-    nothing outside is a target or an obstacle. gripper: the hand that the planner plans for.
+    nothing outside is a target or an obstacle. None if nobody knows it: then the table is looked for at its height, and
+    what does not stand on it, or hangs into the picture from its border, is no target. gripper: the hand that the
+    planner plans for.
     back_project: function (depth, K, T_base_cam) -> (H, W, 3). split: function of the target's points (N, 3) to a list
     of index arrays, one for each object. grasp: function (clouds, scene, table_z, camera_position) -> GraspPlan, in
     place of the kit's planner. Raises ValueError for an argument that does not fit. Topics 03, 06 and 07.
@@ -101,17 +127,19 @@ class Pipeline:
         table_z: float | None = None,
         target_class: int = TARGET,
         *,
+        find_objects: Callable[[RGBDFrame], object] | None = None,
         mirror: bool | None = None,
         engine: str = "torch",
         crf: bool | Callable[[np.ndarray, RGBDFrame], np.ndarray] | None = None,
-        workspace: Sequence[Sequence[float]] = WORKSPACE,
+        workspace: Sequence[Sequence[float]] | None = WORKSPACE,
         gripper: Gripper | None = None,
         back_project: Callable = back_project_to_base,
         split: Callable[[np.ndarray], Sequence[np.ndarray]] | None = None,
         grasp: Callable[..., GraspPlan] | None = None,
     ):
-        self.gives_instances = getattr(model, "gives_instances", False)
-        self.model = model if model is None or self.gives_instances else open_engine(model, engine)
+        require("find_objects", model is None or find_objects is None, "none beside a model", "both")
+        self.model = None if model is None else open_engine(model, engine)
+        self.find_objects = find_objects
         check_whole("target_class", target_class, 0, (getattr(self.model, "num_classes", None) or IGNORE) - 1)
         if grasp is not None and gripper is not None:
             raise ValueError("gripper: expected none beside `grasp`, which plans for its own; got both")
@@ -121,26 +149,37 @@ class Pipeline:
         self.mirror = sees_view if mirror is None else mirror
         crf = not isinstance(self.model, FunctionEngine) if crf is None else crf
         self.crf = refine_labels if crf is True else crf
+        self.only_on_table = workspace is None
+        workspace = EVERYWHERE if workspace is None else workspace
         self.workspace = check_finite("workspace", check_shape("workspace", workspace, (3, 2))).astype(np.float64)
         if not (self.workspace[:, 0] < self.workspace[:, 1]).all():
             raise ValueError(f"workspace: expected from < to for each of x, y and z, got {self.workspace.tolist()}")
         self.back_project = back_project
         self.split = split or separate_objects
-        self.grasp = grasp or partial(plan_grasps, gripper=gripper or Gripper())
+        self.gripper = gripper or Gripper()
+        self.grasp = grasp or partial(plan_grasps, gripper=self.gripper)
 
-    def run(self, frame: RGBDFrame) -> Perception:
-        """From a frame to grasps: `perceive`, then `locate`."""
+    def run(self, frame: RGBDFrame, at: Sequence | None = None) -> Perception:
+        """From a frame to grasps: `perceive`, then `locate`.
+
+        at: a pixel (u, v), column and row: the thing there is the only target, whatever its class and wherever in the
+        workspace it stands; if there is none, the plan's reason says what is there. A network that tells things apart,
+        or `find_objects`, says which pixels it has; of a network of classes alone those that hang together. Raises
+        ValueError for a pixel outside the picture.
+        """
         frame, seconds = self._on_table(frame), {}
-        labels, probabilities, instances = self._perceive(frame, seconds)
-        return self._locate(frame, _check_labels_of(frame, labels), probabilities, instances, seconds)
+        at = None if at is None else _check_pixel("at", at, frame.size)
+        seen = self._perceive(frame, seconds, at is not None)
+        return self._locate(frame, seen, seconds, at)
 
     def perceive(self, frame: RGBDFrame) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"] | None]:
         """Label every pixel: labels, and the class probabilities that they were chosen by.
 
-        A model that gives instances has no probabilities, and its labels are the target's or 0. Raises ValueError
-        without a model, or for one that gives no probabilities or has no such class as the target.
+        `find_objects` has no probabilities, and its labels are the target's or 0. Raises ValueError without it and a
+        model, or for a model that gives no probabilities or has no such class as the target.
         """
-        return self._perceive(self._on_table(frame), {})[:2]
+        seen = self._perceive(self._on_table(frame), {})
+        return seen.labels, seen.probabilities
 
     def locate(
         self,
@@ -148,20 +187,22 @@ class Pipeline:
         labels: Integer[np.ndarray, "H W"],
         probabilities: Float[np.ndarray, "H W C"] | None = None,
         instances: Integer[np.ndarray, "H W"] | None = None,
+        at: Sequence | None = None,
     ) -> Perception:
         """Find the labelled targets in space, and grasps for them.
 
         labels: of this pipeline's `perceive`, true ones, or anybody's: any classes, 255 for "unknown". probabilities:
         what they were chosen by, if anything. instances: numbers of objects, 0 for none, in place of `split`: of the
-        pixels labelled target, those of one number are one target. Raises ValueError naming the argument that does not
-        fit.
+        pixels labelled target, those of one number are one target. at: as in `run`. Raises ValueError naming the
+        argument that does not fit.
         """
         labels = _check_labels_of(frame, labels)
         if probabilities is not None:
             probabilities = self._with_target(check_probabilities(probabilities, labels.shape))
         if instances is not None:
             instances = _check_instances_of(frame, instances)
-        return self._locate(self._on_table(frame), labels, probabilities, instances, {})
+        at = None if at is None else _check_pixel("at", at, frame.size)
+        return self._locate(self._on_table(frame), Labelled(labels, probabilities, instances), {}, at)
 
     def _on_table(self, frame: RGBDFrame) -> RGBDFrame:
         """The frame with the height of the table that counts: this pipeline's, or else its own, or else 0."""
@@ -174,35 +215,112 @@ class Pipeline:
             raise ValueError(f"target_class: expected one of the {C} classes of probabilities, got {self.target_class}")
         return probabilities
 
-    def _perceive(self, frame: RGBDFrame, seconds: dict[str, float]):
-        require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
-        if self.gives_instances:
+    def _perceive(self, frame: RGBDFrame, seconds: dict[str, float], things: bool = False) -> Labelled:
+        """things: tell things apart beside their classes, if the network can."""
+        if self.find_objects is not None:
             with timed(seconds, "objects"):
-                instances = _check_instances_of(frame, self.model(frame))
-            return np.where(instances > 0, self.target_class, 0).astype(np.uint8), None, instances
+                instances, certainty = _numbers(frame, self.find_objects(frame))
+            labels = np.where(instances > 0, self.target_class, 0).astype(np.uint8)
+            return Labelled(labels, instances=instances, certainty=certainty)
+        require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
+        instances = certainty = None
         with timed(seconds, "network"):
-            probabilities = self._with_target(self.model(frame, self.mirror))
+            if things and tells_things(self.model):  # by the same run of the network
+                from labkit.learning.things import find_things
+
+                found = find_things(self.model, frame, self.mirror)
+                instances, certainty = _numbers(frame, found)
+                probabilities = self._with_target(found.probabilities)
+            else:
+                probabilities = self._with_target(self.model(frame, self.mirror))
         with timed(seconds, "labels"):
             labels = most_probable(probabilities)
         if self.crf:
             with timed(seconds, "crf"):
                 labels = self.crf(probabilities, frame)
-        return labels, probabilities, None
+        return Labelled(_check_labels_of(frame, labels), probabilities, instances, certainty)
 
-    def _locate(self, frame: RGBDFrame, labels, probabilities, instances, seconds: dict[str, float]) -> Perception:
+    def _locate(self, frame: RGBDFrame, seen: Labelled, seconds: dict[str, float], at=None) -> Perception:
         with timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
         with timed(seconds, "clouds"):
-            pixels, clouds, scene = self.targets(labels, points, frame.table_z, instances)
+            if at is not None:
+                seen = self._only_at(at, seen, points, frame.table_z)
+            pixels, clouds, scene = self.targets(seen.labels, points, frame.table_z, seen.instances)
+            tables, left_out = (), ()
+            if self.only_on_table and at is None:
+                tables, kept, left_out = _on_the_table(points, pixels, frame)
+                pixels, clouds = [pixels[i] for i in kept], [clouds[i] for i in kept]
         with timed(seconds, "grasps"):
             plan = self.plan(clouds, scene, frame.table_z, frame.T_base_cam[:3, 3])
-            certainty = tuple(1.0 for _ in pixels)
-            if probabilities is not None:
-                of_target = probabilities[..., self.target_class].reshape(-1)
-                certainty = tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
+            if not clouds and len(scene):
+                plan = replace(plan, reason=seen.nothing or "; ".join(left_out) or self._why_none(seen, points, frame))
+            certainty = self._certainty(seen, pixels)
             plan = rank(plan, certainty)
-        known = labels, probabilities, points, pixels, clouds, scene, certainty, plan, seconds
-        return Perception(frame, self.target_class, *known)
+        return Perception(
+            frame=frame,
+            target_class=self.target_class,
+            labels=seen.labels,
+            probabilities=seen.probabilities,
+            points=points,
+            pixels=pixels,
+            clouds=clouds,
+            scene=scene,
+            certainty=certainty,
+            plan=plan,
+            seconds=seconds,
+            left_out=left_out,
+            tables=tables,
+        )
+
+    def _certainty(self, seen: Labelled, pixels: Sequence[Integer[np.ndarray, "_"]]) -> tuple[float, ...]:
+        """For each target its own certainty, or the mean probability of its class; 1 where nothing is known."""
+        if seen.certainty is not None:
+            numbers = seen.instances.reshape(-1)
+            return tuple(float(seen.certainty[numbers[chosen[0]] - 1]) for chosen in pixels)
+        if seen.probabilities is None or seen.instances is not None:
+            return tuple(1.0 for _ in pixels)
+        of_target = seen.probabilities[..., self.target_class].reshape(-1)
+        return tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
+
+    def _only_at(self, at: tuple[int, int], seen: Labelled, points, table_z: float) -> Labelled:
+        """Make the thing at a pixel (u, v) the only target; what else was one is an obstacle."""
+        u, v = at
+        numbers = seen.instances
+        if numbers is None:
+            numbers = np.zeros(seen.labels.shape, np.int32)
+            pixels = np.flatnonzero(np.isin(seen.labels, (self.target_class, OBSTACLE)) & np.isfinite(points[..., 2]))
+            for number, group in enumerate(self.split(points.reshape(-1, 3)[pixels]), start=1):
+                numbers.ravel()[pixels[group]] = number
+        labels = np.where(seen.labels == self.target_class, OBSTACLE, seen.labels).astype(np.uint8)
+        number, height = int(numbers[v, u]), float(points[v, u, 2]) - table_z
+        if number == 0:
+            there = "what has no depth" if np.isnan(height) else f"what lies {1000.0 * height:.0f} mm over it"
+            there = "the table" if abs(height) < ON_TABLE else there
+            said = f"no thing was found at ({u}, {v}): the pixel shows {there}"
+            return replace(seen, labels=labels, instances=np.zeros_like(numbers), nothing=said)
+        labels[numbers == number] = self.target_class
+        certainty = (1.0,) if seen.certainty is None else (seen.certainty[number - 1],)
+        return replace(seen, labels=labels, instances=(numbers == number).astype(np.int32), certainty=certainty)
+
+    def _why_none(self, seen: Labelled, points: Float[np.ndarray, "H W 3"], frame: RGBDFrame) -> str:
+        """Say why no pixel that is labelled target became part of one."""
+        P = points[seen.labels == self.target_class]
+        if not len(P):
+            return NO_TARGET
+        known = P[np.isfinite(P[:, 2])] - (0.0, 0.0, frame.table_z)
+        if not len(known):
+            return f"{NO_TARGET}: the {len(P)} pixels labelled target have no depth"
+        sides = ("before", "beyond"), ("right of", "left of"), ("under", "above")
+        outside = Counter()
+        for axis, (low, high) in enumerate(self.workspace):
+            outside[sides[axis][0]] = np.count_nonzero(known[:, axis] <= low)
+            outside[sides[axis][1]] = np.count_nonzero(known[:, axis] >= high)
+        where, count = outside.most_common(1)[0]
+        if count > 0.5 * len(known):
+            span = " ".join(f"{x:g}" for x in self.workspace.ravel())
+            return f"{NO_TARGET}: {count} of the {len(P)} labelled target lie {where} the workspace, {span}"
+        return f"{NO_TARGET} that hang together: {len(P)} pixels are labelled target, {len(known)} of them have depth"
 
     def targets(
         self,
@@ -233,6 +351,58 @@ class Pipeline:
         if len(scene) == 0:
             return GraspPlan(reason="nothing that the camera saw lies in the workspace")
         return self.grasp(clouds, scene, table_z, camera_position)
+
+
+NO_TARGET = "no target points"  # as the planner says
+ON_TABLE = 0.01  # metres over or under the table's height: what is there is the table
+
+
+def anything(model=None, mirror: bool = True) -> Callable[[RGBDFrame], object]:
+    """Make a function that finds things of any class, for `find_objects`: `labkit.learning.things.find_things`.
+
+    model: a network or an engine that tells things apart; None is the kit's own, unet_rgbd. mirror: as in `Pipeline`.
+    Raises ValueError for a network of classes alone. Topic 03.
+    """
+    from labkit.learning.network import load_model, weights_path
+    from labkit.learning.things import check_tells_things, find_things
+
+    engine = open_engine(load_model(weights_path("unet_rgbd")) if model is None else model)
+    return partial(find_things, check_tells_things(engine), mirror=mirror)
+
+
+def tells_things(model) -> bool:
+    """Whether a network or an engine says at each pixel which thing it belongs to."""
+    return bool(getattr(open_engine(model), "things", False))
+
+
+def _on_the_table(points, pixels, frame: RGBDFrame) -> tuple[tuple[Table, ...], list[int], tuple[str, ...]]:
+    """The planes that were found, which things stand on the table, and what is said of the others."""
+    tables = find_tables(points, frame.T_base_cam[:3, 3], up=(0.0, 0.0, 1.0))
+    table = table_at(tables, frame.table_z)
+    if table is None:
+        why = [f"do not stand on the table, for there is no plane at its height, {frame.table_z:.3f} m"] * len(pixels)
+    else:
+        why = reasons_against(table, tables, points, pixels)
+    kept = [i for i, reason in enumerate(why) if not reason]
+    counts = Counter(filter(None, why))
+    said = (
+        f"{n} of {len(pixels)} targets {reason}; a workspace says what the arm may meet" for reason, n in counts.items()
+    )
+    return tuple(tables), kept, tuple(said)
+
+
+def _numbers(frame: RGBDFrame, found) -> tuple[Integer[np.ndarray, "H W"], tuple[float, ...] | None]:
+    """The numbers of objects that `find_objects` gave, and the certainty of each if it said so."""
+    instances = _check_instances_of(frame, getattr(found, "instances", found))
+    return instances, getattr(found, "certainty", None)
+
+
+def _check_pixel(name: str, at, size: tuple[int, int]) -> tuple[int, int]:
+    """Return a pixel (u, v) as whole numbers if it lies in a picture of (width, height) `size`."""
+    u, v = check_finite(name, check_shape(name, at, (2,)))
+    fits = 0 <= round(u) < size[0] and 0 <= round(v) < size[1]
+    require(name, fits, f"a pixel (u, v) of the picture of {size[0]} x {size[1]}", f"({u:g}, {v:g})")
+    return round(u), round(v)
 
 
 def _check_labels_of(frame: RGBDFrame, labels) -> UInt8[np.ndarray, "H W"]:

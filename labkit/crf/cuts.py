@@ -1,4 +1,6 @@
-"""Many classes by a sequence of minimum cuts: expansion and swap moves (Boykov, Veksler and Zabih 2001).
+"""Many classes by a sequence of minimum cuts: expansion and swap moves.
+
+Boykov, Veksler and Zabih 2001, "Fast approximate energy minimization via graph cuts", doi:10.1109/34.969114.
 
 For three classes and more the minimum is NP-hard to find. But the best of exponentially many small changes can be found
 by one cut: let every pixel choose between its label and alpha (expansion), or let the pixels of two labels choose
@@ -18,6 +20,7 @@ from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE, Graph, max_flow, new_forest
 from labkit.crf.messages import _trws
 from labkit.crf.move_kernels import RING, expansion_move, swap_move
+from labkit.support.validation import MAX_ITERATIONS, check_whole
 
 START_SWEEPS = 6
 # How far flow is pushed on without search trees, in pixels: from a good start the ways are shorter than in one cut.
@@ -51,6 +54,7 @@ def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4)
 
     TRW-S stops after `iterations`, or once its own gap is below `tolerance`; the moves then shrink it further.
     """
+    check_whole("iterations", iterations, 1, MAX_ITERATIONS)
     integer = quantise(crf)
     start = _trws(crf, integer, iterations, tolerance)
     finish = _expansion(crf, integer, start.labels)
@@ -127,7 +131,7 @@ class Moves:
 
     def swap(self, alpha: int, beta: int) -> bool:
         """Label the pixels of alpha and beta anew with these two, as is best; return whether the energy fell."""
-        present, flow, tree = self.cut(swap_move, alpha, beta)
+        present, flow, tree = self.cut(swap_move, (alpha, beta))
         if flow == present:
             return False
         before = self.labels[self.nodes]
@@ -135,7 +139,7 @@ class Moves:
         self.labels[self.nodes[part]] = np.where(tree[part] == SOURCE, beta, alpha)
         return True
 
-    def cut(self, question: Callable, *classes: int, near: int = NEAR):
+    def cut(self, question: Callable, *classes: int | tuple[int, int], near: int = NEAR):
         """Put a question of `move_kernels` to the free pixels: what it returns, the flow, and each pixel's tree."""
         integer = self.integer
         answer = question(

@@ -1,4 +1,4 @@
-"""The dense CRF: every pixel is every other's neighbour (Kraehenbuehl and Koltun 2011).
+"""The dense CRF: every pixel is every other's neighbour (Kraehenbuehl and Koltun 2011, arXiv:1210.5644).
 
     w_pq = w_appearance exp(-|p - q|^2 / (2 theta_alpha^2) - |I_p - I_q|^2 / (2 theta_beta^2))
          + w_smoothness exp(-|p - q|^2 / (2 theta_gamma^2))
@@ -8,11 +8,16 @@ message to a pixel is a weighted mean of all q's, which is one Gaussian filter i
 """
 
 import numpy as np
-from jaxtyping import Float, Num
+from jaxtyping import Float, Int, Num
+from scipy.sparse import coo_array, csr_array, eye_array
+from scipy.special import softmax
 
-from labkit.crf import lattice_kernels as lattice
 from labkit.crf.energy import check_channels
-from labkit.support.validation import check_finite, check_shape, require
+from labkit.support.validation import MAX_ITERATIONS, check_finite, check_number, check_shape, check_whole, require
+
+MAX_COST = 1e30  # of unary and weights: with it all sums stay within float32
+MAX_STEPS = 2**16  # scales that an image may span: float32 leaves the lattice's coordinates four bits behind the point
+MAX_CHANNELS = 16  # a pixel has (channels + 3)^2 coordinates
 
 
 def dense_crf(
@@ -30,7 +35,8 @@ def dense_crf(
 
     unary: finite costs. theta_alpha and theta_gamma in pixels, theta_beta in the image's units. The kernels are
     normalised symmetrically, so that the weights do not depend on the image's size; they are approximated on the
-    permutohedral lattice. Raises ValueError naming the argument that does not fit.
+    permutohedral lattice. Raises ValueError naming the argument that does not fit, such as a scale of which the image
+    spans more than 2^16.
 
     >>> unary = np.zeros((4, 4, 2)) + (0.0, 1.0)
     >>> unary[1, 1] = (1.0, 0.0)  # one pixel stands out
@@ -39,65 +45,95 @@ def dense_crf(
     """
     unary = check_finite("unary", check_shape("unary", unary, (None, None, None)))
     require("unary", 0 not in unary.shape, "at least one pixel and class", f"shape {unary.shape}")
-    numbers = {"theta_alpha": theta_alpha, "theta_beta": theta_beta, "theta_gamma": theta_gamma}
-    numbers |= {"w_appearance": w_appearance, "w_smoothness": w_smoothness}
-    for name, number in numbers.items():
-        if not (0.0 <= number < np.inf) or (number == 0.0 and name.startswith("theta")):
-            raise ValueError(f"{name}: expected a finite number {'above' if 'theta' in name else '>='} 0, got {number}")
-    require("iterations", iterations >= 0, "at least 0", iterations)
+    largest = float(np.abs(unary, dtype=np.float64).max())
+    require("unary", largest <= MAX_COST, f"costs of at most {MAX_COST:g}", f"one of size {largest:g}")
+    check_whole("iterations", iterations, 0, MAX_ITERATIONS)
+    for name, weight in (("w_appearance", w_appearance), ("w_smoothness", w_smoothness)):
+        check_number(name, weight, 0.0, MAX_COST)
     H, W, C = unary.shape
-    colours = check_channels("image", check_finite("image", image), unary).astype(np.float32)
+    colours = check_channels("image", check_finite("image", image), unary)
+    require("image", colours.shape[2] <= MAX_CHANNELS, f"at most {MAX_CHANNELS} channels", colours.shape[2])
+    span = float(np.abs(colours, dtype=np.float64).max(initial=0.0))
+    spans = (("theta_alpha", theta_alpha, max(H, W)), ("theta_beta", theta_beta, span))
+    for name, scale, values in (*spans, ("theta_gamma", theta_gamma, max(H, W))):
+        check_number(name, scale, max(values / MAX_STEPS, 1e-30), 1e30)
+    colours = colours.astype(np.float32)
     v, u = np.indices((H, W), np.float32)
     appearance = np.dstack([u / theta_alpha, v / theta_alpha, colours / theta_beta])
     smoothness = np.dstack([u / theta_gamma, v / theta_gamma])
-    kernels = [(w_appearance, GaussianFilter(appearance)), (w_smoothness, GaussianFilter(smoothness))]
+    kernels = [(w_appearance, GaussianFilter("theta_alpha and theta_beta", appearance))]
+    kernels.append((w_smoothness, GaussianFilter("theta_gamma", smoothness)))
     minus_unary = -unary.reshape(H * W, C).astype(np.float32)
-    q = softmax_of_rows(minus_unary)
+    q = softmax(minus_unary, axis=1)
     for _ in range(iterations):
-        z = minus_unary.copy()
-        for weight, gaussian in kernels:
-            gaussian.add_filtered(q, weight, z)
-        q = softmax_of_rows(z)
+        q = softmax(minus_unary + sum(weight * gaussian.filtered(q) for weight, gaussian in kernels), axis=1)
     return q.reshape(H, W, C)
 
 
-def softmax_of_rows(z: Float[np.ndarray, "N C"]) -> Float[np.ndarray, "N C"]:
-    """Turn each row of float32 into probabilities: by columns, since NumPy is slow along rows so short."""
-    top = z[:, 0]
-    for c in range(1, z.shape[1]):
-        top = np.maximum(top, z[:, c])
-    p = np.exp(z - top[:, None])
-    return p / (p @ np.ones(z.shape[1], np.float32))[:, None]
-
-
 class GaussianFilter:
-    """exp(-|f_p - f_q|^2 / 2) between all pixels, symmetrically normalised: K_pq / sqrt(sum_q K_pq sum_p K_pq)."""
+    """exp(-|f_p - f_q|^2 / 2) between all pixels, symmetrically normalised: K_pq / sqrt(sum_q K_pq sum_p K_pq).
 
-    def __init__(self, features: Float[np.ndarray, "H W d"]):
-        """features: each channel divided by its standard deviation; ValueError for a range too large to index."""
+    On the permutohedral lattice (Adams, Baek and Davis 2010): each pixel gives its values to the d + 1 corners of the
+    simplex around its features (splat), corners exchange with their neighbours along d + 1 directions (blur), and each
+    pixel collects from its corners again (slice). The work is linear in the number of pixels and in d^2.
+    """
+
+    def __init__(self, name: str, features: Float[np.ndarray, "H W d"]):
+        """features: each channel divided by its deviation; a ValueError with `name` for a range too large to index."""
         d = features.shape[2]
         elevated = features.reshape(-1, d).astype(np.float32) @ elevation(d).T.astype(np.float32)
-        margin = 3 * (d + 1)  # corners and their neighbours stay within it
-        lowest = np.floor(elevated.min(axis=0)).astype(np.int64) - margin
-        size = np.ceil(elevated.max(axis=0)).astype(np.int64) + margin - lowest
+        corners, weights = corners_of_pixels(elevated)
+        # A corner is one integer, key = coordinates . stride: a step along a direction adds a constant to it.
+        lowest = corners.min(axis=(0, 1)) - (d + 1)
+        size = corners.max(axis=(0, 1)) + (d + 1) - lowest
         if np.prod(size[:d].astype(np.float64)) > 2.0**62:
-            raise ValueError(f"theta: expected larger scales; {d} features span up to {size.max()} lattice steps")
-        stride = np.cumprod(np.concatenate([[1], size[: d - 1]]))
-        keys, self.weights = lattice.corners_of_pixels(elevated, lowest, stride)
-        found, corner = np.unique(keys, return_inverse=True)
-        self.corner = 1 + corner.reshape(keys.shape).astype(np.int32)
+            raise ValueError(f"{name}: expected larger scales; {d} features span up to {size.max()} lattice steps")
+        stride = np.cumprod([1, *size[: d - 1]])
+        found, corner = np.unique((corners - lowest)[..., :d] @ stride, return_inverse=True)
+        first = np.arange(0, corner.size + 1, d + 1)
+        self.splat = csr_array((weights.ravel(), corner.ravel(), first), shape=(len(weights), len(found)))
         # A step along direction j adds d + 1 to coordinate j and takes 1 from all; the last one has no place in keys.
         steps = np.append((d + 1) * stride, 0) - stride.sum()
-        self.near = lattice.neighbour_corners(found, steps)
-        self.scale = np.ones(len(keys), np.float32)
-        total = np.zeros((len(keys), 1), np.float32)
-        self.add_filtered(np.ones_like(total), 1.0, total)
-        self.scale = 1.0 / np.sqrt(total[:, 0] + np.float32(1e-20))
+        self.blurs = [blur_along(step, found) for step in steps.tolist()]
+        self.scale = np.ones((len(weights), 1), np.float32)
+        self.scale = 1.0 / np.sqrt(self.filtered(self.scale) + np.float32(1e-20))
 
-    def add_filtered(self, values: Float[np.ndarray, "N C"], weight: float, out: Float[np.ndarray, "N C"]) -> None:
-        """out += weight * filtered values, both float32, one row a pixel."""
-        scale = (np.sqrt(weight) * self.scale).astype(np.float32)
-        lattice.lattice_filter(values, scale, self.corner, self.weights, self.near, out)
+    def filtered(self, values: Float[np.ndarray, "N C"]) -> Float[np.ndarray, "N C"]:
+        """Filter values, float32, one row a pixel."""
+        at_corners = self.splat.T @ (self.scale * values)
+        for blur in self.blurs:
+            at_corners = blur @ at_corners
+        return self.scale * (self.splat @ at_corners)
+
+
+def corners_of_pixels(
+    elevated: Float[np.ndarray, "N d1"],
+) -> tuple[Int[np.ndarray, "N d1 d1"], Float[np.ndarray, "N d1"]]:
+    """Find the simplex around each point of the plane sum(x) = 0: its corners' coordinates and barycentric weights."""
+    d1 = elevated.shape[1]
+    # The nearest point whose coordinates are all multiples of d + 1; steps of d + 1 make them sum to 0 again, first
+    # where the point lies furthest above (rank 0) or below its multiple.
+    multiple = np.floor(elevated / np.float32(d1) + np.float32(0.5)).astype(np.int64)
+    rank = (-(elevated - d1 * multiple)).argsort(axis=1, kind="stable").argsort(axis=1) + multiple.sum(axis=1)[:, None]
+    wraps = rank // d1
+    multiple, rank = multiple - wraps, rank - d1 * wraps
+    above = (elevated - d1 * multiple).astype(np.float32) / np.float32(d1)
+    # From the furthest above to the least: a weight is the difference of two neighbours.
+    descending = np.take_along_axis(above, rank.argsort(axis=1), axis=1)
+    weights = np.empty_like(above)
+    weights[:, 1:] = (descending[:, :-1] - descending[:, 1:])[:, ::-1]
+    weights[:, 0] = 1.0 - descending[:, 0] + descending[:, -1]
+    # Corner r lies r above the base in the coordinates of low rank and r - (d + 1) in the others.
+    r = np.arange(d1)[:, None]
+    return d1 * multiple[:, None] + np.where(rank[:, None] < d1 - r, r, r - d1), weights
+
+
+def blur_along(step: int, found: Int[np.ndarray, "M"]) -> csr_array:
+    """Return the matrix that adds to each corner half of its two neighbours, of keys `step` more and less."""
+    place = np.minimum(np.searchsorted(found, found + step), len(found) - 1)
+    one = np.flatnonzero(found[place] == found + step)
+    half = coo_array((np.full(len(one), 0.5, np.float32), (one, place[one])), shape=(len(found), len(found)))
+    return (eye_array(len(found), dtype=np.float32) + half + half.T).tocsr()
 
 
 def elevation(d: int) -> Float[np.ndarray, "d1 d"]:

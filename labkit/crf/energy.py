@@ -4,7 +4,8 @@
     w_pq = lam exp(-|I_p - I_q|^2 / (2 sigma_I^2) - |p - q|^2 / (2 sigma_p^2))
 
 The unary term psi says what each pixel looks like on its own; the pairwise term makes neighbours agree, less so
-across an edge of the image. Every solver of this package takes a `PottsCRF` and gives a `MapResult`.
+across an edge of the image: the contrast-sensitive weights of Boykov and Jolly 2001 (doi:10.1109/ICCV.2001.937505)
+with a term for the distance. Every solver of this package takes a `PottsCRF` and gives a `MapResult`.
 """
 
 from dataclasses import dataclass
@@ -13,11 +14,21 @@ import numpy as np
 from jaxtyping import Float, Integer, Num, UInt8
 
 from labkit.crf.energy_kernels import energy_by_row, pair_exponents
-from labkit.support.validation import check_finite, check_labels, check_same_size, check_shape, require
+from labkit.support.validation import (
+    as_array,
+    check_finite,
+    check_labels,
+    check_number,
+    check_same_size,
+    check_shape,
+    require,
+)
 
 # Each unordered pair of neighbours counts once: a pixel owns the pairs with these neighbours, (down, right) of it.
 OFFSETS = {4: ((0, 1), (1, 0)), 8: ((0, 1), (1, 0), (1, 1), (1, -1))}
 MAX_CLASSES = 255
+MAX_COST = 1e150  # of finite costs and weights: sums over any image stay finite
+SCALES = (1e-100, 1e100)  # what a sigma may be: its square and its inverse are numbers, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +52,9 @@ class PottsCRF:
         weights = check_finite("weights", check_shape("weights", self.weights, (None, *unary.shape[:2])))
         require("weights", len(weights) in (2, 4), "2 or 4 pairs per pixel (4 or 8 neighbours)", len(weights))
         why = "a negative one rewards disagreement, which is not submodular, so that no cut can represent it"
-        require("weights", weights.min() >= 0.0, "costs >= 0", f"{weights.min():.6g}; {why}")
+        require("weights", weights.min(initial=0.0) >= 0.0, "costs >= 0", lambda: f"{weights.min():.6g}; {why}")
+        largest = weights.max(initial=0.0)
+        require("weights", largest <= MAX_COST, f"costs of at most {MAX_COST:g}", f"{largest:.6g}")
         for d, offset in enumerate(OFFSETS[2 * len(weights)]):
             outside = np.ones(unary.shape[:2], bool)
             outside[pair_slices(offset)[0]] = False
@@ -92,8 +105,8 @@ class PottsCRF:
         ((2, 2, 3), 7, np.float64(1.213))
         """
         for name, sigma in (("sigma_I", sigma_I), ("sigma_p", sigma_p), *(("extra", sigma) for _, sigma in extra)):
-            require(name, np.isfinite(sigma) and sigma > 0.0, "a scale above 0", sigma)
-        require("lam", np.isfinite(lam) and lam >= 0.0, "a weight >= 0", lam)
+            check_number(name, sigma, *SCALES)
+        check_number("lam", lam, 0.0, MAX_COST)
         require("connectivity", connectivity in OFFSETS, "4 or 8 neighbours", connectivity)
         unary = check_unary(unary)
         image = check_channels("image", check_finite("image", image), unary)
@@ -149,6 +162,7 @@ def unary_from_probabilities(
     array([[[0.   , 4.605]]])
     """
     p = check_finite("probabilities", check_shape("probabilities", probabilities, (None, None, None)))
+    check_number("floor", floor, 0.0, 1.0)
     require("floor", 0.0 < floor < 1.0, "a probability between 0 and 1", floor)
     sums = np.einsum("vuc->vu", p) if p.size else np.ones(1)
     if p.size and (p.min() < 0.0 or p.max() > 1.0 + 1e-3 or np.abs(sums - 1.0).max() > 1e-3):
@@ -168,6 +182,10 @@ def check_unary(unary: Num[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
         raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
     if not unary.min() > -np.inf:  # NaN is not, either
         raise ValueError("unary: expected costs that are finite or +inf (forbidden), got NaN or -inf")
+    low, high = float(unary.min()), float(unary.max())
+    finite = high if high < np.inf else float(unary.max(where=unary < np.inf, initial=low if low < np.inf else 0.0))
+    largest = max(-low, finite)
+    require("unary", largest <= MAX_COST, f"costs of at most {MAX_COST:g} in size, or +inf", f"{largest:.6g}")
     if unary.max() == np.inf and np.isinf(unary.min(axis=2)).any():
         raise ValueError("unary: expected at least one allowed class per pixel, got a pixel with only +inf")
     return unary.astype(np.float64, copy=False)
@@ -175,7 +193,7 @@ def check_unary(unary: Num[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
 
 def check_channels(name: str, image: Num[np.ndarray, "H W *channels"], unary: np.ndarray) -> Num[np.ndarray, "H W k"]:
     """Return an image or a single channel as (H, W, k); raise a ValueError unless it has the unary term's size."""
-    image = np.asarray(image)
+    image = as_array(name, image)
     if image.ndim not in (2, 3) or image.dtype.kind not in "fiub":
         raise ValueError(f"{name}: expected real numbers (H, W) or (H, W, k), got {image.dtype} {image.shape}")
     check_same_size("unary", unary, name, image)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 
 @kernel
@@ -31,7 +31,7 @@ def pair_exponents(image, scale, extra, offsets, nearness, exponents):
                     add_contrast(here[c, first:last], other[c, first + right : last + right], pairs)
 
 
-@part
+@inline
 def load_row(image, scale, extra, v, row):
     """Copy the features of one row of pixels, channel by channel."""
     channels = image.shape[2]
@@ -43,7 +43,7 @@ def load_row(image, scale, extra, v, row):
             row[channels + c, u] = extra[v, u, c]
 
 
-@part
+@inline
 def add_contrast(a, b, pairs):
     """Subtract |a - b|^2 / 2 pair by pair, except where the difference is NaN."""
     for i in range(len(pairs)):

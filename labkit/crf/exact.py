@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.energy import OFFSETS, MapResult, PottsCRF, pair_slices
 from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE, Graph, both_ways, max_flow, new_forest
-from labkit.support.validation import require
+from labkit.support.validation import as_array, check_shape, require
 
 MAX_LABELLINGS = 2**22
 CHUNK = 2**14
@@ -98,8 +98,26 @@ def grid_max_flow(
     """Return the maximum flow through a grid, and 1 on the source's side of a minimum cut (the larger side), 0 beyond.
 
     excess: capacity from the source where positive, to the sink where negative. weights: capacity of the arcs, both
-    ways, between a pixel and the one `offsets[d]` from it.
+    ways, between a pixel and the one `offsets[d]` from it. Raises ValueError for capacities whose sums are
+    no integers of their dtype any more.
     """
+    excess, weights = as_array("excess", excess), as_array("weights", weights)
+    for name, values in (("excess", excess), ("weights", weights)):
+        require(name, values.dtype.kind == "i", "signed integers", values.dtype)
+    require("weights", weights.min(initial=0) >= 0, "capacities >= 0", lambda: weights.min())
+    check_shape("weights", weights, (len(offsets), *check_shape("excess", excess, (None, None)).shape))
+    require("offsets", tuple(offsets) in OFFSETS.values(), "the pairs of 4 or 8 neighbours", offsets)
+    for d, offset in enumerate(offsets):
+        outside = np.ones(excess.shape, bool)
+        outside[pair_slices(offset)[0]] = False
+        require("weights", not weights[d][outside].any(), "0 where a pair leaves the image", f"others in weights[{d}]")
+    # All that can meet at a pixel stays within its dtype, and all flow within 63 bits.
+    largest = [float(np.abs(values, dtype=np.float64).max(initial=0.0)) for values in (excess, weights)]
+    most = float(np.iinfo(excess.dtype).max) / 2.0
+    fits = largest[0] + 2.0 * len(weights) * largest[1] <= min(most, 2.0**61 / max(1, excess.size))
+    require(
+        "excess", fits, f"capacities that add up within {excess.dtype}", lambda: f"{largest[0]:g} and {largest[1]:g}"
+    )
     H, W = excess.shape
     ring = ((1, 1), (1, 1), (0, 0))
     padded = np.pad(np.moveaxis(weights, 0, 2), ring).reshape(-1, len(weights))

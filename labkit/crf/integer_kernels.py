@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 # offset, magnitude: sums of each pixel's least cost and of its size. typical: sum of the costs above it, each cut off
 # at the weights of the pixel. smallest: of the costs above 0. constant: sum of the costs of the best single class.
@@ -12,7 +12,7 @@ Size = namedtuple("Size", "offset magnitude typical smallest constant")
 
 
 @kernel
-def measure(unary, weights, offsets, highest):
+def size_of(unary, weights, offsets, highest):
     """Measure the costs of a model whose weights are cut off at `highest`; sums run over rows of sums over a row."""
     H, W, C = unary.shape
     sums, row = np.zeros(3 + C), np.empty(3 + C)
@@ -44,14 +44,14 @@ def measure(unary, weights, offsets, highest):
     return Size(sums[0], sums[1], sums[2], smallest, constant)
 
 
-@part
+@inline
 def clear(row):
     """Set a row to 0."""
     for i in range(len(row)):
         row[i] = 0.0
 
 
-@part
+@inline
 def lowest(unary, v, u):
     """The least cost of a pixel; a loop over few classes is faster than numba's own minimum."""
     least = unary[v, u, 0]
@@ -60,7 +60,7 @@ def lowest(unary, v, u):
     return least
 
 
-@part
+@inline
 def add_capped(total, terms, highest):
     """Add the terms, each cut off at `highest`."""
     for i in range(len(terms)):

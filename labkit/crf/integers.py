@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Int
 
 from labkit.crf.energy import PottsCRF
-from labkit.crf.integer_kernels import measure, round_unary, round_weights
+from labkit.crf.integer_kernels import round_unary, round_weights, size_of
 
 # A pixel's costs and messages together stay below 16 times the largest weight: 2^26 keeps that within 31 bits, and
 # 2^36 keeps the sum over 8 million pixels within 63.
@@ -59,12 +59,12 @@ def quantise(crf: PottsCRF) -> IntegerPotts:
     """
     H, W, C = crf.shape
     offsets = np.array(crf.offsets)
-    size, largest = measure(crf.unary, crf.weights, offsets, np.inf), crf.weights.max()
+    size, largest = size_of(crf.unary, crf.weights, offsets, np.inf), crf.weights.max()
     highest = max(1.01 * size.constant, size.smallest)  # where one class is the cheapest everywhere, `constant` is 0
     if highest >= largest:
         highest = np.inf
     else:
-        size = measure(crf.unary, crf.weights, offsets, highest)
+        size = size_of(crf.unary, crf.weights, offsets, highest)
     dtype, scale = integer_scale(min(largest, highest), size.typical / crf.unary.size, size.smallest)
     step = grid_steps(crf.offsets, W)
     weights = np.zeros(((H + 2) * (W + 2), len(offsets)), dtype)
@@ -75,9 +75,10 @@ def quantise(crf: PottsCRF) -> IntegerPotts:
 
 
 def integer_scale(largest: float, typical: float, smallest: float) -> tuple[type, float]:
-    """Choose the dtype of the integers and what a cost of 1 becomes: a power of two, as large as the dtype allows.
+    """Choose the dtype of the integers, and the scale that costs are multiplied by: a power of two as large as fits.
 
-    largest: weight. typical: unary cost, in the mean. smallest: unary cost above 0, which counts where no weight does.
+    largest: the largest weight. typical: the mean unary cost. smallest: the smallest unary cost above 0; the scale
+    depends on it only if all weights are 0.
     """
     if largest == 0.0:  # the pixels are independent: a class is the cheapest, or it costs at least one step
         return np.int32, 2.0 / smallest

@@ -1,5 +1,7 @@
 """Maximum flow on a pixel grid: the algorithm of Boykov and Kolmogorov (2004) without pointers, compiled by numba.
 
+doi:10.1109/TPAMI.2004.60.
+
 The graph is implicit. A pixel n has an arc to each neighbour n + step[k], and arc k of n returns as arc K - 1 - k of
 that neighbour. A ring of pixels without arcs surrounds the image, so that no loop asks where the border is. The two
 terminals are not nodes: excess[n] > 0 is what the source can still give to n, -excess[n] > 0 what n can still give
@@ -13,7 +15,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 FREE, SOURCE, SINK = 0, 1, 2  # which tree a node is in
 ROOT, ORPHAN = -1, -2  # a node's parent is one of its arcs, or the terminal itself, or lost
@@ -86,7 +88,7 @@ def max_flow(graph, forest, active, orphans, nodes, near):
     return flow
 
 
-@part
+@inline
 def push_nearby(graph, height, queue, nodes, near):
     """Let all nodes push their excess towards the sink at once (Goldberg and Tarjan 1988): short ways need no trees.
 
@@ -134,7 +136,7 @@ def push_nearby(graph, height, queue, nodes, near):
                 count += 1
 
 
-@part
+@inline
 def meets_others(graph, tree, n):
     """Say whether a node of a tree can grow at all: amid its own tree it waits until a neighbour gets lost."""
     capacity, _, step = graph
@@ -146,7 +148,7 @@ def meets_others(graph, tree, n):
     return False
 
 
-@part
+@inline
 def push(queue, n):
     """Append a node unless it waits already."""
     if not queue.waiting[n]:
@@ -157,7 +159,7 @@ def push(queue, n):
             queue.ends[1] = 0
 
 
-@part
+@inline
 def pop(queue):
     """Take the node that has waited longest."""
     n = queue.nodes[queue.ends[0]]
@@ -168,7 +170,7 @@ def pop(queue):
     return n
 
 
-@part
+@inline
 def grow(graph, forest, active, n):
     """Let node n take free neighbours into its tree; return its arc to the other tree once there is one, or -1."""
     capacity, _, step = graph
@@ -190,7 +192,7 @@ def grow(graph, forest, active, n):
     return -1
 
 
-@part
+@inline
 def augment(graph, forest, orphans, n, bridge):
     """Send what fits through the path over arc `bridge` of n; return how many orphans that makes and the flow sent."""
     capacity, excess, step = graph
@@ -249,7 +251,7 @@ def augment(graph, forest, orphans, n, bridge):
     return lost, room
 
 
-@part
+@inline
 def adopt(graph, forest, active, orphans, lost, time):
     """Find each orphan the parent nearest to its terminal; one without any leaves the tree and orphans its children."""
     capacity, _, step = graph
@@ -283,7 +285,7 @@ def adopt(graph, forest, active, orphans, lost, time):
         tree[n] = FREE
 
 
-@part
+@inline
 def distance_to_terminal(forest, step, n, time):
     """Count the steps from n up to its terminal, FAR if an orphan is in the way; the nodes passed remember theirs."""
     _, parent, dist, stamp = forest

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.energy_kernels import mean_field_sweep
-from labkit.support.validation import require
+from labkit.support.validation import MAX_ITERATIONS, check_whole, require
 
 
 def mean_field(crf: PottsCRF, iterations: int = 10, temperatures: tuple[float, float] | None = None) -> MapResult:
@@ -32,7 +32,7 @@ def mean_field_marginals(
     >>> mean_field_marginals(crf).round(3)  # no pairwise term: exp(-psi) / sum(exp(-psi))
     array([[[0.731, 0.269], [0.378, 0.622]]])
     """
-    require("iterations", iterations >= 1, "at least 1", iterations)
+    check_whole("iterations", iterations, 1, MAX_ITERATIONS)
     first, last = temperatures if temperatures is not None else (1.0, 1.0)
     require("temperatures", 0.0 < first < np.inf and 0.0 < last < np.inf, "two numbers above 0", temperatures)
     offsets = np.array(crf.offsets)

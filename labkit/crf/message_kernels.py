@@ -9,11 +9,21 @@ Arrays: unary[k, c, v], weights[k, d, v], messages[d, k, c, v] where (d, k, v) n
 hop[d] = (diagonals, places) further. There are MARGIN empty diagonals and one empty place on either side.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 MARGIN = 3  # the longest hop: right and down among 8 neighbours
+
+
+class Skew(NamedTuple):
+    """How an image W wide is stored by diagonals, and where its pixels' neighbours are then."""
+
+    slant: int
+    W: int
+    hop: np.ndarray
 
 
 @kernel
@@ -28,32 +38,32 @@ def skewed(image, slant):
     return out
 
 
-@part
-def straightened(rows, slant, W):
+@inline
+def straightened(rows, skew):
     """Bring one channel (diagonals, places) back to an image (H, W)."""
     H = rows.shape[1] - 2
-    out = np.empty((H, W), rows.dtype)
+    out = np.empty((H, skew.W), rows.dtype)
     for v in range(H):
-        for u in range(W):
-            out[v, u] = rows[MARGIN + u + slant * v, 1 + v]
+        for u in range(skew.W):
+            out[v, u] = rows[MARGIN + u + skew.slant * v, 1 + v]
     return out
 
 
-@part
-def places(k, slant, H, W):
+@inline
+def places(k, H, skew):
     """Range of places on diagonal k that hold pixels."""
     k -= MARGIN
-    return 1 + max(0, -((W - 1 - k) // slant)), 1 + min(H - 1, k // slant) + 1
+    return 1 + max(0, -((skew.W - 1 - k) // skew.slant)), 1 + min(H - 1, k // skew.slant) + 1
 
 
-@part
+@inline
 def add(total, terms):
     """Add element by element; as all loops below, over pixels that are neighbours in memory."""
     for i in range(len(total)):
         total[i] += terms[i]
 
 
-@part
+@inline
 def smaller(least, values):
     """Keep the smaller of each pair of elements."""
     for i in range(len(least)):
@@ -61,7 +71,7 @@ def smaller(least, values):
 
 
 @kernel
-def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forward):
+def trws_sweep(unary, weights, messages, skew, shift, pairs_ahead, forward):
     """Send new messages along all pairs, forward or backward; return the lower bound that this proves.
 
     A pixel's belief h sums its unary cost and the messages to it. It gives an equal share of h to each pair ahead,
@@ -69,14 +79,14 @@ def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forw
     min over j of share(j) - message back(j) + w [j != c], for Potts one minimum over all j, cut off at w above it.
     That minimum goes to the bound. So does what the pixel keeps, with the remainders of the division, at its least.
     """
-    D, C, H = len(hop), unary.shape[1], unary.shape[2] - 2
+    hop, D, C, H = skew.hop, len(skew.hop), unary.shape[1], unary.shape[2] - 2
     h, rest = np.empty((C, H), unary.dtype), np.empty((C, H), unary.dtype)
     low, kept = np.empty(H, unary.dtype), np.empty(H, unary.dtype)
     bound = np.int64(0)
     diagonals = unary.shape[0] - 2 * MARGIN
     for i in range(diagonals):
         k = MARGIN + (i if forward else diagonals - 1 - i)
-        a, b = places(k, slant, H, W)
+        a, b = places(k, H, skew)
         n = b - a
         if n <= 0:
             continue
@@ -110,7 +120,7 @@ def trws_sweep(unary, weights, messages, hop, shift, pairs_ahead, slant, W, forw
     return bound
 
 
-@part
+@inline
 def divide(belief, shift, ahead, rest):
     """Replace a belief by the share of one pair; `rest` is what remains after all pairs ahead took theirs."""
     for i in range(len(belief)):
@@ -119,14 +129,14 @@ def divide(belief, shift, ahead, rest):
         belief[i] = share
 
 
-@part
+@inline
 def subtract(out, x, y):
     """out = x - y."""
     for i in range(len(out)):
         out[i] = x[i] - y[i]
 
 
-@part
+@inline
 def cut_off(message, values, low, w):
     """message = min(values - low, w): the distance transform of a Potts term."""
     for i in range(len(message)):
@@ -134,13 +144,13 @@ def cut_off(message, values, low, w):
 
 
 @kernel
-def trws_labels(unary, weights, messages, hop, slant, W):
+def trws_labels(unary, weights, messages, skew):
     """Read labels off the messages of a backward sweep: each pixel in turn, given the labels already chosen."""
-    D, C, H = len(hop), unary.shape[1], unary.shape[2] - 2
+    hop, D, C, H = skew.hop, len(skew.hop), unary.shape[1], unary.shape[2] - 2
     labels = np.zeros((unary.shape[0], H + 2), np.uint8)
     cost, least = np.empty(H, unary.dtype), np.empty(H, unary.dtype)
     for k in range(MARGIN, unary.shape[0] - MARGIN):
-        a, b = places(k, slant, H, W)
+        a, b = places(k, H, skew)
         n = b - a
         if n <= 0:
             continue
@@ -151,17 +161,17 @@ def trws_labels(unary, weights, messages, hop, slant, W):
                 back, first, last = k - hop[d, 0], a - hop[d, 1], b - hop[d, 1]
                 add_where_differs(cost[:n], weights[back, d, first:last], labels[back, first:last], c)
             choose(labels[k, a:b], least[:n], cost[:n], c)
-    return straightened(labels, slant, W)
+    return straightened(labels, skew)
 
 
-@part
+@inline
 def add_where_differs(cost, w, labels, c):
     """Charge class c for each pair whose other pixel has another label."""
     for i in range(len(cost)):
         cost[i] += w[i] if labels[i] != c else 0
 
 
-@part
+@inline
 def choose(labels, least, cost, c):
     """Take class c where it is the first or the cheapest so far."""
     for i in range(len(labels)):
@@ -187,7 +197,7 @@ def trws_bound(unary, weights, step, nodes, place, iterations, enough):
     return bound, iterations
 
 
-@part
+@inline
 def sweep_nodes(unary, weights, step, nodes, place, messages, forward):
     """Do what `trws_sweep` does; messages[i, k] comes to pixel nodes[i] from its neighbour k."""
     K, C = len(step), unary.shape[1]

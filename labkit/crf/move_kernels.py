@@ -6,12 +6,12 @@ and all arcs of `nodes`. Arrays are flat with a ring (`integers`); ring pixels h
 
 import numpy as np
 
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 RING = 255
 
 
-@part
+@inline
 def pair_weight(weights, n, m, k, K):
     """The weight between pixel n and its neighbour m, the k-th of K, kept at the pixel that counts it forward."""
     return weights[n, k] if 2 * k < K else weights[m, K - 1 - k]
@@ -55,12 +55,13 @@ def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
 
 
 @kernel
-def swap_move(unary, weights, step, labels, free, nodes, alpha, beta, graph):
-    """Ask each pixel labelled alpha or beta (the source's side) which of the two it takes; all pixels are free.
+def swap_move(unary, weights, step, labels, free, nodes, classes, graph):
+    """Ask each pixel of the two `classes` which of them it takes, the second being the source's side; all are free.
 
     A plain minimum cut between these pixels; the others are left out, as whatever they disagree about stays. Returns
     the value of the cut that stands for the present labels.
     """
+    alpha, beta = classes
     K = len(step)
     capacity, excess = graph.capacity, graph.excess
     present = 0

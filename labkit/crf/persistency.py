@@ -16,6 +16,7 @@ from labkit.crf.integers import pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE
 from labkit.crf.message_kernels import trws_bound
 from labkit.crf.move_kernels import energy_of, fold_fixed, persistency_test
+from labkit.support.validation import MAX_ITERATIONS, check_whole
 
 # If more of the pixels than these shares are left after the first test, or after all, "trws+expansion" solves the image
 # as a whole: it takes less time then.
@@ -31,6 +32,7 @@ def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -
     TRW-S on the pixels that fail all tests stops after `iterations`, or once the gap of the whole image is below
     `tolerance`. An image of which much is uncertain is solved by "trws+expansion". iterations counts cuts and TRW-S's.
     """
+    check_whole("iterations", iterations, 1, MAX_ITERATIONS)
     integer = quantise(crf)
     moves = Moves(integer, crf.unary.argmin(axis=2))
     pixels = len(moves.nodes)
@@ -65,9 +67,10 @@ def fix_certain(moves: Moves) -> None:
 
 
 def distance_to_bound(moves: Moves, iterations: int, enough: float) -> tuple[int, int]:
-    """Return how far the integer energy of the free pixels' labels may be above its minimum, by TRW-S, and iterations.
+    """Bound the error of the labels that are not proven: their energy minus a lower bound, in integer units.
 
-    It stops once the distance is `enough`. Folds the fixed pixels' costs into the model of `moves`, as the last step.
+    TRW-S tightens the bound until the difference is at most `enough`, or `iterations` are over. Returns the difference
+    and the iterations used. Call it last: it changes `moves.integer` in place.
     """
     integer = moves.integer
     problem = integer.unary, integer.weights, integer.step

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Integer, Real
 
 from labkit.support.validation import (
+    as_array,
     check_depth,
     check_finite,
     check_K,
@@ -247,7 +248,7 @@ def _check_size(name: str, size) -> tuple[int, int]:
 
 
 def _check_depth_images(depth) -> Float32[np.ndarray, "*batch H W"]:
-    depth = np.asarray(depth)
+    depth = as_array("depth", depth)
     require("depth", depth.ndim >= 2, "shape (H, W) or (..., H, W)", depth.shape)
     _check_size("depth", depth.shape[-2:])
     check_depth("depth", depth.reshape(-1, depth.shape[-1]))  # one tall image: what is checked is its numbers

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labkit.grasp.search_kernels import SLIPPERY, lack
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 STEEPEST = 0.5  # tangent: between two faces that each lean by more than this to the same side, the target slips out
 
@@ -24,37 +24,32 @@ class Contact(NamedTuple):
     slope: float
 
 
-def measure_grips(found, target, hidden, centre, rules, most, dropped):
+def measure_grips(grips, seen, rules, most, dropped):
     """Measure grips of `search`, the best first, until `most` of them hold; `dropped` counts the others on.
 
-    Returns those that hold, and for each of them the middle of the jaws along their closing direction, their opening,
-    and the cost.
+    Returns those that hold, with a, opening and cost as measured.
     """
-    grips, places = found.copy(), np.empty((most, 3))
-    turned = np.empty_like(target), np.empty_like(hidden)
-    n = measure_in_turn(grips, target, hidden, centre, rules, *turned, places, dropped)
-    return grips[:n], places[:n]
+    grips = grips.copy()
+    return grips[: measure_in_turn(grips, seen, rules, most, dropped)]
 
 
 @kernel
-def measure_in_turn(grips, target, hidden, centre, rules, T, H, places, dropped):
-    """Move the grips that hold to the front, until `places` is full; returns how many these are.
-
-    T, H: room for target and hidden points turned to a grip.
-    """
+def measure_in_turn(grips, seen, rules, most, dropped):
+    """Move the grips that hold to the front, until these are `most`; returns how many there are."""
+    target, hidden = np.empty_like(seen.target), np.empty_like(seen.hidden)
     n = 0
     for i in range(len(grips)):
-        if n == len(places):
+        if n == most:
             break
-        turn(target, centre, grips[i], T)
-        turn(hidden, centre, grips[i], H)
-        if measure(grips[i], T, H, rules, places[n], dropped):
+        turn(seen.target, seen.centre, grips[i], target)
+        turn(seen.hidden, seen.centre, grips[i], hidden)
+        if measure_grip(grips[i], target, hidden, rules, dropped):
             grips[n] = grips[i]
             n += 1
     return n
 
 
-@part
+@inline
 def turn(points, centre, grip, out):
     """Coordinates of points along and across the jaws, relative to the target's middle and the grip's row."""
     cos, sin = np.cos(grip.yaw), np.sin(grip.yaw)
@@ -63,9 +58,9 @@ def turn(points, centre, grip, out):
         out[i, 0], out[i, 1], out[i, 2] = dx * cos + dy * sin, dy * cos - dx * sin - grip.b, points[i, 2]
 
 
-@part
-def measure(grip, T, H, rules, place, dropped):
-    """Write middle, opening and cost of a grip into `place`, given target and hidden points turned to it.
+@inline
+def measure_grip(grip, T, H, rules, dropped):
+    """Write a, opening and cost of a grip into it, given target and hidden points turned to it.
 
     The cost is the weighted sum of its shortcomings, each from 0 to 1. Says whether the grip fits and would hold.
     """
@@ -96,11 +91,11 @@ def measure(grip, T, H, rules, place, dropped):
     cost += weights.short * lack((at_left.patch + at_right.patch) / 2, enough.short)
     cost += weights.skew * (1.0 - lack(abs(at_left.middle - at_right.middle), enough.skew))
     cost += weights.unseen * (1.0 - lack(unseen, enough.unseen))
-    place[0], place[1], place[2] = middle, right - left, cost
+    grip.a, grip.opening, grip.cost = middle, right - left, cost
     return True
 
 
-@part
+@inline
 def jaws(P, grip, hand):
     """Where to open the jaws around what stands between them: left and right pad, left and right edge of the target.
 
@@ -119,7 +114,7 @@ def jaws(P, grip, hand):
     return min(grip.left_near, start - off), max(grip.right_near, end + off), start, end
 
 
-@part
+@inline
 def contact(P, tip, hand, edge, side):
     """Look at what a pad meets at an edge of the target (side -1 left, 1 right)."""
     low, high, top, inner = np.inf, -np.inf, -np.inf, -np.inf
@@ -142,7 +137,7 @@ def contact(P, tip, hand, edge, side):
     return Contact(high - low, (low + high) / 2, top - tip, top - max(inner, tip), slope / hand.pad)
 
 
-@part
+@inline
 def slope_beyond(inner, outer, beside):
     """How much further out a face gets from one half of a pad to the other, if it goes on so beside the pad; else 0.
 
@@ -151,7 +146,7 @@ def slope_beyond(inner, outer, beside):
     return max(min(inner - outer, outer - beside), 0.0) if outer < np.inf and beside < np.inf else 0.0
 
 
-@part
+@inline
 def shadow_height(P, height, half, low, high):
     """How far unseen things might stand above a height, between two places along the jaws."""
     z = 0.0

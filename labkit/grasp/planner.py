@@ -243,6 +243,7 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
     """Grasps of one target, or why there is none."""
     from labkit.grasp import search_kernels as kernels  # numba takes its time to import
     from labkit.grasp.measure_kernels import measure_grips
+    from labkit.grasp.surroundings_kernels import surroundings
 
     if len(target) == 0:
         return "no target points"
@@ -252,23 +253,22 @@ def _plan_one(number, target, scene, table_z, camera_position, gripper) -> list[
         return "the target is too flat: nothing of it is higher than the lowest tips"
     hand = _hand(gripper, kernels)
     rules = kernels.Rules(lowest, hand, kernels.Shortcomings(**WEIGHTS), _enough(gripper, kernels))
-    centre, near, hidden = kernels.surroundings(target, scene, camera_position, lowest, hand)
+    seen = surroundings(target, scene, camera_position, lowest, hand)
 
-    def find(scene, hidden):
-        grips, costs, dropped = kernels.search(target, scene, hidden, centre, _yaws(target), rules)
-        best = np.argsort(costs, kind="stable")[: np.isfinite(costs).sum()]
-        return *measure_grips(grips[best], target, hidden, centre, rules, MEASURED, dropped), dropped
+    def find(seen):
+        grips, dropped = kernels.search(seen, _yaws(target), rules)
+        best = np.argsort(grips["cost"], kind="stable")[: np.isfinite(grips["cost"]).sum()]
+        return measure_grips(grips[best], seen, rules, MEASURED, dropped), dropped
 
-    grips, places, dropped = find(near, hidden)
+    grips, dropped = find(seen)
     if len(grips) == 0:
-        alone, _, dropped_alone = find(target, hidden[:0])
+        alone, dropped_alone = find(seen._replace(near=target, hidden=seen.hidden[:0]))
         return _why_none(dropped, len(alone) > 0, dropped_alone, kernels)
-    best = np.argsort(places[:, 2], kind="stable")[:RANKED]
-    grips, (a, opening, cost), b = grips[best], places[best].T, grips["b"][best]
-    cos, sin = np.cos(grips["yaw"]), np.sin(grips["yaw"])
-    xy = centre + np.stack([a * cos - b * sin, a * sin + b * cos], axis=1)
+    grips = grips[np.argsort(grips["cost"], kind="stable")[:RANKED]]
+    a, b, cos, sin = grips["a"], grips["b"], np.cos(grips["yaw"]), np.sin(grips["yaw"])
+    xy = seen.centre + np.stack([a * cos - b * sin, a * sin + b * cos], axis=1)
     T = _frames(grips["yaw"], xy, grips["tip"] + gripper.tips_below_grasp)
-    found = zip(T, opening.tolist(), (1.0 - cost / sum(rules.weights)).tolist(), strict=True)
+    found = zip(T, grips["opening"].tolist(), (1.0 - grips["cost"] / sum(rules.weights)).tolist(), strict=True)
     return [Grasp(T, width, score, number) for T, width, score in found]
 
 

@@ -12,9 +12,10 @@ from labkit.support.validation import require
 
 
 class Draws:
-    """Random numbers for a batch of `whole` images, of which this process makes `made`, from number `first` on.
+    """Random numbers for a batch that several processes may share.
 
-    Each process draws the numbers of the whole batch, so that an image is changed in the same way whoever makes it.
+    The batch has `whole` images; this process makes `made` of them, beginning with image `first`. It draws the numbers
+    of all and keeps those of its own, so that an image is changed in the same way whichever process makes it.
 
     >>> draws = [Draws(torch.Generator().manual_seed(0), 5, *part) for part in ((), (0, 2), (2, 3))]
     >>> whole, *parts = [draw.uniform(0.0, 1.0, 2) for draw in draws]

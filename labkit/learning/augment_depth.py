@@ -15,10 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
-from labkit.labels import OBSTACLE, TARGET
+from labkit.labels import IGNORE, OBSTACLE, TARGET
 from labkit.learning.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
 from labkit.learning.channels import geometry_channels, mirrored
-from labkit.learning.view import held
+from labkit.learning.paint import painted
+from labkit.learning.view import rolled_camera
+
+SIZES = 0.8, 1.7  # of a world, to that which was rendered, where things shall be told apart
 
 
 def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generator) -> RGBDFrame:
@@ -28,7 +31,7 @@ def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generato
     labelled 255 and has no depth.
     """
     h, w = size
-    H, W = frame.labels.shape
+    H, W = frame.depth.shape
     zoom = np.exp(rng.uniform(np.log(0.75), np.log(1.35)))
     roll = rng.uniform(-0.35, 0.35) if rng.random() < 0.5 else 0.0
     spare = np.maximum(0.0, np.array([W - w / zoom, H - h / zoom]) / 2.0)
@@ -43,7 +46,7 @@ def random_view(frame: RGBDFrame, size: tuple[int, int], rng: np.random.Generato
     K_new = frame.K * np.array([[zoom, zoom, 1.0], [zoom, zoom, 1.0], [1.0, 1.0, 1.0]])
     ray = Rotation.from_euler("z", -roll).apply(np.linalg.solve(frame.K, [*middle, 1.0]))
     K_new[:2, 2] = np.array([w - 1, h - 1]) / 2.0 - K_new[:2, :2] @ ray[:2]
-    return held(frame, roll, K_new, (w, h))
+    return rolled_camera(frame, roll, K_new, (w, h))
 
 
 def random_sensor(depth: Float[np.ndarray, "H W"], rng: np.random.Generator) -> Float[np.ndarray, "H W"]:
@@ -126,12 +129,28 @@ def random_calibration(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     return replace(frame, T_base_cam=T, table_z=(frame.table_z or 0.0) + 0.005 * rng.standard_normal())
 
 
-def random_size(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+def random_size(frame: RGBDFrame, rng: np.random.Generator, low: float = 0.887, high: float = 1.127) -> RGBDFrame:
     """All lengths times one factor, the table at 0: objects of another size, seen from as many times as far."""
-    factor = np.exp(rng.uniform(-0.12, 0.12))
+    factor = np.exp(rng.uniform(np.log(low), np.log(high)))
     T = frame.T_base_cam.copy()
     T[:3, 3] = factor * (T[:3, 3] - (0.0, 0.0, frame.table_z or 0.0))
     return replace(frame, T_base_cam=T, depth=frame.depth * np.float32(factor), table_z=0.0)
+
+
+def hidden_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """Take the depth, or most of it, from one thing in fifteen: black, shiny and clear things give no reading."""
+    depth = frame.depth.copy()
+    for number in np.unique(frame.instances):
+        if 0 < number < IGNORE and rng.random() < 1.0 / 15.0:
+            lost = cv2.blur(rng.random(depth.shape, np.float32), (5, 5)) < rng.uniform(0.45, 0.75)
+            depth[(frame.instances == number) & lost] = 0.0
+    return replace(frame, depth=depth)
+
+
+def varied_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """A frame with instances as it may be before the canonical view: painted, and one in two of another size."""
+    frame = painted(frame, rng)
+    return random_size(frame, rng, *SIZES) if rng.random() < 0.5 else frame
 
 
 def augment_frames(
@@ -140,25 +159,39 @@ def augment_frames(
     generator: torch.Generator,
     first: int = 0,
     whole: int | None = None,
-) -> tuple[Float[torch.Tensor, "N 3 h w"], Float[torch.Tensor, "N 7 h w"], UInt8[torch.Tensor, "N h w"]]:
-    """Make a training batch of labelled frames: colours and geometry channels in 0..1, and labels.
+) -> tuple[
+    Float[torch.Tensor, "N 3 h w"],
+    Float[torch.Tensor, "N 7 h w"],
+    UInt8[torch.Tensor, "N h w"],
+    UInt8[torch.Tensor, "N h w"],
+]:
+    """Make a training batch of labelled frames: colours and geometry channels in 0..1, labels, and instances.
 
-    One frame in four keeps its depth and calibration: a simulated camera is exact in both.
+    One frame in four keeps its depth and calibration: a simulated camera is exact in both. Instances are 255 wherever
+    nobody knows them.
     first, whole: as for `labkit.learning.augment.augment`.
     """
     seed = int(torch.randint(2**62, (), generator=generator))
-    rgb, geometry, y = [], [], []
+    rgb, geometry, y, instances = [], [], [], []
     for i, frame in enumerate(frames, start=first):
         rng = np.random.default_rng([seed, i])
         seen, measured = random_view(frame, size, rng), rng.random() < 0.75
         seen = random_size(random_calibration(seen, rng) if measured else seen, rng)
+        if measured and seen.instances is not None:
+            seen = hidden_things(seen, rng)
         depth = random_sensor(seen.depth, rng) if measured else seen.depth
-        images = seen.rgb, geometry_channels(depth, seen.K, seen.T_base_cam, 0.0), seen.labels[..., None]
+        of_things = np.full_like(seen.labels, IGNORE) if seen.instances is None else seen.instances
+        images = (
+            seen.rgb,
+            geometry_channels(depth, seen.K, seen.T_base_cam, 0.0),
+            seen.labels[..., None],
+            of_things[..., None],
+        )
         if rng.random() < 0.5:
             images = [mirrored(image) for image in images]
-        for batch, image in zip((rgb, geometry, y), images, strict=True):
+        for batch, image in zip((rgb, geometry, y, instances), images, strict=True):
             batch.append(torch.from_numpy(image).permute(2, 0, 1))
     draws = Draws(generator, whole or len(frames), first, len(frames))
     x = random_colour(torch.stack(rgb).float().div_(255.0), draws)
     x = random_hue(random_noise(random_sharpness(x, draws), draws), draws).clamp_(0.0, 1.0)
-    return x, torch.stack(geometry), torch.stack(y)[:, 0]
+    return x, torch.stack(geometry), torch.stack(y)[:, 0], torch.stack(instances)[:, 0]

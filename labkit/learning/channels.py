@@ -29,7 +29,7 @@ def geometry_channels(
     >>> [f"{name} {value:.2f}" for name, value in zip(CHANNELS, g[4, 4])]
     ['height 0.54', 'height, fine 0.70', 'known 1.00', 'right 0.50', 'away 0.50', 'up 1.00', 'footprint 0.79']
     """
-    from labkit.support.geometry_kernels import fill_channels  # numba takes its time to import
+    from labkit.support.geometry_kernels import Viewpoint, fill_channels  # numba takes its time to import
 
     depth = np.ascontiguousarray(depth, np.float32)
     R, t = T_base_cam[:3, :3], T_base_cam[:3, 3]
@@ -48,7 +48,8 @@ def geometry_channels(
     single = [np.asarray(x, np.float32) for x in (to_normal, slant)]
     reach = np.array(HEIGHTS, np.float32)
     channels = np.full((*depth.shape, len(CHANNELS)), np.float32(0.5))
-    fill_channels(depth, q, q_u, q_v, *single, np.float32(t[2] - table_z), reach, footprint, channels)
+    viewpoint = Viewpoint(*single, np.float32(t[2] - table_z), reach, footprint)
+    fill_channels(depth, q, q_u, q_v, viewpoint, channels)
     return channels
 
 

@@ -5,10 +5,12 @@
 A network runs in PyTorch, or as an ONNX file in OpenCV's DNN module or onnxruntime, with equal results.
 """
 
+import importlib.util
 import io
 import json
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -17,7 +19,7 @@ from jaxtyping import Float, UInt8
 
 import labkit
 from labkit.learning.channels import CHANNELS
-from labkit.learning.inference import Engine, FunctionEngine, NetworkInput
+from labkit.learning.inference import THINGS, Engine, FunctionEngine, NetworkInput
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_rgb, check_shape, require
 
@@ -31,16 +33,45 @@ class OpenCVEngine(Engine):
 
     def __init__(self, onnx: bytes):
         super().__init__(*_facts(onnx))
-        self.net = cv2.dnn.readNetFromONNX(np.frombuffer(onnx, np.uint8))
+        self.onnx, self.size = onnx, None
+        try:
+            self.net = read(onnx)
+        except cv2.error:  # OpenCV 4.12 reads networks that add or join layers for one size of picture alone
+            self.size = (0, 0)
 
     def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
+        return np.concatenate(self._run(arrays, _outputs(self.things)), axis=1)
+
+    def classes(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
+        return self._run(arrays, ["logits"])[0]
+
+    def _run(self, arrays, outputs: list[str]) -> Sequence[Float[np.ndarray, "N _ H W"]]:
+        size = arrays[0].shape[2:]
+        if self.size not in (None, size):
+            self.net, self.size = read(of_size(self.onnx, *size)), size
         for name, array in zip(self.takes.arrays, arrays, strict=True):
             self.net.setInput(np.ascontiguousarray(array), name)
-        return self.net.forward()
+        return self.net.forward(outputs)
 
     def padded_side(self, side: int) -> int:
         # OpenCV 5.0's bilinear Resize reads past the end of a map that is one pixel high: keep them all larger.
         return max(super().padded_side(side), 2 * self.takes.divisor)
+
+
+def read(onnx_file: bytes) -> cv2.dnn.Net:
+    """An ONNX file as OpenCV's DNN module runs it."""
+    return cv2.dnn.readNetFromONNX(np.frombuffer(onnx_file, np.uint8))
+
+
+def of_size(onnx_file: bytes, height: int, width: int) -> bytes:
+    """An ONNX file whose inputs have one size."""
+    import onnx
+
+    proto = onnx.load_model_from_string(onnx_file)
+    for array in proto.graph.input:
+        for axis, length in ((2, height), (3, width)):
+            array.type.tensor_type.shape.dim[axis].dim_value = length
+    return proto.SerializeToString()
 
 
 class OnnxRuntimeEngine(Engine):
@@ -57,7 +88,8 @@ class OnnxRuntimeEngine(Engine):
 
     def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
         contiguous = map(np.ascontiguousarray, arrays)
-        return self.session.run(None, dict(zip(self.takes.arrays, contiguous, strict=True)))[0]
+        outputs = self.session.run(_outputs(self.things), dict(zip(self.takes.arrays, contiguous, strict=True)))
+        return np.concatenate(outputs, axis=1)
 
 
 def open_engine(model, engine: str = "torch") -> Engine:
@@ -90,12 +122,16 @@ def open_engine(model, engine: str = "torch") -> Engine:
 def shipped(name: str) -> Engine:
     """The kit's own "unet" or "smallsegnet" in OpenCV: the labels of PyTorch without loading it, 120 MB less memory.
 
-    Raises ValueError for another name. Topic 09.
+    Without the package `onnx` it is PyTorch all the same. Raises ValueError for another name. Topic 09.
 
     >>> shipped("unet")(np.zeros((5, 7, 3), np.uint8)).shape
     (5, 7, 4)
     """
     require("name", name in SHIPPED, f"one of {', '.join(SHIPPED)}", repr(name))
+    if importlib.util.find_spec("onnx") is None:
+        from labkit.learning.network import load_model, weights_path
+
+        return open_engine(load_model(weights_path(name)))
     return open_engine(Path(labkit.__file__).with_name("weights") / f"{name}.onnx", "opencv")
 
 
@@ -109,8 +145,9 @@ def export(model, path) -> None:
     """Write a network as one self-contained ONNX file, atomically.
 
     Its inputs are the arrays that the network takes, such as `image`, (1, 3, H, W), its output `logits`, (1, C, H, W),
-    all float32, for any H and W that are divisible as the file's metadata states. OpenCV 4.6 and 5 and onnxruntime read
-    it. Raises ValueError if the model is no network, OSError naming `path` if it cannot be written. Topic 09.
+    and for a network that tells things apart `things`, (1, 3, H, W); all float32, for any H and W that are divisible as
+    the file's metadata states. OpenCV 4.6 and 5 and onnxruntime read it. Raises ValueError if the model is no network,
+    OSError naming `path` if it cannot be written. Topic 09.
     """
     write_atomically(path, to_onnx(model))
 
@@ -122,15 +159,16 @@ def to_onnx(model) -> bytes:
 
     from labkit.learning.network import TorchEngine, evaluating, logits_of
 
-    class LogitsOnly(torch.nn.Module):
-        """The network without what it may return beside its logits."""
+    class Outputs(torch.nn.Module):
+        """The network without what it may return beside its logits and `THINGS`."""
 
         def __init__(self):
             super().__init__()
             self.network = model
 
         def forward(self, *arrays):
-            return logits_of(self.network(*arrays))
+            result = self.network(*arrays)
+            return (result["out"], result["things"]) if engine.things else logits_of(result)
 
     require("model", is_network(model), "a PyTorch network", type(model).__name__)
     engine = TorchEngine(model)
@@ -139,31 +177,36 @@ def to_onnx(model) -> bytes:
     example = {"image": np.zeros((1, 3, height, 2 * height), np.float32)}
     if "geometry" in takes.arrays:
         example["geometry"] = np.zeros((1, len(CHANNELS), height, 2 * height), np.float32)
-    num_classes = engine.forward(*example.values()).shape[1]
+    num_classes = engine.forward(*example.values()).shape[1] - len(THINGS) * engine.things
     device = next((weight.device for weight in model.parameters()), "cpu")
     axes = {2: "height", 3: "width"}
     buffer = io.BytesIO()
     with warnings.catch_warnings(), evaluating(model):
         warnings.simplefilter("ignore")  # the older exporter is meant: the newer one writes what OpenCV 4.6 cannot read
         torch.onnx.export(
-            LogitsOnly().train(model.training),
+            Outputs().train(model.training),
             tuple(torch.from_numpy(array).to(device) for array in example.values()),
             buffer,
             dynamo=False,
             opset_version=OPSET,
             input_names=list(takes.arrays),
-            output_names=["logits"],
-            dynamic_axes=dict.fromkeys((*takes.arrays, "logits"), axes),
+            output_names=_outputs(engine.things),
+            dynamic_axes=dict.fromkeys((*takes.arrays, *_outputs(engine.things)), axes),
         )
     proto = onnx.load_model_from_string(buffer.getvalue())
-    facts = {"architecture": type(model).__name__, "classes": num_classes, **vars(takes)}
+    facts = {"architecture": type(model).__name__, "classes": num_classes, "things": engine.things, **vars(takes)}
     onnx.helper.set_model_props(proto, {k: v if isinstance(v, str) else json.dumps(v) for k, v in facts.items()})
     onnx.checker.check_model(proto)
     return proto.SerializeToString()
 
 
-def _facts(onnx_file: bytes) -> tuple[NetworkInput, int]:
-    """What the metadata of an ONNX file says: what the network takes, and its number of classes."""
+def _outputs(things: bool) -> list[str]:
+    """Names of an ONNX file's outputs."""
+    return ["logits", "things"] if things else ["logits"]
+
+
+def _facts(onnx_file: bytes) -> tuple[NetworkInput, int, bool]:
+    """What the metadata of an ONNX file says: what the network takes, its number of classes, and if it tells things."""
     import onnx
 
     try:
@@ -176,7 +219,8 @@ def _facts(onnx_file: bytes) -> tuple[NetworkInput, int]:
     except (KeyError, ValueError) as error:
         raise ValueError(f"model: expected a file of `labkit export`, got one that states {sorted(facts)}") from error
     mean, std = (tuple(x) if isinstance(x, list) else x for x in (mean, std))
-    return NetworkInput(arrays, mean, std, divisor, json.loads(facts.get("pixel", "null"))), classes
+    takes = NetworkInput(arrays, mean, std, divisor, json.loads(facts.get("pixel", "null")))
+    return takes, classes, json.loads(facts.get("things", "false"))
 
 
 # ------------------------------------------------------------------------------------ the C++ listing

@@ -16,8 +16,15 @@ from jaxtyping import Float, Float32, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.learning.channels import geometry_channels, mirrored
-from labkit.learning.view import View, canonical_view
+from labkit.learning.view import CanonicalView, canonical_view
 from labkit.support.validation import check_finite, check_rgb, check_shape, require
+
+VOTE_UNIT = 20.0  # pixels of the view that a network's output of 1 means in a vote
+THINGS = (
+    "foreground",
+    "du",
+    "dv",
+)  # what a network may give beside its classes: `labkit.learning.things` has the units
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ class NetworkInput:
         require("divisor", self.divisor >= 1, "at least 1", repr(self.divisor))
         require("pixel", self.pixel is None or self.pixel > 0.0, "metres above 0, or None", repr(self.pixel))
 
-    def view(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> View | None:
+    def view(self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"]) -> CanonicalView | None:
         """The canonical view that the network gets to see; None if it sees the picture as it is.
 
         That is so for a network that states no `pixel`, an RGB image, and a frame without any depth.
@@ -75,18 +82,38 @@ class NetworkInput:
         return (rgb - np.float32(self.mean)) / np.float32(self.std)
 
 
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What a network says of things, at the pixels of the view that it saw, (h, w).
+
+    foreground: probability that the pixel is on a thing. votes: where the middle of its thing's visible pixels is, as
+    (du, dv) in pixels of the view from the pixel itself. view: the way back to the picture's own pixels; None if the
+    network saw the picture as it is.
+    """
+
+    foreground: Float32[np.ndarray, "h w"]
+    votes: Float32[np.ndarray, "h w 2"]
+    view: CanonicalView | None
+
+
 class Engine(ABC):
     """A network that is ready to run: `engine(picture)` gives class probabilities, `engine.logits(picture)` logits.
 
-    takes: what the network takes. num_classes: how many classes it tells apart, None if it does not say.
+    takes: what the network takes. num_classes: how many classes it tells apart, None if it does not say. things:
+    whether it tells things apart as well; `engine.see(picture)` then gives that, too.
     """
 
-    def __init__(self, takes: NetworkInput, num_classes: int | None = None):
-        self.takes, self.num_classes = takes, num_classes
+    def __init__(self, takes: NetworkInput, num_classes: int | None = None, things: bool = False):
+        self.takes, self.num_classes, self.things = takes, num_classes, things
 
     @abstractmethod
     def forward(self, *arrays: Float32[np.ndarray, "N _ H W"]) -> Float32[np.ndarray, "N C H W"]:
-        """Run the network on its arrays, of a height and width that it takes; gives logits."""
+        """Run the network on its arrays, of a height and width that it takes; gives logits, then `THINGS` if any."""
+
+    def classes(self, *arrays: Float32[np.ndarray, "N _ H W"]) -> Float32[np.ndarray, "N C H W"]:
+        """As `forward`, but logits alone."""
+        z = self.forward(*arrays)
+        return z[:, : self.num_classes] if self.things else z
 
     def __call__(
         self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
@@ -98,10 +125,27 @@ class Engine(ABC):
         weights may hold NaN).
         """
         view, arrays = self._seen(picture)
-        p = _softmax(self._logits(view, arrays, mirror=False))
+        return self._probabilities(view, [self._outputs(arrays, m, self.classes) for m in (False, True)[: 1 + mirror]])
+
+    def see(
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+    ) -> tuple[Float32[np.ndarray, "H W C"], Sight | None]:
+        """Class probabilities of a picture and, by the same run of the network, what it says of things; else None.
+
+        Arguments and errors as for the engine itself. In a mirror, votes change the sign of du; both are averaged.
+        """
+        if not self.things:
+            return self(picture, mirror), None
+        view, arrays = self._seen(picture)
+        runs = [self._outputs(arrays, m, self.forward) for m in (False, True)[: 1 + mirror]]
+        p = self._probabilities(view, [z[: self.num_classes] for z in runs])
+        z = np.stack([z[self.num_classes :] for z in runs])
         if mirror:
-            p = 0.5 * (p + _softmax(self._logits(view, arrays, mirror=True)))
-        return check_finite("probabilities", np.ascontiguousarray(p.transpose(1, 2, 0)))
+            z[1, THINGS.index("du")] *= -1.0
+        z = check_finite("things", z)
+        with np.errstate(over="ignore"):  # exp of a large number: the foreground is 0
+            foreground = (1.0 / (1.0 + np.exp(-z[:, 0]))).mean(axis=0)
+        return p, Sight(foreground, z[:, 1:].mean(axis=0).transpose(1, 2, 0) * np.float32(VOTE_UNIT), view)
 
     def logits(
         self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
@@ -111,26 +155,44 @@ class Engine(ABC):
         mirror: those of the mirrored picture, mirrored back. Logits of a canonical view are brought back to the
         picture's own pixels.
         """
-        return self._logits(*self._seen(picture), mirror)
+        view, arrays = self._seen(picture)
+        return self._back(view, self._outputs(arrays, mirror, self.classes))
 
     def _seen(self, picture):
         """The canonical view of a picture, None if the network sees it as it is, and the arrays for the network."""
         view = self.takes.view(picture)
         return view, self.takes.build(picture if view is None else view.frame)
 
-    def _logits(self, view: View | None, arrays, mirror: bool) -> Float32[np.ndarray, "C H W"]:
-        z = self.padded([(mirrored(array) if mirror else array)[None] for array in arrays])[0]
-        z = z[..., ::-1] if mirror else z
+    def _probabilities(self, view, runs: Sequence[Float32[np.ndarray, "C h w"]]) -> Float32[np.ndarray, "H W C"]:
+        """The mean of the class probabilities of several runs, at the picture's own pixels."""
+        p = _softmax(self._back(view, runs[0]))
+        for z in runs[1:]:
+            p = 0.5 * (p + _softmax(self._back(view, z)))
+        return check_finite("probabilities", np.ascontiguousarray(p.transpose(1, 2, 0)))
+
+    def _outputs(self, arrays, mirror: bool, run: Callable) -> Float32[np.ndarray, "C h w"]:
+        """What `run` gives for the arrays of one picture, or of its mirror image, mirrored back."""
+        z = self.padded([(mirrored(array) if mirror else array)[None] for array in arrays], run)[0]
+        return z[..., ::-1] if mirror else z
+
+    def _back(self, view: CanonicalView | None, z: Float32[np.ndarray, "C h w"]) -> Float32[np.ndarray, "C H W"]:
+        """Bring channels of the view to the picture's own pixels."""
         return z if view is None else view.back(z.transpose(1, 2, 0)).transpose(2, 0, 1)
 
-    def padded(self, arrays: Sequence[Float32[np.ndarray, "N H W _"]]) -> Float32[np.ndarray, "N C H W"]:
-        """Run the network on arrays of any height and width: pad them by repeating their border, crop the logits."""
+    def padded(
+        self, arrays: Sequence[Float32[np.ndarray, "N H W _"]], run: Callable | None = None
+    ) -> Float32[np.ndarray, "N C H W"]:
+        """Run the network on arrays of any height and width: pad them by repeating their border, crop the logits.
+
+        run: `forward` for all that it gives, if it is not `classes`, for logits alone.
+        """
         height, width = arrays[0].shape[1:3]
         down, right = (self.padded_side(side) - side for side in (height, width))
         if down or right:
             arrays = [np.pad(array, ((0, 0), (0, down), (0, right), (0, 0)), mode="edge") for array in arrays]
         # Channels stay last in memory: PyTorch's convolutions are fastest there, and other engines make their own copy.
-        z = self.forward(*(np.ascontiguousarray(array).transpose(0, 3, 1, 2) for array in arrays))
+        run = run or self.classes
+        z = run(*(np.ascontiguousarray(array).transpose(0, 3, 1, 2) for array in arrays))
         return z[..., :height, :width]
 
     def padded_side(self, side: int) -> int:
@@ -153,7 +215,14 @@ class FunctionEngine(Engine):
         self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
     ) -> Float[np.ndarray, "H W C"]:
         rgb = picture.rgb if isinstance(picture, RGBDFrame) else check_rgb("rgb", picture)
-        return check_probabilities(self.function(rgb), rgb.shape[:2])
+        try:
+            p = self.function(rgb)
+        except AttributeError as error:
+            if not isinstance(getattr(error, "obj", None), np.ndarray):
+                raise
+            wanted = "a function of an RGB image; of a frame, to numbers of objects, it is Pipeline(find_objects=...)"
+            raise ValueError(f"model: expected {wanted}, got one that asks the image for {error.name!r}") from error
+        return check_probabilities(p, rgb.shape[:2])
 
     def forward(self, image: Float32[np.ndarray, "N 3 H W"]) -> Float32[np.ndarray, "N C H W"]:
         with np.errstate(divide="ignore"):  # the logarithm of 0

@@ -19,7 +19,7 @@ from torch.nn import functional as F
 
 from labkit.labels import CLASSES
 from labkit.learning.channels import CHANNELS
-from labkit.learning.inference import Engine, NetworkInput
+from labkit.learning.inference import THINGS, Engine, NetworkInput
 from labkit.learning.view import PIXEL
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
@@ -122,38 +122,110 @@ class UNet(nn.Module):
         down, right = -height % self.takes.divisor, -width % self.takes.divisor
         if down or right:
             return UNet.forward(self, F.pad(x, (0, right, 0, down), mode="replicate"))[..., :height, :width]
+        return self.logits(decoded(self.encoded(x), self.narrow, self.decoder))
+
+    def encoded(self, x: Float[torch.Tensor, "N D H W"]) -> list[torch.Tensor]:
+        """The features at each scale, the finest first."""
         x = x - 0.5
         skips = []
         for stage in self.encoder:
             x = stage(x)
             skips.append(x)
-        for i in reversed(range(len(self.decoder))):
-            x = F.interpolate(self.narrow[i](x), scale_factor=2, mode="bilinear")
-            x = self.decoder[i](x + skips[i])
-        return self.logits(x)
+        return skips
+
+
+def decoded(skips: list[torch.Tensor], narrow: nn.ModuleList, decoder: nn.ModuleList) -> torch.Tensor:
+    """The finest features again, with what the coarser ones know of the whole object."""
+    x = skips[-1]
+    for i in reversed(range(len(decoder))):
+        x = F.interpolate(narrow[i](x), scale_factor=2, mode="bilinear")
+        x = decoder[i](x + skips[i])
+    return x
+
+
+class ThingsBranch(nn.Module):
+    """What a U-Net needs to tell things apart beside its classes: a coarsest scale, a decoder and three outputs.
+
+    It looks at the U-Net's features at 1/2, 1/4 and 1/8, and leaves them as they are: so classes stay what they are.
+    widths: channels at 1/2, 1/4, 1/8 and 1/16.
+    """
+
+    def __init__(self, widths: tuple[int, ...]):
+        super().__init__()
+        self.deep = nn.Sequential(convolution(widths[-2], widths[-1], 3, 2), Residual(widths[-1]))
+        scales = range(len(widths) - 1)
+        self.narrow = nn.ModuleList(convolution(widths[i + 1], widths[i], 1) for i in scales)
+        self.decoder = nn.ModuleList(convolution(widths[i], widths[i]) for i in scales)
+        self.outputs = nn.ConvTranspose2d(widths[0], len(THINGS), kernel_size=4, stride=2, padding=1)
+
+    def forward(self, skips: list[torch.Tensor]) -> Float[torch.Tensor, "N 3 H W"]:
+        """Map the features of a U-Net, the finest first, to the channels `THINGS` at the image's height and width."""
+        return self.outputs(decoded([*skips[:-1], self.deep(skips[-2])], self.narrow, self.decoder))
 
 
 class UNetRGBD(UNet):
     """A U-Net that also sees depth, as `labkit.learning.channels.geometry_channels`; 1.3 million weights.
 
     A shape is told by its heights and normals, which do not depend on colour, texture or viewpoint. One more block and
-    wider features at 1/16 cost little there. It sees frames in their canonical view. Topics 03 and 06.
+    wider features at 1/16 cost little there. It sees frames in their canonical view. things: with a `ThingsBranch`,
+    half a million weights more, whose three channels tell things apart (`labkit.learning.things`); logits and they then
+    come as a dict. Topics 03 and 06.
 
-    >>> UNetRGBD().eval()(torch.zeros(1, 3, 37, 61), torch.full((1, 7, 37, 61), 0.5)).shape
+    >>> image, geometry = torch.zeros(1, 3, 37, 61), torch.full((1, 7, 37, 61), 0.5)
+    >>> UNetRGBD().eval()(image, geometry).shape
     torch.Size([1, 4, 37, 61])
+    >>> {name: tuple(z.shape) for name, z in UNetRGBD(things=True).eval()(image, geometry).items()}
+    {'out': (1, 4, 37, 61), 'things': (1, 3, 37, 61)}
     """
 
     half_kernels = True  # in its file
 
-    def __init__(self, num_classes: int = len(CLASSES)):
-        super().__init__(num_classes, (32, 64, 96, 128), (0, 1, 2, 2), 3 + len(CHANNELS))
+    def __init__(self, num_classes: int = len(CLASSES), things: bool = False):
+        widths = (32, 64, 96, 128)
+        super().__init__(num_classes, widths, (0, 1, 2, 2), 3 + len(CHANNELS))
         self.takes = replace(self.takes, arrays=("image", "geometry"), pixel=PIXEL)
+        self.branch = ThingsBranch(widths) if things else None
+
+    @property
+    def things(self) -> bool:
+        """Whether it tells things apart."""
+        return self.branch is not None
 
     def forward(
+        self, image: Float[torch.Tensor, "N 3 H W"], geometry: Float[torch.Tensor, "N 7 H W"], classes: bool = True
+    ) -> Float[torch.Tensor, "N C H W"] | dict[str, torch.Tensor]:
+        """Map images and geometry in [0, 1] to logits of the same height and width.
+
+        With things a dict: the logits as "out", unless `classes` is False, and the channels `THINGS`, (N, 3, H, W), as
+        "things".
+        """
+        if not self.things:
+            return self.classes(image, geometry)
+        height, width = image.shape[-2:]
+        edges = (0, -width % self.takes.divisor, 0, -height % self.takes.divisor)
+        x = torch.cat([image, geometry], dim=1)
+        skips = self.encoded(F.pad(x, edges, mode="replicate") if any(edges) else x)
+        z = {"out": self.logits(decoded(skips, self.narrow, self.decoder))} if classes else {}
+        z["things"] = self.branch(skips)
+        return {name: each[..., :height, :width] for name, each in z.items()}
+
+    def classes(
         self, image: Float[torch.Tensor, "N 3 H W"], geometry: Float[torch.Tensor, "N 7 H W"]
     ) -> Float[torch.Tensor, "N C H W"]:
-        """Map images and geometry in [0, 1] to logits of the same height and width."""
+        """The logits alone."""
         return super().forward(torch.cat([image, geometry], dim=1))
+
+
+def with_things(model: UNetRGBD, seed: int = 0) -> UNetRGBD:
+    """A network with the weights of another and a `ThingsBranch`, its own or a fresh one: it alone is trained."""
+    with torch.random.fork_rng():
+        torch.manual_seed(seed)
+        more = UNetRGBD(model.num_classes, things=True)
+    more.load_state_dict(model.state_dict(), strict=False)
+    more.takes = model.takes
+    for name, weight in more.named_parameters():
+        weight.requires_grad_(name.startswith("branch."))
+    return more
 
 
 WEIGHTS = Path(__file__).parents[1] / "weights"  # shipped with the kit; MODEL_CARD.md beside them says what they can do
@@ -168,10 +240,10 @@ def architecture_of(model: nn.Module) -> str:
 def save_model(model: nn.Module, path, **meta) -> None:
     """Write a model's weights, its architecture and plain facts about it (`meta`), atomically.
 
-    The file is a dict with keys architecture, num_classes, pixel (of the view that it knows), state_dict and meta, that
-    `load_model` reads; `meta` holds numbers, strings, lists and dicts. A model that states `half_kernels` gets the
-    kernels of its convolutions stored in 16 bits, which halves the file and changes probabilities by less than a
-    thousandth.
+    The file is a dict with keys architecture, num_classes, things (whether it tells them apart), pixel (of the view
+    that it knows), state_dict and meta, that `load_model` reads; `meta` holds numbers, strings, lists and dicts. A
+    model that states `half_kernels` gets the kernels of its convolutions stored in 16 bits, which halves the file and
+    changes probabilities by less than a thousandth.
     """
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
     if getattr(model, "half_kernels", False):
@@ -179,6 +251,7 @@ def save_model(model: nn.Module, path, **meta) -> None:
     checkpoint = {
         "architecture": architecture_of(model),
         "num_classes": getattr(model, "num_classes", None),
+        "things": getattr(model, "things", False),
         "pixel": TorchEngine(model).takes.pixel,
         "state_dict": state,
         "meta": meta,
@@ -226,11 +299,13 @@ def load_model(path, num_classes: int = len(CLASSES), model: nn.Module | None = 
         if architecture not in ARCHITECTURES:
             names = ", ".join(ARCHITECTURES)
             raise ValueError(f"path: expected weights of {names}, or `model`, for {path} of {architecture!r}")
-        model = ARCHITECTURES[architecture](num_classes)
+        things = {"things": True} if checkpoint.get("things") else {}
+        model = ARCHITECTURES[architecture](num_classes, **things)
         bias = state.get("logits.bias")
-        if bias is not None and bias.shape != (num_classes,):
+        trained_for = num_classes if bias is None else len(bias)
+        if trained_for != num_classes:
             raise ValueError(
-                f"num_classes: expected {len(bias)}, the classes that {path} was trained for, got {num_classes}"
+                f"num_classes: expected {trained_for}, the classes that {path} was trained for, got {num_classes}"
             )
     expected = model.state_dict()
     strange = len(state.keys() - expected.keys())
@@ -276,7 +351,8 @@ class TorchEngine(Engine):
     """
 
     def __init__(self, model: nn.Module, takes: NetworkInput | None = None):
-        super().__init__(takes or getattr(model, "takes", NetworkInput()), getattr(model, "num_classes", None))
+        takes = takes or getattr(model, "takes", NetworkInput())
+        super().__init__(takes, getattr(model, "num_classes", None), getattr(model, "things", False))
         self.model = model
 
     def weight(self) -> torch.Tensor:
@@ -285,12 +361,25 @@ class TorchEngine(Engine):
         return next((tensor for tensor in held if tensor.is_floating_point()), torch.zeros(()))
 
     def forward(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
-        """Run the network where its weights are, in their precision; gives logits in float32."""
+        """Run the network where its weights are, in their precision; gives logits, then `THINGS`, in float32."""
+        return self._run(arrays, things=True)
+
+    def classes(self, *arrays: Float[np.ndarray, "N _ H W"]) -> Float[np.ndarray, "N C H W"]:
+        return self._run(arrays, things=False)
+
+    def _run(self, arrays, things: bool) -> Float[np.ndarray, "N C H W"]:
         weight = self.weight()
         with torch.inference_mode(), evaluating(self.model):
             x = [torch.from_numpy(array).to(weight.device, weight.dtype) for array in arrays]
-            z = self.model(*(each.contiguous(memory_format=torch.channels_last) for each in x))
-        z = logits_of(z)
+            network = self.model.classes if self.things and not things else self.model
+            try:
+                result = network(*(each.contiguous(memory_format=torch.channels_last) for each in x))
+            except (RuntimeError, TypeError) as error:  # as of a first layer that takes other channels
+                given = " and ".join(f"{a} of {x.shape[1]} channels" for a, x in zip(self.takes.arrays, x, strict=True))
+                why = str(error).splitlines()[0]
+                told = f"one that takes {given} (its attribute `takes` says)"
+                raise ValueError(f"model: expected {told}, got {why}") from error
+            z = torch.cat([result["out"], result["things"]], dim=1) if self.things and things else logits_of(result)
         size = tuple(arrays[0].shape[-2:])
         if not isinstance(z, torch.Tensor) or z.ndim != 4 or tuple(z.shape[-2:]) != size:
             got = tuple(z.shape) if isinstance(z, torch.Tensor) else type(z).__name__

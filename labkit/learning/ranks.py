@@ -13,14 +13,14 @@ from torch import distributed as dist
 from torch import nn
 
 
-def told(name: str, alone: int = 0) -> int:
-    """A number that torchrun tells each process, such as RANK; `alone` without torchrun."""
+def env_int(name: str, alone: int = 0) -> int:
+    """Read a number that torchrun puts into each process's environment, such as RANK; `alone` without torchrun."""
     return int(os.environ[name]) if dist.is_torchelastic_launched() else alone
 
 
 def leads() -> bool:
     """Whether this process writes files and prints: one does."""
-    return told("RANK") == 0
+    return env_int("RANK") == 0
 
 
 @contextmanager
@@ -36,32 +36,32 @@ def joined(device: torch.device) -> Iterator[None]:
         dist.destroy_process_group()
 
 
-def place() -> tuple[int, int]:
-    """This process's rank, and how many have met."""
+def rank_and_count() -> tuple[int, int]:
+    """This process's rank, and how many there are."""
     return (dist.get_rank(), dist.get_world_size()) if dist.is_initialized() else (0, 1)
 
 
-def total(x: torch.Tensor) -> torch.Tensor:
-    """The sum of all ranks' tensors, at each of them; without gradient. It is also where ranks wait for each other."""
+def sum_over_ranks(x: torch.Tensor) -> torch.Tensor:
+    """Sum a tensor over all ranks, for each of them, without gradient. Ranks wait for each other here."""
     x = x.detach().clone()
     if dist.is_initialized():
         dist.all_reduce(x)
     return x
 
 
-def part(count: int) -> range:
+def share_of_batch(count: int) -> range:
     """Which of `count` images of a batch this rank makes; none, if there are fewer than ranks.
 
-    >>> part(8)
+    >>> share_of_batch(8)
     range(0, 8)
     """
-    rank, ranks = place()
+    rank, ranks = rank_and_count()
     return range(count * rank // ranks, count * (rank + 1) // ranks)
 
 
 def spread(model: nn.Module) -> nn.Module:
     """What to call in place of the model, so that its gradients are the means over ranks; its parts stay its own."""
-    if place()[1] == 1:
+    if rank_and_count()[1] == 1:
         return model
     for layer in model.modules():
         if type(layer) is nn.BatchNorm2d and layer.affine and layer.track_running_stats:

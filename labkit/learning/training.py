@@ -26,15 +26,14 @@ from tqdm.auto import tqdm
 from labkit.labels import CLASSES, IGNORE
 from labkit.learning import ranks
 from labkit.learning.augment import augment
-from labkit.learning.augment_depth import augment_frames
-from labkit.learning.images import ImagesInMemory, too_large
+from labkit.learning.augment_depth import augment_frames, varied_things
+from labkit.learning.images import ImagesInMemory
 from labkit.learning.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
+from labkit.learning.things import things_loss
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
-
-AHEAD = 8  # steps that a file of images is read ahead
 
 
 @dataclass(frozen=True)
@@ -99,13 +98,22 @@ RECIPES = {
 }
 
 
-def fine_tuning(model: str, validated: bool) -> TrainConfig:
+# How trained weights learn to tell things apart: windows that hold a jug and its neighbours, the classes as they come.
+THINGS_RECIPE = TrainConfig(
+    model="unet_rgbd", epochs=10, batch=4, lr=2e-3, weights="none", crop=(224, 288), val_every=10
+)
+
+
+def fine_tuning_recipe(model: str, validated: bool) -> TrainConfig:
     """How trained weights go on with a few pictures of somebody's own: gently, and long enough for twenty of them.
 
     validated: whether there are pictures to validate on. Without, the classes are not weighted, since nothing could
     tell how far to take the weights out again (`undo_weights`).
     """
     return replace(RECIPES[model], epochs=60, lr=1e-3, weights="sqrt" if validated else "none", val_every=20)
+
+
+fine_tuning = fine_tuning_recipe  # its name in lab 10 of courses that began before 0.3
 
 
 def choose_device(device: str = "auto") -> torch.device:
@@ -115,7 +123,7 @@ def choose_device(device: str = "auto") -> torch.device:
         raise ValueError("device: expected a CUDA GPU and a CUDA build of PyTorch, got neither; use cpu or auto")
     if device == "cpu" or not torch.cuda.is_available():
         return torch.device("cpu")
-    return torch.device("cuda", ranks.told("LOCAL_RANK"))
+    return torch.device("cuda", ranks.env_int("LOCAL_RANK"))
 
 
 def bf16_is_native(device: torch.device) -> bool:
@@ -132,7 +140,7 @@ def generator_for(*numbers: int) -> torch.Generator:
     return torch.Generator().manual_seed(int(state))
 
 
-@lru_cache(maxsize=2)  # this epoch's, and the next one's, which is read ahead
+@lru_cache(maxsize=1)
 def order_of_epoch(seed: int, epoch: int, count: int) -> torch.Tensor:
     """The order in which an epoch shows its images."""
     return torch.randperm(count, generator=generator_for(seed, 0, epoch))
@@ -183,11 +191,19 @@ class Trainer:
         self.batches = math.ceil(len(data) / config.batch)  # in an epoch
         self.total = config.steps if config.steps is not None else config.epochs * self.batches
         model = fresh_model(config) if model is None else model
-        self.takes = TorchEngine(model).takes
+        engine = TorchEngine(model)
+        self.takes, self.things = engine.takes, engine.things
         self.model = model.to(device=device, memory_format=torch.channels_last)
+        parts = (part for part in model.modules() if any(True for _ in part.parameters()))
+        self.frozen = [part for part in parts if not any(weight.requires_grad for weight in part.parameters())]
+        # A frozen network with a branch that tells things apart learns no classes, and need not give them.
+        self.learns_classes = not self.things or model.logits not in self.frozen
         self.call = ranks.spread(self.model)
         self.optimiser = torch.optim.AdamW(
-            self.model.parameters(), lr=config.lr, weight_decay=config.weight_decay, fused=True
+            [w for w in self.model.parameters() if w.requires_grad],
+            lr=config.lr,
+            weight_decay=config.weight_decay,
+            fused=True,
         )
         self.bf16 = bf16_is_native(device)
         counts = data.class_counts(config.num_classes)
@@ -201,23 +217,29 @@ class Trainer:
         epoch, place = divmod(step, self.batches)
         order = order_of_epoch(self.config.seed, epoch, len(self.data))
         chosen = order[place * self.config.batch : (place + 1) * self.config.batch].tolist()
-        return chosen, ranks.part(len(chosen))
+        return chosen, ranks.share_of_batch(len(chosen))
 
-    def batch_of_step(self, step: int) -> tuple[list[torch.Tensor], torch.Tensor]:
-        """The arrays (N, D, h, w) that the network takes, and labels (N, h, w): a function of the seed and the step.
+    def batch_of_step(self, step: int) -> tuple[list[torch.Tensor], torch.Tensor, torch.Tensor | None]:
+        """The arrays (N, D, h, w) that the network takes, labels (N, h, w), and instances if it tells things apart.
 
-        With several ranks, this one's part of them.
+        A function of the seed and the step; with several ranks, this one's part of it.
         """
         config, (H, W) = self.config, self.data.y.shape[1:]
         whole, part = self.images_of_step(step)
         chosen = whole[part.start : part.stop] or [whole[part.start]]  # to have shapes; it is cut off again
-        views = [(picture, self.takes.view(picture)) for picture in self.data.pictures(chosen)]
+        pictures, instances = self.data.pictures(chosen), None
+        if self.things and config.augment:
+            rngs = [
+                np.random.default_rng([config.seed, 2, step, i]) for i in range(part.start, part.start + len(chosen))
+            ]
+            pictures = [varied_things(*each) for each in zip(pictures, rngs, strict=True)]
+        views = [(picture, self.takes.view(picture)) for picture in pictures]
         seen = [picture if view is None else view.frame for picture, view in views]
         if config.augment:
             size = (H, W) if config.crop is None else (min(config.crop[0], H), min(config.crop[1], W))
             generator = generator_for(config.seed, 1, step)
             if self.data.depth is not None:
-                *arrays, y = augment_frames(seen, size, generator, part.start, len(whole))
+                *arrays, y, instances = augment_frames(seen, size, generator, part.start, len(whole))
             else:
                 *arrays, y = augment(
                     self.data.rgb[chosen], self.data.y[chosen], size, generator, part.start, len(whole)
@@ -228,31 +250,39 @@ class Trainer:
             built = [self.takes.build(picture) for picture in seen]
             arrays = [stacked(array).permute(0, 3, 1, 2) for array in zip(*built, strict=True)]
             y = self.data.y[chosen] if self.takes.pixel is None else stacked([p.labels for p in seen], IGNORE)
-        arrays, y = [array[: len(part)] for array in arrays], y[: len(part)]
+            if self.things:
+                instances = stacked([p.instances for p in seen], IGNORE)
+        truth = [y, instances] if self.things else [y]
+        arrays, truth = ([array[: len(part)] for array in each] for each in (arrays, truth))
         edges = (0, -y.shape[2] % self.takes.divisor, 0, -y.shape[1] % self.takes.divisor)
-        if not any(edges):
-            return arrays, y
-        return [F.pad(array, edges, mode="replicate") for array in arrays], F.pad(y, edges, value=IGNORE)
+        if any(edges):
+            arrays = [F.pad(array, edges, mode="replicate") for array in arrays]
+            truth = [F.pad(image, edges, value=IGNORE) for image in truth]
+        return arrays, truth[0], truth[1] if self.things else None
 
     def step(self) -> float:
         """Make one optimiser step and return its loss, over all ranks' images."""
-        arrays, y = self.batch_of_step(self.done)
-        ahead, part = self.images_of_step(self.done + AHEAD)
-        self.data.read_ahead(ahead[part.start : part.stop])
+        arrays, y, instances = self.batch_of_step(self.done)
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.learning_rate(self.done, self.total)
         self.model.train()
+        for part in self.frozen:
+            part.eval()
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
-            logits = logits_of(self.call(*(array.to(self.device) for array in arrays)))
+            classes = {} if self.learns_classes else {"classes": False}
+            result = self.call(*(array.to(self.device) for array in arrays), **classes)
         counted = (y != IGNORE).sum()
-        share = counted / ranks.total(counted).clamp(min=1)  # of the batch's pixels
-        loss = self.loss(logits, y.to(self.device), self.weights) * share
+        share = counted / ranks.sum_over_ranks(counted).clamp(min=1)  # of the batch's pixels
+        loss = self.loss(logits_of(result), y.to(self.device), self.weights) if self.learns_classes else 0.0
+        if self.things:
+            loss = loss + things_loss(result["things"], instances.to(self.device))
+        loss = loss * share
         self.optimiser.zero_grad(set_to_none=True)
-        (loss * ranks.place()[1]).backward()  # gradients are means over ranks, and the loss is their sum
+        (loss * ranks.rank_and_count()[1]).backward()  # gradients are means over ranks, and the loss is their sum
         nn.utils.clip_grad_norm_(self.model.parameters(), 5.0)  # one odd batch must not undo an hour
         self.optimiser.step()
         self.done += 1
-        self.losses.append(ranks.total(loss.cpu()).item())
+        self.losses.append(ranks.sum_over_ranks(loss.cpu()).item())
         return self.losses[-1]
 
     def state(self) -> dict:
@@ -268,8 +298,8 @@ class Trainer:
         }
 
     def what(self) -> dict:
-        """What makes another run of the same configuration: how many images there are, and the loss's name."""
-        return {"images": len(self.data), "loss": name_of(self.loss)}
+        """What makes another run of the same configuration: the number of images, the loss, and if it tells things."""
+        return {"images": len(self.data), "loss": name_of(self.loss), "things": self.things}
 
     def restore(self, state: dict, source) -> None:
         """Go on from a `state`; raises ValueError naming `config` if it is of another run.
@@ -277,7 +307,8 @@ class Trainer:
         What a state does not name was no choice yet when it was written, and had what is now its default.
         """
         ours = asdict(self.config) | self.what()
-        defaults = {field.name: field.default for field in fields(TrainConfig)} | {"loss": name_of(segmentation_loss)}
+        defaults = {field.name: field.default for field in fields(TrainConfig)}
+        defaults |= {"loss": name_of(segmentation_loss), "things": False}
         theirs = defaults | state.get("config", {}) | {key: state[key] for key in self.what() if key in state}
         differ = sorted(key for key in ours if theirs.get(key) != ours[key])
         if differ:
@@ -292,8 +323,8 @@ class Trainer:
 
     def check_together(self) -> None:
         """Raise ValueError unless all ranks go on from the same step."""
-        found, count = int(ranks.total(torch.tensor(self.done))), ranks.place()[1]
-        together = ranks.total(torch.tensor(int(self.done * count != found))) == 0
+        found, count = int(ranks.sum_over_ranks(torch.tensor(self.done))), ranks.rank_and_count()[1]
+        together = ranks.sum_over_ranks(torch.tensor(int(self.done * count != found))) == 0
         require("out", together, "a checkpoint that every process reads, or none", f"step {self.done} here alone")
 
 
@@ -308,12 +339,12 @@ def stacked(images: Sequence[np.ndarray], beyond: int | None = None) -> torch.Te
 def evaluate(model: nn.Module, data: ImagesInMemory, num_classes: int) -> np.ndarray:
     """Pool one confusion matrix (C, C) over all images of `data`, whole, with the model in eval mode."""
     engine, n = TorchEngine(model), np.zeros((num_classes, num_classes), np.int64)
-    device, (rank, count) = engine.weight().device, ranks.place()
+    device, (rank, count) = engine.weight().device, ranks.rank_and_count()
     with torch.autocast(device.type, torch.bfloat16, enabled=bf16_is_native(device)):
         for i in range(rank, len(data), count):
             z = engine.logits(data.pictures([i])[0])
             n += confusion_matrix(data.y[i].numpy(), z.argmax(axis=0), num_classes)
-    return ranks.total(torch.from_numpy(n)).numpy()
+    return ranks.sum_over_ranks(torch.from_numpy(n)).numpy()
 
 
 def train(
@@ -325,16 +356,14 @@ def train(
     device: str = "auto",
     progress: bool = True,
     model: nn.Module | None = None,
-    memory_gb: float | None = None,
     loss: Callable = segmentation_loss,
 ) -> list[dict]:
     """Train a network and return its history: one dict per epoch (epoch, steps, loss, and mean_iou and iou by class).
 
     train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. model: a network
-    of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. memory_gb: beyond so many
-    gigabytes, decoded images are kept in a file in `out`, not in memory; None is half of the machine's memory. loss: a
-    function of logits (N, C, H, W), labels (N, H, W) and class weights (C,) to a scalar, as `segmentation_loss` is; its
-    attribute `sums_over_pixels` tells that the scalar is a sum over pixels, divided by how many are counted. In the
+    of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. loss: a function of logits
+    (N, C, H, W), labels (N, H, W) and class weights (C,) to a scalar, as `segmentation_loss` is; its attribute
+    `sums_over_pixels` tells that the scalar is a sum over pixels, divided by how many are counted. In the
     folder `out` are written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json;
     NAME.checkpoint.pt, from which `resume` goes on. The checkpoint is written at Ctrl-C, too, which then raises
     KeyboardInterrupt and says where it is. On one machine, with as many threads, a resumed run ends with the very
@@ -346,9 +375,10 @@ def train(
     model = fresh_model(config) if model is None else model
     with ranks.joined(where):
         check_loss(loss, config, validated=val_set is not None)
-        how = {"progress": progress, "depth": "geometry" in TorchEngine(model).takes.arrays, "memory_gb": memory_gb}
-        train_data = kept(train_set, config.num_classes, "train_set", out, **how)
-        val_data = None if val_set is None else kept(val_set, config.num_classes, "val_set", out, **how)
+        how = {"progress": progress, "depth": "geometry" in TorchEngine(model).takes.arrays}
+        things = TorchEngine(model).things
+        train_data = cached_dataset(train_set, config.num_classes, "train_set", instances=things, **how)
+        val_data = None if val_set is None else cached_dataset(val_set, config.num_classes, "val_set", **how)
         checkpoint = out / f"{config.model}.checkpoint.pt"
         trainer = Trainer(train_data, config, where, model, loss)
         if resume and checkpoint.is_file():
@@ -367,7 +397,7 @@ def check_loss(loss: Callable, config: TrainConfig, validated: bool) -> None:
     """Raise ValueError if a loss that is not a sum over pixels meets what only a sum allows."""
     if not getattr(loss, "sums_over_pixels", False):
         expected = "one process, or a sum over pixels (sums_over_pixels = True), whose parts ranks can add up"
-        require("loss", ranks.place()[1] == 1, expected, name_of(loss))
+        require("loss", ranks.rank_and_count()[1] == 1, expected, name_of(loss))
         expected = f"'none', since validation takes them out again, from sums over pixels alone, not {name_of(loss)}"
         require("weights", config.weights == "none" or not validated, expected, repr(config.weights))
 
@@ -384,7 +414,7 @@ def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, pro
             if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:
                 finish_epoch(trainer, val_data, out)
                 write_state(trainer, checkpoint)
-            if ranks.total(torch.tensor(int(interrupt.pending))) > 0:  # all stop after the same step
+            if ranks.sum_over_ranks(torch.tensor(int(interrupt.pending))) > 0:  # all stop after the same step
                 write_state(trainer, checkpoint)
                 raise KeyboardInterrupt(
                     f"stopped after {trainer.done} of {trainer.total} steps; the same command goes on from {checkpoint}"
@@ -442,14 +472,14 @@ def undo_weights(
     return best
 
 
-def kept(
-    dataset, num_classes: int, name: str, out: Path, progress: bool, depth: bool, memory_gb: float | None
+def cached_dataset(
+    dataset, num_classes: int, name: str, progress: bool, depth: bool, instances: bool = False
 ) -> ImagesInMemory:
-    """Read a dataset into memory, or into a file in `out` if it is too large, unless it was read already."""
+    """Read a dataset into memory, unless it was read already."""
     if not isinstance(dataset, ImagesInMemory):
-        file = out / f".{name}.images" if too_large(name, dataset, depth, memory_gb) else None
-        return ImagesInMemory(dataset, num_classes, name, progress, depth, file)
+        return ImagesInMemory(dataset, num_classes, name, progress, depth, instances)
     require(name, not depth or dataset.depth is not None, "images with depth", "some that were read without")
+    require(name, not instances or dataset.instances is not None, "images with instances", "some read without")
     return dataset
 
 

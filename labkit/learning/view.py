@@ -22,23 +22,23 @@ MOST_PIXELS = 800 * 600  # of a view; pictures that show more of the world get l
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class CanonicalView:
     """A picture's canonical view, and the way back.
 
     frame: the view, a frame like any other, with the K and T_base_cam of the camera that would have seen it. size: of
-    the picture, (width, height). turns: quarters that the picture was turned by first, counter-clockwise. M: (2, 3),
-    maps a pixel (u, v, 1) of the view to the place in the turned picture that it shows.
+    the picture, (width, height). turns: quarters that the picture was turned by first, counter-clockwise.
+    to_turned: (2, 3); pixel (u, v) of the view shows the place to_turned (u, v, 1) of the turned picture.
     """
 
     frame: RGBDFrame
     size: tuple[int, int]
     turns: int
-    M: Float[np.ndarray, "2 3"]
+    to_turned: Float[np.ndarray, "2 3"]
 
     def back(self, image: Float32[np.ndarray, "h w C"], how: int = cv2.INTER_LINEAR) -> Float32[np.ndarray, "H W C"]:
         """Bring numbers of the view's pixels to the picture's own: bilinearly, or as OpenCV's flag `how` says."""
         size = self.size if self.turns % 2 == 0 else self.size[::-1]
-        to_view = cv2.invertAffineTransform(self.M)
+        to_view = cv2.invertAffineTransform(self.to_turned)
         out = np.empty((*size[::-1], image.shape[2]), np.float32)
         for first in range(0, image.shape[2], 4):  # as many channels as OpenCV warps at a time
             part = np.ascontiguousarray(image[..., first : first + 4])
@@ -46,13 +46,13 @@ class View:
         return rot90(out, -self.turns)
 
 
-def canonical_view(frame: RGBDFrame, pixel: float = PIXEL) -> View | None:
+def canonical_view(frame: RGBDFrame, pixel: float = PIXEL) -> CanonicalView | None:
     """Turn a picture upright and resample it so that its median pixel covers `pixel` metres; None without any depth.
 
     Pixels near the table's height count for the median, all if there are none. Colour is interpolated; depth, and
-    labels if known, are the nearest pixel's. Beyond the picture there is no depth, colour repeats the border and labels
-    are 255. Instances are left out. A camera that looks down by more than 80 degrees is turned by whole quarters, to
-    where base z points up best. Quarter turns of one picture have the very same view. Topic 06.
+    labels and instances if known, are the nearest pixel's. Beyond the picture there is no depth, colour repeats the
+    border, and labels and instances are 255. A camera that looks down by more than 80 degrees is turned by whole
+    quarters, to where base z points up best. Quarter turns of one picture have the very same view. Topic 06.
 
     >>> looking_ahead = np.array([[ 0.0, 0.0, 1.0, 0.0],  # the picture's right is -y of the base, its lower edge -z
     ...                           [-1.0, 0.0, 0.0, 0.0],
@@ -87,11 +87,11 @@ def canonical_view(frame: RGBDFrame, pixel: float = PIXEL) -> View | None:
     T = frame.T_base_cam.copy()
     T[:3, :3] = np.column_stack([R[:, :2] @ turn, R[:, 2]])
     size = tuple(size.astype(int).tolist())
-    labels = None if frame.labels is None else rot90(frame.labels, turns)
-    rgb, depth, labels = resampled(rgb, depth, labels, M, size, scale)
+    known = (None if image is None else rot90(image, turns) for image in (frame.labels, frame.instances))
+    rgb, depth, labels, instances = resampled(rgb, depth, *known, M, size, scale)
     K = np.array([[f_view, 0.0, c_view[0]], [0.0, f_view, c_view[1]], [0.0, 0.0, 1.0]])
-    view = RGBDFrame(rgb, depth, K, T, labels, table_z=frame.table_z)
-    return View(view, frame.size, turns, M)
+    view = RGBDFrame(rgb, depth, K, T, labels, instances, table_z=frame.table_z)
+    return CanonicalView(view, frame.size, turns, M)
 
 
 def turned_upright(frame: RGBDFrame):
@@ -131,29 +131,33 @@ def table_pixel(depth: Float[np.ndarray, "H W"], A, c, down, height: float) -> f
     return float(middle / np.sqrt(A[0, 0] * A[1, 1]))
 
 
-def held(frame: RGBDFrame, roll: float, K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> RGBDFrame:
+def rolled_camera(frame: RGBDFrame, roll: float, K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> RGBDFrame:
     """What the camera would see if it were rolled about its axis (radians), with another K and (width, height) `size`.
 
     It stays where it is, so depth does not change: pixel x of the new picture shows what K R K_new^-1 x of the old one
-    did. Depth, and labels if known, are the nearest pixel's; beyond the old picture there is no depth, and labels are
-    255. Instances are left out.
+    did. Depth, and labels and instances if known, are the nearest pixel's; beyond the old picture there is no depth,
+    and labels and instances are 255.
     """
     turn = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
     M = (frame.K @ turn @ np.linalg.inv(K))[:2]
     scale = 1.0 / np.sqrt(np.linalg.det(M[:, :2]))
-    rgb, depth, labels = resampled(frame.rgb, frame.depth, frame.labels, M, size, scale)
+    images = resampled(frame.rgb, frame.depth, frame.labels, frame.instances, M, size, scale)
     T = frame.T_base_cam.copy()
     T[:3, :3] = T[:3, :3] @ turn
-    return RGBDFrame(rgb, depth, K, T, labels, table_z=frame.table_z)
+    rgb, depth, labels, instances = images
+    return RGBDFrame(rgb, depth, K, T, labels, instances, table_z=frame.table_z)
 
 
-def resampled(rgb, depth, labels, M, size: tuple[int, int], scale: float):
-    """Colours, depth and labels (or None) of another picture: `warped` as suits each. scale: its, to the old one's."""
+def resampled(rgb, depth, labels, instances, M, size: tuple[int, int], scale: float):
+    """Colours, depth, labels and instances (or None) of another picture: `warped` as suits each.
+
+    scale: the new picture's, to the old one's.
+    """
     nearest = cv2.INTER_NEAREST, cv2.BORDER_CONSTANT
     return (
         warped(smoothed(rgb, scale), M, size, cv2.INTER_LINEAR),
         warped(depth, M, size, *nearest),
-        None if labels is None else warped(labels, M, size, *nearest, IGNORE),
+        *(None if known is None else warped(known, M, size, *nearest, IGNORE) for known in (labels, instances)),
     )
 
 

@@ -15,8 +15,9 @@ from rosbags.typesys import Stores, get_typestore
 from tqdm.auto import tqdm
 
 from labkit.node.bus import Transport
+from labkit.node.diagnostics import Counts
 from labkit.node.messages import DEFAULT_TOPICS, Message, Topics, Transforms
-from labkit.node.segmentation import Counts, SegmentationNode
+from labkit.node.segmentation import SegmentationNode
 from labkit.node.transforms import TransformTree
 from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline

@@ -89,6 +89,14 @@ class Pose:
 
 
 @dataclass(frozen=True)
+class Point:
+    """A place in the header's frame, metres. ROS: PointStamped."""
+
+    header: Header
+    point: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class PoseArray:
     """Several poses in the header's frame; the poses' own headers do not travel."""
 
@@ -164,6 +172,7 @@ Message = (
     | CameraInfo
     | PointCloud2
     | Pose
+    | Point
     | PoseArray
     | Detections
     | Transforms
@@ -194,10 +203,11 @@ class Topics:
     detections: str = "/segmentation/grasp_detections"
     gripper: str = "/segmentation/gripper"
     scene: str = "/segmentation/scene_cloud"
+    clicked: str = "/clicked_point"
     answer: str = "/segmentation/answer"
     diagnostics: str = "/diagnostics"
 
 
 DEFAULT_TOPICS = Topics()
-SHARED = ("tf", "tf_static", "diagnostics")  # one for all robots, whatever namespace each has
+SHARED = ("tf", "tf_static", "clicked", "diagnostics")  # one for all robots, whatever namespace each has
 ROS_TOPICS = Topics(**{name: topic if name in SHARED else topic[1:] for name, topic in vars(DEFAULT_TOPICS).items()})

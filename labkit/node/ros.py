@@ -8,8 +8,9 @@ from contextlib import contextmanager
 
 from labkit.node import ros1, ros2
 from labkit.node.bus import Transport
+from labkit.node.diagnostics import Counts
 from labkit.node.messages import ROS_TOPICS
-from labkit.node.segmentation import Counts, SegmentationNode
+from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline
 
 logger = logging.getLogger(__name__)

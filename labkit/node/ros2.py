@@ -1,6 +1,6 @@
 """The edge to ROS 2: a transport over rclpy (topic 08).
 
-rclpy comes from a sourced ROS 2, or from the unofficial wheels of `make ros2`; see README. Messages travel as bytes,
+rclpy comes from a sourced ROS 2, or from the unofficial wheels of `make ros2` (docs/ros2.md). Messages travel as bytes,
 which `Wire` reads and writes: that is faster than rclpy's own classes, and a message that cannot be read is an error of
 one message and not of a thread.
 """

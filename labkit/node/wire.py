@@ -21,6 +21,7 @@ from labkit.node.messages import (
     Image,
     JointState,
     Message,
+    Point,
     PointCloud2,
     PointField,
     Pose,
@@ -36,6 +37,7 @@ TYPES = {
     CameraInfo: "sensor_msgs/msg/CameraInfo",
     PointCloud2: "sensor_msgs/msg/PointCloud2",
     Pose: "geometry_msgs/msg/PoseStamped",
+    Point: "geometry_msgs/msg/PointStamped",
     PoseArray: "geometry_msgs/msg/PoseArray",
     Detections: "vision_msgs/msg/Detection3DArray",
     Transforms: "tf2_msgs/msg/TFMessage",
@@ -95,7 +97,7 @@ class Wire:
             raise ValueError(f"message: expected a {name}: {type(error).__name__}: {error}") from error
 
     def decode_or_error(self, name: str, data) -> Message | ValueError:
-        """Read as `decode` does; the error in place of a message that cannot be read, as a Transport delivers it."""
+        """Read a message, or return the ValueError that says why it cannot be read: a Transport delivers either."""
         try:
             return self.decode(name, data)
         except ValueError as error:

@@ -6,6 +6,7 @@ how wide does the object reach?), and tests (does a rendered point lie on the su
 
 import hashlib
 import importlib.util
+import re
 import tempfile
 import threading
 import xml.etree.ElementTree as ElementTree
@@ -84,7 +85,8 @@ def _urdf_mesh(urdf: str) -> trimesh.Trimesh:
     """The visual meshes of a one-link URDF of pybullet_data, in the link's frame, before any scaling of the whole."""
     path = urdf_path(urdf)
     meshes = []
-    for visual in ElementTree.parse(path).getroot().iter("visual"):
+    text = re.sub(rb"^\s*<\?xml.*?\?>", b"", path.read_bytes())  # version="0.0", say some, which newer parsers refuse
+    for visual in ElementTree.fromstring(text).iter("visual"):
         named, origin = visual.find("geometry/mesh"), visual.find("origin")
         mesh = read_mesh(path.parent / named.get("filename"))
         vertices = mesh.vertices * np.array([float(s) for s in named.get("scale", "1 1 1").split()])

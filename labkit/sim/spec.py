@@ -15,6 +15,7 @@ from labkit.labels import CLASSES, OBSTACLE, TARGET
 from labkit.support.validation import check_finite, check_shape, check_T, require
 
 Vector = tuple[float, ...]
+PARTS = ("box", "cylinder", "sphere", "hull")
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,9 @@ class Part:
     size: Vector
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Vector = (0.0, 0.0, 0.0, 1.0)
+
+    def __post_init__(self):
+        require("part.kind", self.kind in PARTS, f"one of {', '.join(PARTS)}", repr(self.kind))
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,21 @@ class Table:
     size: Vector = (0.7, 1.1, 0.05)
     z: float = 0.0
     texture: Texture = Texture()
+
+
+@dataclass(frozen=True)
+class Furniture:
+    """A fixed box that is no thing to grasp: a bin's wall or floor, a shelf, a second table.
+
+    size: lengths in x, y and z before it is turned by `yaw` (radians) about the vertical through `centre`. surface:
+    whether its pixels are labelled surface, as the table's are, and not background.
+    """
+
+    size: Vector
+    centre: Vector
+    texture: Texture = Texture()
+    yaw: float = 0.0
+    surface: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,7 +152,11 @@ class Camera:
 
 @dataclass(frozen=True)
 class Light:
-    """The lamp: where it shines from (base frame), its colour, and how much of it is ambient, diffuse and specular."""
+    """The lamp: where it shines from (base frame), its colour, and how much of it is ambient, diffuse and specular.
+
+    distance: of the lamp from the base frame's origin, metres; it matters to shadows alone. From 4 m those of small
+    things fall on the table; from 2 m a TinyRenderer mostly loses them.
+    """
 
     direction: Vector = (0.5, 0.3, 1.0)
     colour: Vector = (1.0, 1.0, 1.0)
@@ -141,11 +164,15 @@ class Light:
     diffuse: float = 0.5
     specular: float = 0.05
     shadow: bool = True
+    distance: float = 2.0
 
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """Everything that a World needs. The robot's base link stands at the origin; floor and walls are background."""
+    """Everything that a World needs. The robot's base link stands at the origin; floor and walls are background.
+
+    joints: the arm's, 7 angles (rad) and 2 fingers (m), where it stands; None is its home.
+    """
 
     objects: tuple[ObjectSpec, ...]
     camera: Camera
@@ -154,12 +181,16 @@ class SceneSpec:
     floor: Texture = Texture(kind="plain", colour_a=(0.4, 0.4, 0.42))
     walls: Texture = Texture(kind="plain", colour_a=(0.75, 0.74, 0.7))
     robot: bool = True
+    furniture: tuple[Furniture, ...] = ()
+    joints: Vector | None = None
     seed: int = 0
     config: str = "by hand"
 
     def __post_init__(self):
         names = [thing.name for thing in self.objects]
         require("objects", len(set(names)) == len(names), "unique names", names)
+        if self.joints is not None:
+            check_finite("joints", check_shape("joints", self.joints, (9,)))
         for thing in self.objects:
             off = np.abs(np.subtract(thing.position[:2], self.table.centre)) > np.array(self.table.size[:2]) / 2
             where = f"{self.table.size[:2]} m around {self.table.centre}"

@@ -1,6 +1,5 @@
 """The same mask by other means (topic 09): other stacks' ways to it, and their listings, in Python.
 
-threshold: HSV ranges. regions: k-means, components, the choice of one. objects: what stands on a table, by depth and
-colours. matlab: labels with scores, a montage. small_fcn: three layers. The same network in other engines:
-`labkit.learning.engines`.
+threshold: HSV ranges. regions: k-means, components, the choice of one. matlab: labels with scores, a montage.
+small_fcn: three layers. The same network in other engines: `labkit.learning.engines`.
 """

@@ -1,8 +1,8 @@
 """How numba compiles the loops in the modules ending in `_kernels`, and where it keeps what it compiled.
 
-A kernel is called from Python; what it is compiled to is kept in files beside the code. A part is called by kernels
-and other parts only. It compiles faster, as it needs no entrance from Python and no file; called from Python it would
-run as Python. Arrays are made outside, and loops say what NumPy's functions would: numba takes longer to compile
+A kernel is called from Python; what it is compiled to is kept in files beside the code. What is `inline` is called by
+kernels and their like only. It compiles faster, as it needs no entrance from Python and no file; called from Python it
+would run as Python. Arrays are made outside, and loops say what NumPy's functions would: numba takes longer to compile
 `np.full`, `x.min()` or `x[:] = 0` than a loop.
 """
 
@@ -10,13 +10,14 @@ import os
 from pathlib import Path
 
 from numba import config, njit
-from numba.core.caching import CacheImpl, UserWideCacheLocator
+from numba.core import caching
 from numba.extending import register_jitable
 
 from labkit.support.files import write_atomically
 
 KERNELS = []  # all whose modules are loaded
-part = register_jitable
+UserWide = getattr(caching, "UserWideCacheLocator", None) or caching._UserWideCacheLocator  # the name before numba 0.62
+inline = register_jitable
 
 
 def kernel(function):
@@ -25,7 +26,7 @@ def kernel(function):
     return KERNELS[-1]
 
 
-class CopyOfSharedCache(UserWideCacheLocator):
+class CopyOfSharedCache(UserWide):
     """The user's own cache of a kernel, to which whatever is newer beside the code is copied first.
 
     Numba reads a cache only in a folder that it may write to. The users of one read-only installation would each
@@ -46,6 +47,5 @@ class CopyOfSharedCache(UserWideCacheLocator):
         return own
 
 
-if not config.CACHE_LOCATOR_CLASSES:
-    choices = [CopyOfSharedCache, *CacheImpl._locator_classes]
-    config.CACHE_LOCATOR_CLASSES = ",".join(f"{choice.__module__}.{choice.__name__}" for choice in choices)
+# Asked first, unless the user's NUMBA_CACHE_LOCATOR_CLASSES (which numba knows since 0.62) names others.
+caching.CacheImpl._locator_classes = [CopyOfSharedCache, *caching.CacheImpl._locator_classes]

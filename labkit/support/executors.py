@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, as_completed, wait
 from contextlib import contextmanager
 from hashlib import sha256
-from importlib.metadata import version
 from itertools import starmap
 from pathlib import Path
 
@@ -95,7 +94,7 @@ def one_thread() -> None:
 def kit_version() -> str:
     """Name this installation of the kit: its version, and a digest of its code."""
     files = sorted(Path(labkit.__file__).parent.rglob("*.py"))
-    return f"{version('labkit')}, code {sha256(b''.join(path.read_bytes() for path in files)).hexdigest()[:8]}"
+    return f"{labkit.__version__}, code {sha256(b''.join(path.read_bytes() for path in files)).hexdigest()[:8]}"
 
 
 def _check_workers(client, address: str) -> None:

@@ -4,9 +4,11 @@ For the image NumPy needs a pass over memory for each operation. For the points 
 times as long as a grid of cubes. The benchmark of this topic measures both.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from labkit.support.compiled import kernel, part
+from labkit.support.compiled import inline, kernel
 
 
 def scale_rays(depth, rays, t):
@@ -38,15 +40,28 @@ def scale_rows(depth, rays, t, P):
                 row[k] = row[k] * ray[k] + t[k]
 
 
-@kernel
-def fill_channels(depth, q, q_u, q_v, axes, slant, camera_height, reach, footprint, out):
-    """Compute the geometry channels of every pixel, `out` (H, W, 7) in 0..1, from 1 / depth and its slopes.
+class Viewpoint(NamedTuple):
+    """What the geometry channels depend on besides depth; all float32.
 
     axes: (3, 3), from the gradient (q_u, q_v, q_1) of 1 / depth to the normal's parts. slant: (3,), the height that a
-    ray gains for each metre of depth is its product with (u, v, 1). reach: the metres of the two height channels.
-    footprint: metres at which its channel is 0.5, times the focal length. All float32; `out` comes as 0.5 everywhere,
-    which a pixel without depth keeps.
+    ray gains for each metre of depth is its product with (u, v, 1). height: of the camera over the table. reach: the
+    metres of the two height channels. footprint: metres at which its channel is 0.5, times the focal length.
     """
+
+    axes: np.ndarray
+    slant: np.ndarray
+    height: np.float32
+    reach: np.ndarray
+    footprint: np.float32
+
+
+@kernel
+def fill_channels(depth, q, q_u, q_v, viewpoint, out):
+    """Compute the geometry channels of every pixel, `out` (H, W, 7) in 0..1, from 1 / depth and its slopes.
+
+    All float32; `out` comes as 0.5 everywhere, which a pixel without depth keeps.
+    """
+    axes, slant, camera_height, reach, footprint = viewpoint
     H, W = depth.shape
     half, one = np.float32(0.5), np.float32(1.0)
     for v in range(H):
@@ -90,7 +105,7 @@ def sort_into_cells(P, reach):
     return order, points[order], (keys, np.append(starts, len(P)), x_step, y_step)
 
 
-@part
+@inline
 def nearby_cells(keys, offset):
     """Find, for every cell a, the run of cells first[a] to last[a] whose keys are within 2 of keys[a] + offset.
 
@@ -108,7 +123,7 @@ def nearby_cells(keys, offset):
     return first, last
 
 
-@part
+@inline
 def within(points, i, j, reach):
     """Say whether two points are at most `reach` apart."""
     x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
@@ -138,7 +153,7 @@ def add_neighbours(points, keys, starts, x_step, y_step, reach, enough, count):
                             count[i] += within(points, i, j, reach)
 
 
-@part
+@inline
 def root(parent, a):
     """Follow a cell to the root of its tree, shortening the way for the next time."""
     while parent[a] != a:
@@ -147,7 +162,7 @@ def root(parent, a):
     return a
 
 
-@part
+@inline
 def touch(points, starts, a, b, reach):
     """Say whether any point of cell a is within `reach` of any point of cell b."""
     for i in range(starts[a], starts[a + 1]):

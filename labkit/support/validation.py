@@ -7,7 +7,9 @@ import numpy as np
 
 # No sensor of this kit sees further, and no arm's camera stands further away; larger numbers are millimetres.
 MAX_DEPTH_M = 100.0
+FILL = "fill them: array.filled(...)"
 MAX_TRANSLATION_M = 20.0
+MAX_ITERATIONS = 10_000  # of any method here: more is a slip, and looks like a program that hangs
 
 
 def require(name: str, fits, expected: str, got) -> None:
@@ -33,13 +35,49 @@ def check_whole(name: str, value, least: int, most: int | None = None) -> int:
     return int(value)
 
 
+def check_number(name: str, value, least: float, most: float) -> float:
+    """Return a real number from `least` to `most`; NaN, True, texts and arrays are none.
+
+    >>> check_number("theta", 1e-8, least=1e-3, most=1e6)
+    Traceback (most recent call last):
+    ...
+    ValueError: theta: expected a number from 0.001 to 1e+06, got 1e-08
+    """
+    real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    require(name, real and least <= value <= most, f"a number from {least:g} to {most:g}", lambda: repr_of(value))
+    return float(value)
+
+
+def repr_of(value) -> str:
+    """A value in a message: in short, and NumPy's numbers as Python's."""
+    text = repr(value.item() if isinstance(value, np.generic) else value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def as_array(name: str, value) -> np.ndarray:
+    """Return a value as an ndarray; one with masked values is refused, since nothing here computes without these.
+
+    >>> as_array("depth", np.ma.masked_equal([0.0, 0.5], 0.0))
+    Traceback (most recent call last):
+    ...
+    ValueError: depth: expected an array without a mask, got 1 masked values of 2; fill them: array.filled(...)
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        count = int(np.ma.getmaskarray(value).sum())
+        require(name, not count, "an array without a mask", f"{count} masked values of {value.size}; {FILL}")
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected an array, got rows of different lengths") from error
+
+
 def check_shape(name: str, array, shape: tuple) -> np.ndarray:
     """Return `array` as an ndarray if its shape fits; None in `shape` stands for any length.
 
     >>> check_shape("P", [[1.0, 2.0, 3.0]], (None, 3)).shape
     (1, 3)
     """
-    array = np.asarray(array)
+    array = as_array(name, array)
     fits = array.ndim == len(shape) and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
     if not fits:
         expected = str(tuple("any" if s is None else s for s in shape)).replace("'", "")
@@ -54,7 +92,7 @@ def check_same_size(name_a: str, a: np.ndarray, name_b: str, b: np.ndarray) -> N
 
 def check_finite(name: str, array: np.ndarray) -> np.ndarray:
     """Return `array` if it is real, numeric and without NaN or infinity."""
-    array = np.asarray(array)
+    array = as_array(name, array)
     require(name, array.dtype.kind in "fiu", "real numbers", lambda: f"dtype {array.dtype}")
     bad = array.size - np.count_nonzero(np.isfinite(array))
     require(name, not bad, "finite numbers", lambda: f"{bad} NaN or infinite of {array.size}")
@@ -94,7 +132,7 @@ def check_depth(name: str, depth) -> np.ndarray:
 
 def check_points(name: str, P) -> np.ndarray:
     """Return points, floating point (..., 3): x, y, z on the last axis; NaN is fine."""
-    P = np.asarray(P)
+    P = as_array(name, P)
     if P.ndim == 0 or P.shape[-1] != 3 or P.dtype.kind != "f":
         raise ValueError(f"{name}: expected floating-point x, y, z on the last axis, got {P.dtype} {P.shape}")
     return P
@@ -106,7 +144,7 @@ def check_K(name: str, K) -> np.ndarray:
     if K[1, 0] or K[2, 0] or K[2, 1]:
         raise ValueError(f"{name}: expected an upper triangular intrinsic matrix, got {K.tolist()}; is it transposed?")
     require(name, K[2, 2] == 1.0, "its last row to be 0 0 1", K[2].tolist)
-    if not (K[0, 0] > 0.0 and K[1, 1] > 0.0):
+    if not (K[0, 0] > 1e-9 and K[1, 1] > 1e-9):  # pixels; below, its inverse has no numbers
         raise ValueError(f"{name}: expected positive focal lengths (else it is singular), got {K[0, 0]} and {K[1, 1]}")
     return K
 
@@ -133,7 +171,7 @@ def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
 
 def check_labels(name: str, y, num_classes: int, ignore: int | None = 255) -> np.ndarray:
     """Return integer labels in 0 .. num_classes - 1, or `ignore`; any shape and integer dtype."""
-    y = np.asarray(y)
+    y = as_array(name, y)
     require(name, y.dtype.kind in "iu", "integer labels", lambda: f"dtype {y.dtype}")
     if y.size and (y.min() < 0 or y.max() >= num_classes):
         wrong = (y < 0) | (y >= num_classes)

@@ -1,1 +1,0 @@
-"""What needs a student, an instructor or Jupyter: questions and their checks, grading, release, explorers, plots."""

@@ -1,1 +1,0 @@
-"""Questions of topic 09: blobs, labels and their size, colours and regions."""

@@ -1,0 +1,197 @@
+"""Telling things apart: each pixel votes for the middle of its thing, and votes that agree are one thing.
+
+Classes cannot do it: two mugs that touch are one region of "mug". So the network says three more numbers at each pixel
+(`labkit.learning.inference.THINGS`): whether it is on a thing at all, and the arrow (du, dv) from the pixel to the
+middle of its thing's visible pixels. That is a Hough transform with a learnt vote. Hough found lines so: each point
+votes for every line it may lie on, and a line is where many votes meet. Here a pixel x has one vote, the place x +
+d(x), and n pixels of one thing that vote without error put n votes on one place; pixels of its neighbour, however
+close, put theirs on another. With errors of a few pixels the n votes lie in a spot, which a histogram, smoothed, turns
+into a peak. What two things share is no longer a border but a valley between two peaks.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Float32, Int32, Integer
+
+from labkit.frame import RGBDFrame
+from labkit.labels import IGNORE
+from labkit.learning.inference import VOTE_UNIT, Sight
+from labkit.support.validation import check_finite, check_shape, require
+
+if TYPE_CHECKING:
+    import torch
+
+CELL = 3  # pixels of the view along a side of the histogram's cells
+SPREAD = 1.6  # cells: standard deviation of the Gaussian that smooths the histogram
+APART = 16  # pixels: of two peaks that are closer, the lower one is none
+ENOUGH = 1.2  # votes in a cell of the smoothed histogram: a lower peak is none
+LEAST = 60  # pixels of the view: a smaller thing is none
+AGREES = 0.5  # of the radius of a disc of the thing's area: a vote that misses the peak by less agrees with it
+VOTES_COUNT = 8.0  # weight of a vote's loss at a pixel of a thing, against that of the foreground at any pixel
+
+
+@dataclass(frozen=True, eq=False)
+class Things:
+    """The things of one frame.
+
+    instances: int32 (H, W), 0 where there is none, things numbered from 1, the largest first. certainty: for each
+    thing, in 0..1, how sure it is that there is one and that it is one. foreground: float32 (H, W), probability that a
+    pixel is on a thing. probabilities: of the classes, float32 (H, W, C), by the same run of the network.
+    """
+
+    instances: Int32[np.ndarray, "H W"]
+    certainty: tuple[float, ...]
+    foreground: Float32[np.ndarray, "H W"]
+    probabilities: Float32[np.ndarray, "H W C"]
+
+    def __len__(self) -> int:
+        return len(self.certainty)
+
+
+def find_things(model, frame: RGBDFrame, mirror: bool = True) -> Things:
+    """Find every thing in a frame, whatever it is and wherever it stands: one run of the network, then `group`.
+
+    model: a network that tells things apart, such as the kit's unet_rgbd, or an engine of one. mirror: look at the
+    mirror image, too. Nothing found is no error: `len(things)` is 0. Raises ValueError for another network.
+    """
+    from labkit.learning.engines import open_engine
+
+    engine = check_tells_things(open_engine(model))
+    probabilities, sight = engine.see(frame, mirror)
+    numbers, certainty = group(sight.foreground, sight.votes)
+    instances, foreground = brought_back(sight, numbers)
+    left = np.unique(instances[instances > 0])  # a thing may lie outside the picture, or between its pixels
+    number_of = np.zeros(len(certainty) + 1, np.int32)
+    number_of[left] = np.arange(1, len(left) + 1)
+    return Things(number_of[instances], tuple(certainty[k - 1] for k in left), foreground, probabilities)
+
+
+def check_tells_things(engine):
+    """Return an engine whose network tells things apart; raises ValueError for one of classes alone."""
+    wanted = "a network that tells things apart, such as unet_rgbd, or `labkit train --things` of one"
+    require("model", getattr(engine, "things", False), wanted, "one of classes alone")
+    return engine
+
+
+def brought_back(sight: Sight, numbers: Int32[np.ndarray, "h w"]):
+    """Instances and foreground at the picture's own pixels: the nearest pixel's of the view, and interpolated."""
+    if sight.view is None:
+        return numbers, sight.foreground
+    back = sight.view.back
+    instances = back(numbers[..., None].astype(np.float32), cv2.INTER_NEAREST)[..., 0].astype(np.int32)
+    return instances, np.ascontiguousarray(back(sight.foreground[..., None])[..., 0])
+
+
+def group(
+    foreground: Float[np.ndarray, "h w"], votes: Float[np.ndarray, "h w 2"]
+) -> tuple[Int32[np.ndarray, "h w"], tuple[float, ...]]:
+    """Group pixels by their votes: numbers of things (0 is none), the largest first, and the certainty of each.
+
+    foreground: probability that a pixel is on a thing; those above 0.5 vote. votes: (du, dv), pixels, from each pixel
+    to the middle of its thing. Peaks of the smoothed histogram of votes are the things; a pixel is of the peak that its
+    vote is nearest to. The certainty of a thing is the mean over its pixels of its foreground where the vote agrees
+    with the peak, and 0 where it does not. Raises ValueError for another shape, NaN, or a foreground outside 0..1.
+
+    >>> foreground, votes = np.zeros((40, 90)), np.zeros((40, 90, 2))
+    >>> for left in (10, 40):  # two squares of 30 pixels that touch
+    ...     foreground[5:35, left : left + 30] = 1.0
+    ...     v, u = np.mgrid[5:35, left : left + 30]
+    ...     votes[5:35, left : left + 30] = np.stack([left + 14.5 - u, 19.5 - v], axis=-1)
+    >>> numbers, certainty = group(foreground, votes)
+    >>> numbers[20, [5, 39, 40]].tolist(), certainty
+    ([0, 1, 2], (1.0, 1.0))
+    """
+    foreground = check_finite("foreground", check_shape("foreground", foreground, (None, None)))
+    require("foreground", ((foreground >= 0.0) & (foreground <= 1.0)).all(), "probabilities in 0..1", "others")
+    votes = check_finite("votes", check_shape("votes", votes, (*foreground.shape, 2)))
+    v, u = np.nonzero(foreground > 0.5)
+    numbers = np.zeros(foreground.shape, np.int32)
+    places = np.stack([u, v], axis=1) + votes[v, u]
+    peaks = peaks_of(histogram(places))
+    if len(peaks) == 0:
+        return numbers, ()
+    distance, nearest = nearest_of(places, peaks)
+    pixels = np.bincount(nearest, minlength=len(peaks))
+    order = [k for k in np.argsort(-pixels, kind="stable") if pixels[k] >= LEAST]
+    number_of = np.zeros(len(peaks), np.int32)
+    number_of[order] = np.arange(1, len(order) + 1)
+    numbers[v, u] = number_of[nearest]
+    agrees = distance < AGREES * np.sqrt(pixels[nearest] / np.pi)
+    sure = np.bincount(nearest, foreground[v, u] * agrees, len(peaks)) / np.maximum(pixels, 1)
+    return numbers, tuple(sure[order].tolist())
+
+
+def histogram(places: Float[np.ndarray, "N 2"]) -> tuple[Float32[np.ndarray, "r c"], Float[np.ndarray, "2"]]:
+    """Count votes (u, v) in cells of CELL pixels, smoothed; and the place of the first cell's middle.
+
+    A vote is shared among the four cells around it, by its distance to their middles, so that no cell's edge tells.
+    """
+    if len(places) == 0:
+        return np.zeros((1, 1), np.float32), np.zeros(2)
+    pad = int(np.ceil(4 * SPREAD))
+    first = places.min(axis=0) - pad * CELL
+    at = (places - first) / CELL
+    low = np.floor(at).astype(np.intp)
+    share = at - low
+    size = low.max(axis=0) + 2 + pad
+    counts = np.zeros(size[0] * size[1])
+    for i in (0, 1):
+        for j in (0, 1):
+            weight = np.abs(1 - i - share[:, 0]) * np.abs(1 - j - share[:, 1])
+            counts += np.bincount((low[:, 1] + j) * size[0] + low[:, 0] + i, weight, len(counts))
+    return cv2.GaussianBlur(counts.reshape(size[1], size[0]).astype(np.float32), (0, 0), SPREAD), first
+
+
+def peaks_of(smoothed) -> Float[np.ndarray, "K 2"]:
+    """The places (u, v) of a histogram's peaks: cells that are the highest within APART pixels, and ENOUGH."""
+    counts, first = smoothed
+    reach = int(APART // CELL)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    row, column = np.nonzero((counts == cv2.dilate(counts, disc)) & (counts > ENOUGH))
+    return first + CELL * np.stack([column, row], axis=1)
+
+
+def nearest_of(places: Float[np.ndarray, "N 2"], peaks: Float[np.ndarray, "K 2"]):
+    """For each place the distance to the nearest peak, and that peak's number."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(peaks).query(places)
+
+
+def vote_targets(instances: Integer[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W 2"]:
+    """The true votes: (du, dv) from each pixel of a thing to the mean place of all its pixels; 0 elsewhere.
+
+    >>> vote_targets(np.array([[7, 7, 7, 0, 2]]))[0, :, 0].tolist()
+    [1.0, 0.0, -1.0, 0.0, 0.0]
+    """
+    v, u = np.nonzero((instances > 0) & (instances != IGNORE))
+    number = instances[v, u]
+    votes = np.zeros((*instances.shape, 2), np.float32)
+    pixels = np.maximum(np.bincount(number), 1)
+    for axis, place in enumerate((u, v)):
+        votes[v, u, axis] = (np.bincount(number, place) / pixels)[number] - place
+    return votes
+
+
+def things_loss(z: "torch.Tensor", instances: "torch.Tensor") -> "torch.Tensor":
+    """Give the loss of the channels `THINGS` (N, 3, H, W): the foreground's cross-entropy, and the votes' smooth L1.
+
+    instances: (N, H, W), 0 is no thing, pixels of 255 are left out. A vote counts where a thing is. Its loss is
+    quadratic up to 4 pixels of error and linear beyond, so that a pixel that cannot know, on a half hidden thing, does
+    not pull more than others. All is summed over pixels and divided by the number of those counted, as
+    `segmentation_loss` is.
+    """
+    import torch
+    from torch.nn import functional as F
+
+    known = instances != IGNORE
+    foreground = (instances > 0) & known
+    truth = torch.from_numpy(np.stack([vote_targets(each) for each in instances.cpu().numpy()])).to(z.device)
+    z = z.float()
+    of_foreground = F.binary_cross_entropy_with_logits(z[:, 0], foreground.float(), reduction="none")
+    of_votes = F.smooth_l1_loss(z[:, 1:], truth.permute(0, 3, 1, 2) / VOTE_UNIT, reduction="none", beta=0.2).sum(dim=1)
+    total = (of_foreground * known).sum() + VOTES_COUNT * (of_votes * foreground).sum()
+    return total / known.sum().clamp(min=1)

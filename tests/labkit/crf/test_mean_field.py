@@ -1,0 +1,159 @@
+"""Enumeration and mean field against each other, the lattice against the sum over all pairs of pixels."""
+
+import itertools
+
+import numpy as np
+import pytest
+from random_crf import random_crf
+from scipy.special import logsumexp, softmax
+
+from labkit.crf import PottsCRF, dense_crf, log_partition, marginals
+from labkit.crf.dense import GaussianFilter
+from labkit.crf.energy import pair_slices
+from labkit.crf.mean_field import mean_field_marginals
+
+
+def free_energy(crf, q):
+    """F(q) = <E>_q - entropy(q)."""
+    used = q > 0.0  # 0 log 0 = 0, and a class without probability costs nothing
+    F = (q[used] * (crf.unary[used] + np.log(q[used]))).sum()
+    for w, offset in zip(crf.weights, crf.offsets, strict=True):
+        a, b = pair_slices(offset)
+        F += (w[a] * (1.0 - (q[a] * q[b]).sum(axis=2))).sum()
+    return F
+
+
+def test_without_pairwise_term_Z_and_marginals_factorise():
+    """Problem 3 of the text, for the whole distribution."""
+    crf = random_crf(0, 2, 3, 3, lam=0.0)
+    assert log_partition(crf) == pytest.approx(logsumexp(-crf.unary, axis=2).sum())
+    assert marginals(crf) == pytest.approx(softmax(-crf.unary, axis=2))
+
+
+def test_Z_of_two_pixels_by_hand():
+    psi, w = np.array([[[0.2, 1.0], [0.7, 0.1]]]), 0.9
+    crf = PottsCRF(psi, np.array([[[w, 0.0]], [[0.0, 0.0]]]))
+    Z = np.exp(-0.9) + np.exp(-0.2 - 0.1 - w) + np.exp(-1.0 - 0.7 - w) + np.exp(-1.1)
+    assert log_partition(crf) == pytest.approx(np.log(Z))
+    assert marginals(crf)[0, 0, 0] == pytest.approx((np.exp(-0.9) + np.exp(-0.2 - 0.1 - w)) / Z)
+
+
+def test_marginals_are_the_gradient_of_log_Z():
+    crf, step = random_crf(4, 2, 3, 3, 8), 1e-5
+    p = marginals(crf)
+    for index in [(0, 0, 0), (1, 2, 1), (0, 1, 2)]:
+        nudge = np.zeros(crf.shape)
+        nudge[index] = step
+        up, down = (log_partition(PottsCRF(crf.unary + sign * nudge, crf.weights)) for sign in (1, -1))
+        assert (down - up) / (2 * step) == pytest.approx(p[index], abs=1e-8)
+
+
+def test_a_forbidden_class_has_no_probability():
+    crf = random_crf(5, 2, 4, 3, forbidden=0.5)
+    p = marginals(crf)
+    assert (p[np.isinf(crf.unary)] == 0.0).all() and p.sum(axis=2) == pytest.approx(np.ones((2, 4)))
+    assert np.isfinite(free_energy(crf, mean_field_marginals(crf)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_free_energy_bounds_log_Z_and_falls_with_every_sweep(seed, connectivity):
+    crf = random_crf(seed, 3, 4, 2, connectivity, lam=1.5)
+    falling = [free_energy(crf, mean_field_marginals(crf, n)) for n in range(1, 8)]
+    assert all(later <= earlier + 1e-12 for earlier, later in itertools.pairwise(falling))
+    assert falling[-1] >= -log_partition(crf)
+
+
+def test_mean_field_stops_where_each_pixel_is_the_softmax_of_its_mean_cost():
+    crf = random_crf(6, 4, 5, 3, 4, lam=0.4)
+    q = mean_field_marginals(crf, 200)
+    cost = crf.unary.copy()
+    cost[:, 1:] -= crf.weights[0][:, :-1, None] * q[:, :-1]
+    cost[:, :-1] -= crf.weights[0][:, :-1, None] * q[:, 1:]
+    cost[1:] -= crf.weights[1][:-1, :, None] * q[:-1]
+    cost[:-1] -= crf.weights[1][:-1, :, None] * q[1:]
+    assert q == pytest.approx(softmax(-cost, axis=2), abs=1e-9)
+
+
+def all_pairs_filter(features, values):
+    """The symmetrically normalised Gaussian, summed over all pairs."""
+    f = features.reshape(-1, features.shape[2])
+    K = np.exp(-0.5 * ((f[:, None] - f[None]) ** 2).sum(axis=2))
+    scale = 1.0 / np.sqrt(K.sum(axis=1))
+    return scale[:, None] * (K @ (scale[:, None] * values))
+
+
+@pytest.mark.parametrize("colours", [0, 1, 3])
+def test_the_lattice_is_close_to_the_sum_over_all_pairs(colours):
+    rng = np.random.default_rng(colours)
+    v, u = np.indices((24, 32)) / 5.0
+    shades = [np.sin(0.3 * (k + 1) * u) + 0.5 * v for k in range(colours)]
+    features = np.stack([u, v, *shades], axis=2)
+    values = rng.random((24 * 32, 2)).astype(np.float32) + (u.ravel()[:, None] > 3)
+    filtered = GaussianFilter("features", features).filtered(values)
+    exact = all_pairs_filter(features, values)
+    error = np.abs(filtered - exact) / exact.mean()
+    assert np.median(error) < 0.03 and error.max() < 0.25
+    assert np.corrcoef(filtered.ravel(), exact.ravel())[0, 1] > 0.995
+
+
+def test_dense_mean_field_on_a_small_image_is_close_to_all_pairs():
+    rng = np.random.default_rng(1)
+    H, W, C = 16, 20, 3
+    image = np.zeros((H, W, 3))
+    image[:, 10:] = 100.0
+    unary = rng.normal(size=(H, W, C)) - 0.5 * np.eye(C)[(np.arange(W) >= 10) * 2]
+    v, u = np.indices((H, W))
+    q = softmax(-unary.reshape(-1, C), axis=1)
+    for _ in range(5):
+        appearance = all_pairs_filter(np.dstack([u / 8.0, v / 8.0, image / 20.0]), q)
+        q = softmax(-unary.reshape(-1, C) + 4.0 * appearance + all_pairs_filter(np.dstack([u, v]) / 2.0, q), axis=1)
+    options = {"theta_alpha": 8.0, "theta_beta": 20.0, "w_appearance": 4.0, "theta_gamma": 2.0, "w_smoothness": 1.0}
+    ours = dense_crf(unary, image, iterations=5, **options)
+    agree = ours.argmax(axis=2).ravel() == q.argmax(axis=1)
+    assert agree.mean() > 0.97
+    assert ours.sum(axis=2) == pytest.approx(np.ones((H, W)), abs=1e-5)
+
+
+def test_dense_crf_without_weights_is_the_softmax_of_the_unary_term():
+    unary = np.random.default_rng(2).normal(size=(6, 7, 4))
+    q = dense_crf(unary, np.zeros((6, 7)), w_appearance=0.0, w_smoothness=0.0)
+    assert q == pytest.approx(softmax(-unary, axis=2), abs=1e-6)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("unary", {"unary": np.full((4, 5, 2), np.inf)}),
+        ("image", {"image": np.zeros((5, 4, 3))}),
+        ("theta_alpha", {"theta_alpha": 0.0}),
+        ("theta_beta", {"theta_beta": np.nan}),
+        ("w_smoothness", {"w_smoothness": -1.0}),
+        ("iterations", {"iterations": -1}),
+        ("iterations", {"iterations": 10**9}),
+        ("iterations", {"iterations": True}),
+        ("theta_gamma", {"theta_gamma": 1e-8}),
+        ("theta_gamma", {"theta_gamma": "3"}),
+        ("theta_beta", {"image": np.full((4, 5, 3), 2**62)}),
+        ("unary", {"unary": np.full((4, 5, 2), 2.0**62) * 1e20}),
+        ("w_appearance", {"w_appearance": 1e300}),
+        ("image", {"image": np.zeros((4, 5, 17))}),
+        ("image", {"image": np.ma.masked_all((4, 5, 3))}),
+        ("unary", {"unary": np.ma.masked_greater(np.eye(20).reshape(20, 10, 2), 0.5)}),
+        ("theta", {"theta_alpha": 1e-4, "theta_beta": 1e-6, "image": np.arange(60).reshape(4, 5, 3) * 1.0}),
+    ],
+)
+def test_bad_input_names_the_argument(name, arguments):
+    with pytest.raises(ValueError, match=name):
+        dense_crf(**{"unary": np.zeros((4, 5, 2)), "image": np.zeros((4, 5, 3)), **arguments})
+
+
+@pytest.mark.parametrize(
+    "options", [{"w_appearance": 1e30, "w_smoothness": 1e30}, {"theta_gamma": 1e-3}, {"theta_beta": 1.0}]
+)
+def test_the_largest_that_is_taken_gives_probabilities(options):
+    """At the limits each pixel's classes still sum to 1: no NaN in silence."""
+    image = np.random.default_rng(0).integers(0, 256, (4, 5, 3))
+    q = dense_crf(np.full((4, 5, 2), 1e30), image, **{"theta_beta": 10.0, **options})
+    assert q.sum(axis=2) == pytest.approx(np.ones((4, 5)))

@@ -1,0 +1,111 @@
+import cv2
+import numpy as np
+import pytest
+
+from labkit.frame import RGBDFrame
+
+K = np.array([[100.0, 0.0, 4.0], [0.0, 110.0, 3.0], [0.0, 0.0, 1.0]])
+GOOD = {
+    "rgb": np.zeros((6, 8, 3), np.uint8),
+    "depth": np.ones((6, 8), np.float32),
+    "K": K,
+    "T_base_cam": np.eye(4),
+    "labels": np.zeros((6, 8), np.int64),
+}
+
+
+def changed(matrix, index, value):
+    matrix = np.array(matrix, dtype=float)
+    matrix[index] = value
+    return matrix
+
+
+def test_a_good_frame_keeps_its_values_in_the_kits_types():
+    depth = np.full((6, 8), 0.5)
+    depth[2, 3], depth[2, 4] = 0.0, np.nan  # no reading
+    frame = RGBDFrame(**(GOOD | {"depth": depth, "table_z": 0.25}))
+    assert frame.depth.dtype == np.float32 and np.array_equal(frame.depth, depth.astype(np.float32), equal_nan=True)
+    assert frame.labels.dtype == np.uint8 and frame.size == (8, 6) and frame.table_z == 0.25
+    assert repr(frame) == "RGBDFrame(8 x 6, labels, table_z=0.25)"
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("argument", "value", "says"),
+    [
+        ("rgb", np.zeros((6, 8), np.uint8), "shape"),
+        ("rgb", np.zeros((6, 8, 3)), "uint8"),
+        ("rgb", np.zeros((0, 8, 3), np.uint8), "pixel"),
+        ("depth", np.ones((8, 6), np.float32), "size"),
+        ("depth", np.ones((6, 8), np.uint16), "millimetres"),
+        ("depth", np.full((6, 8), 850.0, np.float32), "millimetres"),
+        ("depth", np.full((6, 8), -0.1, np.float32), ">= 0"),
+        ("depth", np.full((6, 8), np.inf, np.float32), "0 or NaN"),
+        ("K", K.T, "transposed"),
+        ("K", changed(K, (0, 0), 0.0), "singular"),
+        ("K", changed(K, (0, 0), np.nan), "finite"),
+        ("K", np.eye(4), "shape"),
+        ("T_base_cam", 2.0 * np.eye(4), "0 0 0 1"),
+        ("T_base_cam", changed(np.eye(4), (0, 0), 1.1), "orthonormal"),
+        ("T_base_cam", changed(np.eye(4), (0, 0), -1.0), "right-handed"),
+        ("T_base_cam", changed(np.eye(4), (3, 0), 1.0), "transposed"),
+        ("T_base_cam", np.eye(3), "shape"),
+        ("labels", np.full((6, 8), 256), "0 to 254 or 255"),
+        ("labels", np.zeros((6, 8)), "integer"),
+        ("labels", np.zeros((5, 8), int), "size"),
+        ("instances", np.zeros((6, 9), np.uint8), "size"),
+        ("table_z", 750, "millimetres"),
+        ("table_z", np.inf, "finite"),
+    ],
+)
+def test_wrong_arguments_are_named(argument, value, says):
+    with pytest.raises(ValueError, match=rf"^{argument}: .*{says}"):
+        RGBDFrame(**(GOOD | {argument: value}))
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Random images on disk, and what they hold."""
+    rng = np.random.default_rng(0)
+    images = {
+        "rgb": rng.integers(0, 256, (6, 8, 3), dtype=np.uint8),
+        "depth": rng.integers(0, 3000, (6, 8), dtype=np.uint16),
+        "labels": rng.integers(0, 4, (6, 8), dtype=np.uint8),
+    }
+    for name, image in images.items():
+        assert cv2.imwrite(str(tmp_path / f"{name}.png"), image[..., ::-1] if name == "rgb" else image)
+    return {name: tmp_path / f"{name}.png" for name in images}, images
+
+
+def test_from_files_reads_what_was_written(files):
+    paths, images = files
+    frame = RGBDFrame.from_files(**paths, K=K, T_base_cam=np.eye(4), depth_scale=0.0005, table_z=0.1)
+    assert np.array_equal(frame.rgb, images["rgb"]) and np.array_equal(frame.labels, images["labels"])
+    assert np.allclose(frame.depth, images["depth"] * 0.0005, atol=1e-6) and frame.table_z == 0.1
+
+
+def test_numbers_of_objects_may_have_16_bits(files, tmp_path):
+    paths, _ = files
+    for dtype, most in ((np.uint8, 200), (np.uint16, 60_000)):
+        numbers = np.linspace(0, most, 48).reshape(6, 8).astype(dtype)
+        cv2.imwrite(str(tmp_path / "instances.png"), numbers)
+        known = paths | {"instances": tmp_path / "instances.png"}
+        frame = RGBDFrame.from_files(**known, K=K, T_base_cam=np.eye(4))
+        assert np.array_equal(frame.instances, numbers) and frame.instances.dtype == dtype
+
+
+@pytest.mark.bad_input
+def test_files_that_do_not_fit_are_named(files, tmp_path):
+    paths, _ = files
+    truncated = tmp_path / "truncated.png"
+    truncated.write_bytes(paths["rgb"].read_bytes()[:20])
+    cases = [
+        ({"rgb": tmp_path / "nowhere.png"}, FileNotFoundError, "nowhere"),
+        ({"rgb": truncated}, ValueError, r"^rgb: .*damaged"),
+        ({"depth": paths["labels"]}, ValueError, r"^depth: expected uint16"),
+        ({"rgb": paths["depth"]}, ValueError, r"^rgb: expected uint8 .*uint16 .*swapped"),
+        ({"depth_scale": 0.0}, ValueError, r"^depth_scale:"),
+    ]
+    for change, error, says in cases:
+        with pytest.raises(error, match=says):
+            RGBDFrame.from_files(**(paths | {"K": K, "T_base_cam": np.eye(4)} | change))
