@@ -26,6 +26,7 @@ from data_gen.scenes import CONFIGS, sample_scene
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import CLASSES
+from labkit.learning.paint import painted
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
 from labkit.support.executors import as_they_come
@@ -38,10 +39,18 @@ KINDS = ("rgb", "depth", "labels", "instances")
 FAMILY_NUMBER = {family: number for number, family in enumerate(FAMILIES, start=1)}
 
 
-def render(spec: SceneSpec, size: tuple[int, int] = (320, 240)) -> RGBDFrame:
-    """Load a scene, let it settle and take its picture; size is (width, height)."""
+def render(spec: SceneSpec, size: tuple[int, int] = (320, 240), smooth: bool = False) -> RGBDFrame:
+    """Load a scene, let it settle and take its picture; size is (width, height), smooth as in `World.render`."""
     with World(spec) as world:
-        return world.render(size)
+        return picture_of(world, size, smooth)
+
+
+def picture_of(world: World, size: tuple[int, int], smooth: bool = False) -> RGBDFrame:
+    """Take a World's picture; the things of a config that paints them have patches of other colours."""
+    frame, spec = world.render(size, smooth=smooth), world.spec
+    if spec.config not in CONFIGS or not CONFIGS[spec.config].painted:
+        return frame
+    return painted(frame, np.random.default_rng([spec.seed, 4]))
 
 
 def generate(
@@ -113,7 +122,7 @@ def write_frame(out: str, index: int, seed: int, config: str, size, sensor: Dept
     out = Path(out)
     spec = sample_scene(seed, config)
     with World(spec) as world:
-        frame = world.render(size)
+        frame = picture_of(world, size)
         poses = world.poses()
     if sensor is not None:
         frame = sensor.apply(frame, np.random.default_rng([seed, 1]))

@@ -4,8 +4,10 @@ import colorsys
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from data_gen import clutter
 from data_gen.families import FAMILIES, quaternion
 from data_gen.wide import WIDE
 from labkit.labels import OBSTACLE, TARGET
@@ -26,7 +28,10 @@ class SceneConfig:
     Ranges are (low, high): distance in metres, elevation in radians above the table (several ranges are drawn from with
     equal chance), roll about the line of sight up to so many radians. hard: object proportions and models that training
     never sees. wide: every other object is of `data_gen.wide`'s proportions. fov_y: of the camera, radians. renderer,
-    sensor: as in `labkit.sim.spec.Camera`.
+    sensor: as in `labkit.sim.spec.Camera`. crowd: so many things of any class, dropped as they fall
+    (`data_gen.clutter`), in place of targets among obstacles. bins: the share of scenes whose things lie in a bin.
+    sizes: factor of things that are not of a household's size. painted: things have patches and stripes of other
+    colours.
     """
 
     stream: int
@@ -41,8 +46,18 @@ class SceneConfig:
     fov_y: tuple[float, float] = (0.55, 0.85)
     renderer: str = "tiny"
     sensor: str = "exact"
+    crowd: tuple[int, int] | None = None
+    bins: float = 0.0
+    sizes: tuple[float, float] = (1.0, 1.0)
+    painted: bool = False
 
 
+CROWDED = {
+    "roll": 3.1,
+    "fov_y": (0.55, 0.95),
+    "sizes": (1.0, 1.8),
+    "painted": True,
+}
 CONFIGS = {
     "train": SceneConfig(stream=0),
     "test": SceneConfig(stream=1),
@@ -78,7 +93,19 @@ CONFIGS = {
         renderer="egl",
         sensor="stereo",
     ),
+    "clutter": SceneConfig(
+        stream=6, crowd=(1, 20), elevations=((0.3, 0.7), (0.7, 1.1), (1.1, 1.56)), distance=(0.5, 1.4), **CROWDED
+    ),
+    "bin": SceneConfig(
+        stream=7, crowd=(2, 20), bins=1.0, elevations=((0.6, 1.0), (1.0, 1.56)), distance=(0.5, 1.1), **CROWDED
+    ),
 }
+
+
+# Ranges in place of every config's own, metres and degrees: empty, but in a notebook whose course has another camera
+# (`labcourse.camera`).
+HELD: dict[str, tuple[float, float]] = {}
+MOST_TRIES = 10_000  # to find a camera that sees all targets
 
 
 def sample_scene(seed: int, config: str = "train") -> SceneSpec:
@@ -86,9 +113,11 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
 
     config: "train", "test" (the same distribution, other scenes), "hard" (shapes, textures and viewpoints that are not
     in train), "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data), "any"
-    (wide's objects from every elevation up to 89 degrees, at any roll: training data as well) or "other" (test's
-    objects as another camera sees them: from overhead, wide-angled, drawn by another renderer, with depth
-    of a stereo pair). Raises ValueError for a negative seed or an unknown config.
+    (wide's objects from every elevation up to 89 degrees, at any roll: training data as well), "other" (test's objects
+    as another camera sees them: from overhead, wide-angled, drawn by another renderer, with depth of a stereo pair),
+    "clutter" (1 to 20 things from a marker to a jug, in heaps or loosely, on tables that end in view, beside shelves,
+    with the arm in the picture: training data) or "bin" (such things in a bin). Raises ValueError for a negative seed
+    or an unknown config.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
@@ -96,19 +125,56 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     """
     require("config", config in CONFIGS, f"one of {sorted(CONFIGS)}", repr(config))
     require("seed", isinstance(seed, (int, np.integer)) and seed >= 0, "an integer of at least 0", repr(seed))
-    kind = CONFIGS[config]
+    kind = _as_held(CONFIGS[config])
     rng = np.random.default_rng([kind.stream, int(seed)])
+    if kind.crowd:
+        return _crowded(rng, kind, int(seed), config)
     table = _table(rng, kind)
     azimuth = float(rng.uniform(-1.75, 1.75))
     objects = _objects(rng, kind, table, azimuth)
     return SceneSpec(
         objects=objects,
-        camera=_camera(rng, kind, azimuth, objects),
+        camera=_camera(rng, kind, azimuth, np.array([o.position for o in objects if o.class_id == TARGET])),
         table=table,
         light=_light(rng),
         floor=_texture(rng, kind),
         walls=_texture(rng, kind),
         seed=int(seed),
+        config=config,
+    )
+
+
+def _as_held(kind: SceneConfig) -> SceneConfig:
+    """A config with the ranges of HELD."""
+    ranges = {key: tuple(np.radians(ends)) for key, ends in HELD.items() if key != "distance"}
+    changed = {"distance": HELD["distance"]} if "distance" in HELD else {}
+    changed |= {"elevations": (ranges["elevation"],)} if "elevation" in ranges else {}
+    changed |= {"roll": ranges["roll"][1]} if "roll" in ranges else {}
+    changed |= {"fov_y": ranges["fov_y"]} if "fov_y" in ranges else {}
+    return replace(kind, **changed) if changed else kind
+
+
+def _crowded(rng: np.random.Generator, kind: SceneConfig, seed: int, config: str) -> SceneSpec:
+    """Draw a scene of things as they fall, on a table or in a bin."""
+    table = clutter.table(rng, _texture(rng, kind))
+    count = int(rng.integers(kind.crowd[0], kind.crowd[1] + 1))
+    furniture = clutter.second_plane(rng, table, _texture(rng, kind))
+    if rng.random() < kind.bins:
+        area, walls = clutter.bin_around(rng, table, _colour(rng))
+        furniture = (*walls, *furniture)
+    else:
+        area = clutter.heap_area(rng, table, count)
+    objects = clutter.things(rng, table, area, count, kind.sizes, lambda: _object_colour(rng, table))
+    return SceneSpec(
+        objects=objects,
+        camera=_camera(rng, kind, float(rng.uniform(-1.75, 1.75)), np.array([[area.x, area.y, area.z + 0.03]])),
+        table=table,
+        light=_light(rng),
+        floor=_texture(rng, kind),
+        walls=_texture(rng, kind),
+        furniture=furniture,
+        joints=clutter.arm(rng, table),
+        seed=seed,
         config=config,
     )
 
@@ -155,10 +221,9 @@ def _light(rng: np.random.Generator) -> Light:
     )
 
 
-def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects: tuple[ObjectSpec, ...]) -> Camera:
-    """A camera on the side of `azimuth` (radians from the base's x axis), drawn until it sees every target's centre."""
-    targets = np.array([thing.position for thing in objects if thing.class_id == TARGET])
-    while True:
+def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, targets: Float[np.ndarray, "N 3"]) -> Camera:
+    """A camera on the side of `azimuth` (radians from the base's x axis), drawn until it sees all of these places."""
+    for _ in range(MOST_TRIES):
         low, high = kind.elevations[rng.integers(len(kind.elevations))]
         camera = Camera.looking_at(
             targets.mean(axis=0) + rng.uniform(-0.08, 0.08, 3) * (1.0, 1.0, 0.3),
@@ -177,6 +242,7 @@ def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, objects
         u, v = pixels[:, 0] / pixels[:, 2], pixels[:, 1] / pixels[:, 2]
         if (P_cam[:, 2] > 0.3).all() and (abs(u - 160) < 136).all() and (abs(v - 120) < 100).all():
             return camera
+    raise ValueError(f"camera: expected one that sees all targets, found none with {HELD or kind}: a larger distance?")
 
 
 def _objects(rng, kind: SceneConfig, table: Table, azimuth: float) -> tuple[ObjectSpec, ...]:

@@ -4,10 +4,12 @@ import errno
 import hashlib
 import json
 import os
+import runpy
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +25,17 @@ from labkit.geometry.sensor import DepthSensor
 from labkit.labels import OBSTACLE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.shapes import object_mesh
+from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
 
 SIZE = (80, 60)
+
+
+@cache
+def drawn(config: str) -> list[SceneSpec]:
+    """The first sixty scenes of a config, drawn once."""
+    return [data_gen.sample_scene(seed, config) for seed in range(60)]
 
 
 def digest(folder: Path) -> dict[str, str]:
@@ -51,22 +60,11 @@ def test_same_seed_same_scene_and_other_seed_or_config_another():
     assert data_gen.sample_scene(4, "train").objects != scene.objects
 
 
-def test_same_scene_same_bytes_in_another_process():
-    code = (
-        "import data_gen, hashlib; f = data_gen.render(data_gen.sample_scene(9, 'hard'), (80, 60));"
-        "print(hashlib.sha256(f.rgb.tobytes() + f.depth.tobytes() + f.labels.tobytes()).hexdigest())"
-    )
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True).stdout.split()[-1]
-    data_gen.render(data_gen.sample_scene(1, "test"), SIZE)  # here it is not the first scene of its process
-    f = data_gen.render(data_gen.sample_scene(9, "hard"), SIZE)
-    assert found == hashlib.sha256(f.rgb.tobytes() + f.depth.tobytes() + f.labels.tobytes()).hexdigest()
-
-
 def test_no_family_is_both_target_and_obstacle_and_colours_do_not_tell():
     colours = {TARGET: [], OBSTACLE: []}
     roles = {}
-    for seed in range(150):
-        for thing in data_gen.sample_scene(seed, "test").objects:
+    for spec in (*drawn("test"), *(data_gen.sample_scene(seed, "test") for seed in range(60, 150))):
+        for thing in spec.objects:
             colours[thing.class_id].append(thing.colour)
             roles.setdefault(thing.family, set()).add(thing.class_id)
     assert all(len(role) == 1 for role in roles.values()) and set(roles) == set(FAMILIES)
@@ -76,7 +74,7 @@ def test_no_family_is_both_target_and_obstacle_and_colours_do_not_tell():
 
 @pytest.mark.parametrize("config", ["train", "wide", "any"])
 def test_training_shows_nothing_that_hard_asks_about(config):
-    scenes = {c: [data_gen.sample_scene(seed, c) for seed in range(60)] for c in (config, "hard")}
+    scenes = {c: drawn(c) for c in (config, "hard")}
     things = {c: [thing for spec in scenes[c] for thing in spec.objects] for c in scenes}
     assert not set.intersection(*({s.table.texture.kind for s in scenes[c]} for c in scenes))
     assert not set.intersection(*({t.urdf for t in things[c] if t.family == "blob"} for c in scenes))
@@ -95,7 +93,7 @@ def test_training_shows_nothing_that_hard_asks_about(config):
 def test_wide_has_none_of_hards_shapes(ours_is):
     """Shapes are told apart by the edges of their boxes, or by their parts."""
     things = {"wide": ours_is, "hard": "hard"}
-    things = {c: [t for seed in range(60) for t in data_gen.sample_scene(seed, k).objects] for c, k in things.items()}
+    things = {c: [t for spec in drawn(k) for t in spec.objects] for c, k in things.items()}
 
     def sizes(config, family):
         """Edge lengths in the object's frame, sorted."""
@@ -114,16 +112,31 @@ def test_wide_has_none_of_hards_shapes(ours_is):
     assert {t.family for t in things["wide"]} == set(FAMILIES) == set(WIDE)
 
 
+def test_calm_colours_change_no_depth_and_no_label():
+    """Also of a scene with more things than colours, drawn smoothly; what each thing is does not choose its colour."""
+    spec = max((spec for spec in drawn("test")), key=lambda spec: len(spec.objects))
+    calm = data_gen.calm(spec)
+    frame, quiet = data_gen.render(spec, SIZE), data_gen.render(calm, SIZE, smooth=True)
+    for name in ("depth", "labels", "instances", "K", "T_base_cam"):
+        assert np.array_equal(getattr(frame, name), getattr(quiet, name)), name
+    assert not np.array_equal(frame.rgb, quiet.rgb)
+    assert len({thing.colour for thing in calm.objects}) == 7 < len(calm.objects)
+    colours = {family: {t.colour for s in drawn("test") for t in data_gen.calm(s).objects if t.family == family}
+               for family in ("duck", "ball")}  # fmt: skip
+    assert all(len(seen) >= 5 for seen in colours.values())
+
+
 def test_every_target_can_be_held():
     """Each target is narrower than the open gripper somewhere: its least extent in the plane, or a rim's."""
-    for seed in range(60):
-        for thing in data_gen.sample_scene(seed, "test").objects:
+    for spec in drawn("test"):
+        for thing in spec.objects:
             if thing.class_id == TARGET and thing.family not in ("ring", "mug"):
                 extents = np.sort(np.ptp(object_mesh(thing).vertices, axis=0))
                 assert extents[0] < 0.065, thing.family
             assert 0.05 <= thing.mass <= 0.5 and thing.friction <= 1.0
 
 
+@pytest.mark.nightly
 def test_statistics_of_test_are_as_promised():
     s = statistics(range(900_000, 900_030), "test", (160, 120))
     assert sum(share >= 0.10 for share in s.families.values()) >= 5
@@ -133,6 +146,38 @@ def test_statistics_of_test_are_as_promised():
     near, far = s.camera
     assert near >= 0.6 and far <= 1.2
     assert s.target_pixels <= 0.02
+
+
+@pytest.mark.parametrize("config", ["clutter", "bin"])
+def test_crowds_are_repeatable_and_what_holds_them_is_no_thing(config):
+    """1 to 20 things of many sizes; walls, floors of bins and shelves have no instance, and only floors are surface."""
+    specs = [data_gen.sample_scene(seed, config) for seed in range(12)]
+    assert specs[3] == data_gen.sample_scene(3, config)
+    counts = [len(spec.objects) for spec in specs]
+    assert min(counts) >= 1 and max(counts) <= 20 and max(counts) > 10
+    lengths = [np.ptp(object_mesh(thing).vertices, axis=0).max() for spec in specs for thing in spec.objects]
+    assert min(lengths) < 0.05 and max(lengths) > 0.2
+    assert any(spec.joints for spec in specs) and not all(spec.joints for spec in specs)
+    walled = [sum(piece.surface for piece in spec.furniture) for spec in specs]
+    assert walled == [config == "bin"] * len(specs)
+    with World(specs[3]) as world:
+        frame = dataset.picture_of(world, SIZE)
+    again = data_gen.render(specs[3], SIZE)
+    assert all(np.array_equal(getattr(frame, name), getattr(again, name)) for name in ("rgb", "depth", "instances"))
+    np.testing.assert_array_equal(frame.instances > 0, frame.labels >= TARGET)
+
+
+def test_things_in_a_bin_lie_in_it_and_on_each_other():
+    """Where they come to rest most lie between the walls, some of them higher than the bin's floor."""
+    spec = data_gen.sample_scene(6, "bin")
+    *walls, floor = spec.furniture[:5]
+    with World(spec) as world:
+        middles = np.array([world.centre(thing.name) for thing in spec.objects])
+        bottoms = [world.client.getAABB(world.bodies[thing.name])[0][2] for thing in spec.objects]
+    c, s = np.cos(floor.yaw), np.sin(floor.yaw)
+    inside = np.abs((middles[:, :2] - floor.centre[:2]) @ [[c, -s], [s, c]]) < np.array(floor.size[:2]) / 2
+    assert inside.all(axis=1).mean() > 0.6 and max(bottoms) > floor.centre[2] + 0.02
+    assert all(wall.size[2] >= 0.05 for wall in walls)
 
 
 # Datasets -----------------------------------------------------------------------------------------------------------
@@ -192,33 +237,35 @@ def test_an_executor_gives_the_same_bytes_and_a_finished_dataset_is_left_alone(u
     assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*.png")} == before
 
 
-def test_killed_at_any_moment_and_run_again_it_gives_the_same_bytes(undisturbed, tmp_path):
+def test_killed_in_the_middle_and_run_again_it_gives_the_same_bytes(undisturbed, tmp_path):
+    """Those of `undisturbed`, which this process made."""
     out = tmp_path / "killed"
     command = [sys.executable, "-m", "data_gen", str(out), "--scenes", "6", "--config", "test", "--size", "80x60"]
-    for frames_before_the_kill in (1, 3):
-        process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-        deadline = time.monotonic() + 240.0
-        while len(list(out.glob("rgb/0*.png"))) < frames_before_the_kill and time.monotonic() < deadline:
-            time.sleep(0.005)
-        process.kill()
-        process.wait()
-        assert not (out / "dataset.json").exists()
-        with pytest.raises(FileNotFoundError, match="not finished"):
-            data_gen.load(out)
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 240.0
+    while len(list(out.glob("rgb/0*.png"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    assert not (out / "dataset.json").exists()
+    with pytest.raises(FileNotFoundError, match="not finished"):
+        data_gen.load(out)
     subprocess.run(command, check=True, capture_output=True)
     found = {name: value for name, value in digest(out).items() if not name.endswith(".tmp")}
     assert found == digest(undisturbed)
 
 
-def test_verify_names_what_is_damaged_and_what_is_missing(tmp_path):
+def test_verify_names_what_is_damaged_and_what_is_missing(tmp_path, monkeypatch, capsys):
     out = tmp_path / "data"
     data_gen.generate(out, range(2), "test", SIZE, progress=False)
     assert data_gen.verify(out) == []
     (out / "depth" / "000001.png").write_bytes(b"not a picture")
     (out / "rgb" / "000000.png").unlink()
     assert sorted(data_gen.verify(out)) == ["depth/000001.png: damaged", "rgb/000000.png: missing"]
-    run = subprocess.run([sys.executable, "-m", "data_gen", str(out), "--verify"], capture_output=True, text=True)
-    assert run.returncode == 1 and "rgb/000000.png: missing" in run.stdout
+    monkeypatch.setattr(sys, "argv", ["data_gen", str(out), "--verify"])
+    with pytest.raises(SystemExit) as stop:
+        runpy.run_module("data_gen", run_name="__main__")
+    assert stop.value.code == 1 and "rgb/000000.png: missing" in capsys.readouterr().out
 
 
 def test_depth_noise_is_off_unless_asked_for_and_spoils_depth_alone(tmp_path):
@@ -305,5 +352,5 @@ def test_the_command_says_a_full_disk_in_one_line_and_goes_on_later(tmp_path):
     assert run.returncode == 1
     assert run.stderr.strip().splitlines()[-1].startswith("data_gen: ") and "could not write" in run.stderr
     assert not list(out.rglob("*.tmp"))
-    subprocess.run([sys.executable, "-m", *arguments], check=True, capture_output=True)
+    data_gen.generate(out, range(2), "test", SIZE, progress=False)
     assert data_gen.verify(out) == []

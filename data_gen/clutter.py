@@ -1,0 +1,168 @@
+"""Crowded scenes: things dropped in a heap, side by side, or into a bin, whatever they are (configs clutter and bin).
+
+Nothing is kept apart here: things touch, lean and lie on and in each other, as they fall. Tables are small, large or
+beside a shelf, and the arm stands anywhere above them: what the camera sees of these is no thing.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from data_gen.families import FAMILIES, Body, quaternion
+from data_gen.household import HOUSEHOLD
+from data_gen.wide import WIDE
+from labkit.sim.kinematics import HOME, link_frames
+from labkit.sim.shapes import object_mesh
+from labkit.sim.spec import Furniture, ObjectSpec, Table, Texture
+
+APART = 0.004  # metres between bounding boxes where things start: they fall into contact
+BIN_FLOOR = 0.006  # metres
+CLEAR = 0.3  # metres that the hand stays over the table
+
+
+class Area(NamedTuple):
+    """A rectangle of the table, turned by yaw, where things start: middle, half its lengths, and z of its ground."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    yaw: float
+    z: float
+
+    def at(self, a: float, b: float) -> np.ndarray:
+        """The place (x, y) at shares a and b, -1 to 1, of its half lengths."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return np.array([self.x, self.y]) + np.array([[c, -s], [s, c]]) @ (a * self.half_x, b * self.half_y)
+
+
+def table(rng: np.random.Generator, texture: Texture) -> Table:
+    """A table of any size, so that its end is in view as often as not."""
+    size = float(rng.uniform(0.42, 0.8)), float(rng.uniform(0.55, 1.4)), float(rng.uniform(0.02, 0.08))
+    centre = 0.55, float(rng.uniform(-0.08, 0.08))
+    return Table(centre=centre, size=size, z=float(rng.uniform(-0.04, 0.04)), texture=texture)
+
+
+def heap_area(rng: np.random.Generator, stand: Table, count: int) -> Area:
+    """Where `count` things start: crowded, or all over the table."""
+    room = np.array(stand.size[:2]) / 2.0 - 0.06
+    if rng.random() < 0.5:
+        half = np.minimum(room, np.sqrt((count + 3) / 20.0) * rng.uniform((0.08, 0.1), (0.22, 0.3)))
+    else:
+        half = room * rng.uniform(0.5, 1.0, 2)
+    x, y = np.array(stand.centre) + rng.uniform(-1.0, 1.0, 2) * (room - half)
+    return Area(float(x), float(y), *map(float, half), 0.0, stand.z)
+
+
+def bin_around(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, tuple[Furniture, ...]]:
+    """A bin of four walls and a floor on the table, and the area inside it."""
+    half_x, half_y = (float(side) / 2 for side in rng.uniform((0.26, 0.32), (0.4, 0.5)))
+    height, wall, yaw = rng.uniform(0.05, 0.15), rng.uniform(0.003, 0.012), float(rng.uniform(-0.3, 0.3))
+    spare = np.maximum(np.array(stand.size[:2]) / 2.0 - (half_x, half_y), 0.0)
+    x, y = np.array(stand.centre) + 0.6 * rng.uniform(-1.0, 1.0, 2) * spare
+    area = Area(float(x), float(y), half_x, half_y, yaw, stand.z + BIN_FLOOR)
+    texture = Texture(colour_a=colour)
+    middle = stand.z + height / 2
+    walls = [((wall, 2 * half_y + 2 * wall, height), (side, 0.0)) for side in (-1.0, 1.0)]
+    walls += [((2 * half_x, wall, height), (0.0, side)) for side in (-1.0, 1.0)]
+    pieces = [
+        Furniture(tuple(map(float, size)), (*area.at(a, b).tolist(), middle), texture, yaw) for size, (a, b) in walls
+    ]
+    floor = Furniture(
+        (2 * half_x, 2 * half_y, BIN_FLOOR), (area.x, area.y, stand.z + BIN_FLOOR / 2), texture, yaw, True
+    )
+    return area._replace(half_x=0.75 * half_x, half_y=0.75 * half_y), (*pieces, floor)
+
+
+def second_plane(rng: np.random.Generator, stand: Table, texture: Texture) -> tuple[Furniture, ...]:
+    """Nothing, a floor close below the table, or a shelf beside it, lower or higher."""
+    kind = rng.random()
+    if kind < 0.45:
+        return ()
+    if kind < 0.65:
+        top = stand.z - stand.size[2] - rng.uniform(0.05, 0.5)
+        return (Furniture((5.0, 5.0, 0.02), (0.0, 0.0, float(top - 0.01)), texture),)
+    wide, side = float(rng.uniform(0.2, 0.6)), float(rng.choice([-1.0, 1.0]))
+    top = stand.z + rng.choice([rng.uniform(-0.4, -0.05), rng.uniform(0.05, 0.3)])
+    y = stand.centre[1] + side * (stand.size[1] / 2 + rng.uniform(0.0, 0.1) + wide / 2)
+    return (
+        Furniture((float(rng.uniform(0.4, 0.9)), wide, 0.03), (stand.centre[0], float(y), float(top - 0.015)), texture),
+    )
+
+
+def arm(rng: np.random.Generator, stand: Table) -> tuple[float, ...] | None:
+    """Joints that hold the hand above the table, so that the arm hangs into the picture; None for its home."""
+    if rng.random() < 0.6:
+        return None
+    while True:
+        q = np.array(HOME)
+        q[:7] = rng.uniform((-0.9, -0.8, -0.3, -2.6, -0.3, 1.2, -1.0), (0.9, 0.5, 0.3, -1.2, 0.3, 2.6, 2.5))
+        hand = link_frames(q[:7])[8, :3, 3]
+        if hand[2] - 0.12 > stand.z + CLEAR and hand[0] > 0.3:
+            return tuple(q.tolist())
+
+
+def things(
+    rng: np.random.Generator, stand: Table, area: Area, count: int, sizes: tuple[float, float], colour
+) -> tuple[ObjectSpec, ...]:
+    """So many things above an area, each where it touches no other: beside the last one, or above what is there.
+
+    One whose frame would start beside the table is left out. sizes: range of the factor of things that are of no
+    household's size. colour: function without arguments.
+    """
+    placed, boxes = [], []
+    for number in range(count):
+        family, body = _body(rng, sizes)
+        thing, low, high = _turned(rng, family, body, f"{family}_{number}", colour())
+        x, y = area.at(*rng.uniform(-1.0, 1.0, 2))
+        if boxes and rng.random() < 0.35:  # side by side
+            beside, axis, side = boxes[-1], rng.integers(2), rng.choice([-1.0, 1.0])
+            middle = (beside[0][:2] + beside[1][:2]) / 2
+            reach = (beside[1][axis] - beside[0][axis] + high[axis] - low[axis]) / 2 + 0.001
+            near = middle + side * reach * np.eye(2)[axis]
+            inside = np.abs(near - (area.x, area.y)) < (area.half_x, area.half_y)
+            x, y = near if inside.all() else (x, y)
+        shift = np.array([x, y, 0.0]) - (low + high) / 2 * (1.0, 1.0, 0.0)
+        if not (
+            np.abs(shift[:2] - stand.centre) <= np.array(stand.size[:2]) / 2
+        ).all():  # NaN, of one random_urdf, is not
+            continue
+        low, high = low + shift, high + shift
+        below = [top[2] for bottom, top in boxes if (bottom[:2] < high[:2]).all() and (low[:2] < top[:2]).all()]
+        rise = max([area.z, *below]) + APART - low[2]
+        lift = np.array([0.0, 0.0, rise])
+        boxes.append((low + lift, high + lift))
+        placed.append(replace(thing, position=(float(shift[0]), float(shift[1]), float(rise))))
+    return tuple(placed)
+
+
+def _body(rng: np.random.Generator, sizes: tuple[float, float]) -> tuple[str, Body]:
+    """A family and a thing of it: of a household's size, or one of `wide`'s or `train`'s that is larger or smaller."""
+    if rng.random() < 0.45:
+        family, recipe = HOUSEHOLD[rng.integers(len(HOUSEHOLD))]
+        return family, recipe(rng)
+    family = list(FAMILIES)[rng.integers(len(FAMILIES))]
+    body = WIDE[family](rng) if rng.random() < 0.5 else FAMILIES[family].recipe(rng, False)
+    return family, replace(body, scale=float(body.scale * np.exp(rng.uniform(*np.log(sizes)))))
+
+
+def _turned(rng: np.random.Generator, family: str, body: Body, name: str, colour):
+    """The thing at the origin, turned at random, and the corners of its bounding box."""
+    turned = Rotation.from_euler("z", rng.uniform(-np.pi, np.pi)) * Rotation.from_quat(quaternion(*body.tilt))
+    thing = ObjectSpec(
+        name=name,
+        family=family,
+        class_id=FAMILIES[family].class_id,
+        position=(0.0, 0.0, 0.0),
+        orientation=tuple(turned.as_quat().tolist()),
+        urdf=body.urdf,
+        scale=float(body.scale),
+        parts=body.parts,
+        colour=colour,
+        mass=float(rng.uniform(0.05, 0.3)),
+        friction=float(rng.uniform(0.6, 1.0)),
+    )
+    vertices = turned.apply(object_mesh(thing).vertices)
+    return thing, vertices.min(axis=0), vertices.max(axis=0)
