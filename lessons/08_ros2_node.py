@@ -1,4 +1,4 @@
-"""A node of ROS 2 in forty lines: an image comes in, its mask goes out. `labkit node --ros` adds depth, poses, grasps.
+"""A node of ROS 2 in forty lines: an image comes in, its mask goes out. `labkit node ros` adds depth, poses, grasps.
 
 Run it where there is ROS 2: python lessons/08_ros2_node.py --ros-args -r image:=/camera/color/image_raw
 """
