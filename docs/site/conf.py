@@ -2,8 +2,10 @@
 
 The pages are the repository's own files, where they lie; nothing is written twice. Hooks adapt them: links into the
 code lead to its reference page, views in 3-D get one plotly for the whole site, explorers get pictures of their states
-(`explorers.py`), docstrings and lessons are linked both ways by the topic's number, and README becomes the first page.
-Everything is bundled: the site needs no network.
+(`explorers.py`), docstrings and lessons are linked both ways by the topic's number, and `landing.md` stands in README's
+place. Everything is bundled: the site needs no network. Links to edit a page
+and to report a problem are there once `[project.urls] Repository` of pyproject.toml says where the kit is published.
+With LABKIT_PDF in the environment, Chromium prints each lesson.
 """
 
 import html
@@ -14,19 +16,24 @@ import pkgutil
 import re
 import shutil
 import sys
+import tomllib
 from collections import defaultdict
 from pathlib import Path
 
 import plotly
 
 import labkit
+from labgrader import course
+from labgrader.publishing import unpublished
 from labkit import losses  # noqa: F401  torch first: its threads must not meet those of other libraries half loaded
 
 ROOT = Path(__file__).parents[2]
+REFERENCE = ROOT / "reference"  # there while the site is built, since a page's place is its address
 sys.path.insert(0, str(Path(__file__).parent))
 import explorers  # noqa: E402  beside this file
+import pdf  # noqa: E402
 
-project, author, version = "labkit", "the labkit authors", importlib.metadata.version("labkit")
+project, author, version = "labkit", "the labkit authors", labkit.__version__
 project_copyright = "the labkit authors, MIT licence"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx-mathjax-offline"]
 root_doc = "README"
@@ -40,7 +47,7 @@ include_patterns = [
     "lessons/*.md",
     "labs/*/*.ipynb",
     "docs/*.md",
-    "out/reference/*.rst",
+    "reference/*.rst",
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 4
@@ -51,23 +58,43 @@ autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 
+DROPPED = course.course().dropped
+exclude_patterns = [f"{folder}/{topic[:3]}*" for topic in DROPPED for folder in ("lessons", "labs")]
+
 html_theme = "sphinx_book_theme"
 html_title = "labkit"
+html_favicon = "_static/favicon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+# Buttons to the repository, once pyproject.toml says where it is.
+REPOSITORY = course.course().repository
 html_theme_options = {
+    **({"repository_url": REPOSITORY, "repository_branch": "main"} if REPOSITORY else {}),
+    "use_repository_button": bool(REPOSITORY),
+    "use_edit_page_button": bool(REPOSITORY),
+    "use_issues_button": bool(REPOSITORY),
     "use_download_button": True,
     "use_fullscreen_button": False,
     "show_toc_level": 2,
     "home_page_in_toc": True,
     "navbar_persistent": [],
 }
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+myst_html_meta = {"description": PROJECT["description"]}
+if REPOSITORY := PROJECT.get("urls", {}).get("Repository"):
+    shown = dict.fromkeys(("use_repository_button", "use_issues_button", "use_edit_page_button"), True)
+    html_theme_options |= shown | {"repository_url": REPOSITORY, "repository_branch": "main", "path_to_docs": ""}
 
 GUIDES = {
     "Guides": [
+        "docs/install",
+        "docs/publish",
         "docs/teaching",
+        "docs/week_by_week",
         "docs/grading",
+        "docs/own_pictures",
         "docs/library",
+        "docs/ros2",
         "docs/capstone",
         "docs/hub",
         "docs/scale",
@@ -75,16 +102,14 @@ GUIDES = {
         "docs/style",
         "CHANGELOG",
     ],
-    "How good it is": ["labkit/weights/MODEL_CARD", "BENCHMARKS", "docs/evidence"],
+    "How good it is": ["docs/scores", "labkit/weights/MODEL_CARD", "BENCHMARKS", "docs/evidence"],
 }
 
 
-# Where four kinds of readers want to go from the first page, under its title.
-SHORTCUTS = (
-    "Decide: [ten minutes](/docs/ten_minutes.md) from picture to lift. "
-    "Learn: [first lesson](/lessons/01_labels.ipynb), [twenty bugs](/lessons/errata.md). "
-    "Teach: [syllabus](/docs/teaching.md). Use: {ref}`all names of the library <genindex>`."
-)
+PDF = bool(os.environ.get("LABKIT_PDF"))
+
+# What no file can link to, as the first page's last line.
+NAMES = "The library by topic: {doc}`reference </reference/index>`, or {ref}`all its names <genindex>`."
 
 # ------------------------------------------------------------------------------------------- what stands where
 
@@ -106,17 +131,19 @@ def lesson_of(number: str) -> str | None:
     return next((page for page in LESSONS if f"/{number}_" in page), None)
 
 
-LESSONS, LABS, MODULES = written("lessons", ".ipynb"), written("labs", ".ipynb"), modules()
+LESSONS, LABS = (
+    [page for page in written(of, ".ipynb") if course.is_taught(Path(page).name)] for of in ("lessons", "labs")
+)
+MODULES = modules()
 EXPLORERS = explorers.build(LESSONS)  # lesson's page -> names of its explorers
-TOPIC = re.compile(r"\bTopics? ((?:\d\d(?:_\w+)?(?:, | and )?)+)")
+TOPIC = re.compile(r"\b[Tt]opics? ((?:\d\d(?:_\w+)?(?:, | and )?)+)")
 derived: dict[str, set[str]] = defaultdict(set)  # lesson's page -> modules whose docstrings cite its topic
 
 
 def write_reference() -> None:
     """Write a page per module, and note which lesson derives what it holds."""
-    out = ROOT / "out" / "reference"
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    shutil.rmtree(REFERENCE, ignore_errors=True)
+    REFERENCE.mkdir()
     for name in MODULES:
         module = importlib.import_module(name)
         text = " ".join(
@@ -134,17 +161,45 @@ def write_reference() -> None:
         if hasattr(module, "__path__"):  # its names are documented where they are written
             inside = [other for other in MODULES if other.rpartition(".")[0] == name]
             text += "   :no-members:\n\n" + "\n".join(f"* :doc:`{other}`" for other in inside) + "\n"
-        (out / f"{name}.rst").write_text(text)
+        (REFERENCE / f"{name}.rst").write_text(text)
+    (REFERENCE / "index.rst").write_text(by_topic())
+
+
+def by_topic() -> str:
+    """The reference's first page: the modules of each topic, and those of none."""
+    lines = [
+        "Reference",
+        "=========",
+        "",
+        "What the lessons derive, by topic. :ref:`All names, from A to Z <genindex>`.",
+        "",
+    ]
+    topics = defaultdict(set)
+    for page, names in derived.items():
+        topics[Path(page).name[:2], page] |= names
+    for (number, page), names in sorted(topics.items()):
+        title = f"{number} {Path(page).name[3:].replace('_', ' ')}"
+        lines += [title, "-" * len(title), "", f"Derived in :doc:`/{page}`.", "", *map(entry, sorted(names)), ""]
+    rest = sorted(set(MODULES).difference(*topics.values()))
+    lines += ["What every topic needs", "----------------------", "", *map(entry, rest), ""]
+    return "\n".join([*lines, ".. toctree::", "   :hidden:", "", *(f"   {name}" for name in MODULES), ""])
+
+
+def entry(name: str) -> str:
+    """A module in a list: its name, and what its docstring says first."""
+    first = (importlib.import_module(name).__doc__ or "").strip().partition("\n")[0]
+    words = re.sub(r"\s*(\([Tt]opic[^)]*\)|Topics? [^.]*\.)", "", first).replace("|", "\\|").replace("*", "\\*")
+    return f"* :doc:`{name}`: {words}".rstrip(": ")
 
 
 def contents() -> str:
-    """The site's table of contents, as README's last lines."""
+    """The site's table of contents, as the first page's last lines."""
     parts = {
         "Start": ["docs/ten_minutes"],
         "Lessons": [*LESSONS, "lessons/errata"],
         "Labs": LABS,
         **{name: [page for page in pages if (ROOT / f"{page}.md").exists()] for name, pages in GUIDES.items()},
-        "Reference": ["genindex", *(f"out/reference/{name}" for name in MODULES)],
+        "Reference": ["reference/index", "genindex"],
     }
     trees = [
         "\n".join(["", "```{toctree}", ":hidden:", f":caption: {name}", *(f"/{page}" for page in pages), "```", ""])
@@ -169,8 +224,9 @@ def links_that_lead_somewhere(text: str, folder: Path) -> str:
         place = str(path.relative_to(ROOT))
         module = place.removesuffix(".py").removesuffix("/").replace("/", ".").removesuffix(".__init__")
         if module in MODULES:
-            return f"[{words}](/out/reference/{module}.rst)"
-        shown = path.suffix in (".md", ".ipynb") and any(path.match(str(ROOT / p)) for p in include_patterns)
+            return f"[{words}](/reference/{module}.rst)"
+        page = path.suffix in (".md", ".ipynb") and course.is_taught(path.name)
+        shown = page and any(path.match(str(ROOT / p)) for p in include_patterns)
         return f"[{words}](/{place}{anchor or ''})" if shown and path.exists() else words
 
     return LINK.sub(mend, text)
@@ -180,13 +236,16 @@ def read_source(app, page: str, source: list[str]) -> None:
     """Adapt a page: see the module's docstring."""
     path = ROOT / page
     if (ROOT / f"{page}.md").exists():
-        text = re.sub(r"\[explorer: (\w+)\]\(.*\)", lambda match: explorers.page(match[1], page), source[0])
-        text = links_that_lead_somewhere(text, path.parent.relative_to(ROOT))
-        source[0] = text.replace("\n\n", f"\n\n{SHORTCUTS}\n\n", 1) + contents() if page == root_doc else text
+        path = Path(__file__).parent / "landing.md" if page == root_doc else path.with_suffix(".md")
+        text = source[0] if page != root_doc else path.read_text().replace("](../demo", "](docs/demo")
+        text = re.sub(r"\[explorer: (\w+)\]\(.*\)", lambda match: explorers.page(match[1], page), text)
+        text = links_that_lead_somewhere(course.taught_rows(text), path.parent.relative_to(ROOT))
+        source[0] = f"{text}\n\n{NAMES}\n\n{contents()}" if page == root_doc else text
         return
     if not (ROOT / f"{page}.ipynb").exists():
         return
-    notebook, names = json.loads(source[0]), iter(EXPLORERS.get(page, ()))
+    notebook = unpublished(json.loads(source[0]), f"{page}.ipynb", ROOT)  # here its links lead to the site's pages
+    names = iter(EXPLORERS.get(page, ()))
     for cell in notebook["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
@@ -198,9 +257,12 @@ def read_source(app, page: str, source: list[str]) -> None:
             show_in_3d(output.get("data", {}))
         cell["metadata"]["mystnb"] = {"image": {"alt": what_is_shown(notebook["cells"], cell)}}
     if page in derived:
-        links = ", ".join(f"[`{name}`](/out/reference/{name}.rst)" for name in sorted(derived[page]))
+        links = ", ".join(f"[`{name}`](/reference/{name}.rst)" for name in sorted(derived[page]))
         last = {"cell_type": "markdown", "metadata": {}, "id": "reference", "source": f"**In the kit:** {links}"}
         notebook["cells"].append(last)
+    if PDF and page in LESSONS:
+        printed = f'<p class="note"><a href="{Path(page).name}.pdf">This lesson as a PDF</a></p>'
+        notebook["cells"].insert(1, {"cell_type": "markdown", "metadata": {}, "id": "pdf", "source": printed})
     if labs := [lab for lab in LABS if Path(lab).name[:3] == Path(page).name[:3]]:
         notebook["cells"].insert(1, {"cell_type": "markdown", "metadata": {}, "id": "lab", "source": to_lab(labs[0])})
     source[0] = json.dumps(notebook)
@@ -268,8 +330,16 @@ def plain_words(app, what, name, thing, options, lines: list[str]) -> None:
             lines[i] = TOPIC.sub(link, line)
 
 
+def no_edit_of_what_is_made(app, page, template, context, doctree) -> None:
+    """A page that was made, or stands in another's place, has no file of its name to edit."""
+    has_file = (ROOT / f"{page}.md").exists() or (ROOT / f"{page}.ipynb").exists()
+    if page == root_doc or not has_file:
+        context["page_source_suffix"] = ""
+
+
 def finish(app, error) -> None:
     """The first page is index.html; plotly and the explorers' pictures stand beside the pages once."""
+    shutil.rmtree(REFERENCE, ignore_errors=True)
     if error is None:
         static = Path(app.outdir) / "_static"
         for folder in explorers.OUT.glob("*/*/"):
@@ -277,6 +347,8 @@ def finish(app, error) -> None:
         shutil.copy(Path(app.outdir) / "README.html", Path(app.outdir) / "index.html")
         script = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
         shutil.copy(script, static / "plotly.min.js")
+        if PDF:
+            pdf.print_pages(Path(app.outdir), LESSONS)
 
 
 write_reference()
@@ -289,4 +361,5 @@ def setup(app) -> None:
     app.add_js_file("lab.js", defer="defer")
     app.connect("source-read", read_source)
     app.connect("autodoc-process-docstring", plain_words)
+    app.connect("html-page-context", no_edit_of_what_is_made, priority=400)  # before the theme looks
     app.connect("build-finished", finish)

@@ -23,6 +23,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+ROOMS = ("labkit", "labcourse", "data_gen")  # what draws an explorer's picture
 OUT = ROOT / "out" / "explorers"
 LIMIT = 60  # states per explorer
 DOTS = 120  # per inch of a picture; a page shows it with 80
@@ -35,6 +36,7 @@ CLICKS = {"none": {f"pixel_{v}_{u}": False for v in range(4) for u in range(5)}}
 CLICKS |= {f"{n} of the thing's 6": dict.fromkeys(THING[:n], True) for n in range(1, 7)}
 CLICKS |= {"all 6, and the corner's 2": dict.fromkeys([*THING, "pixel_0_3", "pixel_0_4"], True)}
 POINTS = [(172, 112), (120, 122), (88, 115), (172, 155), (140, 85), (43, 110), (250, 80)]
+THINGS = [(139, 137), (66, 133), (196, 109), (227, 106), (209, 141), (193, 129), (60, 160)]
 BUGS = {"swapped": "u for the row", "ray": "depth along the ray", "buffer": "depth buffer", "view": "view matrix"}
 BUGS |= {"opengl": "OpenGL's axes"}
 CHOSEN = {
@@ -42,6 +44,8 @@ CHOSEN = {
     "you_are_the_solver": {"pixels clicked": CLICKS, "lam": [0.0, 2.0, 3.0]},
     "logits": {"z0": [-8.0, 2.0, 8.0], "z1": [1.0, 7.0], "z2": [-8.0, -1.0, 5.0], "y": [1], "h": [1e-16, 1e-5, 1.0]},
     "keyhole": {"pixel": {f"u = {u}, v = {v}": {"u": u, "v": v} for u, v in POINTS}},
+    "votes_that_meet": {"side": [10, 16, 18, 20, 24, 36, 50], "sigma": [0.0, 2.0, 4.0, 6.0, 10.0, 14.0, 16.0, 18.0]},
+    "pick_a_thing": {"pixel": {f"u = {u}, v = {v}": {"u": u, "v": v} for u, v in THINGS}},
     "sliding_mask": {"shift": [0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 18, 24], "radius": [2, 4, 5, 9, 14]},
     "gaussians": {
         "exponent": [-4, -2, -1, 0, 0.5, 1, 2, 3, 4, 5, 5.25, 5.5, 6, 8, 10],
@@ -199,7 +203,7 @@ def walk(lesson: Path, folder: Path) -> None:
 
 def build(lessons: list[str]) -> dict[str, list[str]]:
     """Walk the lessons (pages as Sphinx names them) that changed; give the names of each one's explorers, in order."""
-    kit = [Path(__file__), *sorted(ROOT.glob("labkit/**/*.py")), *sorted(ROOT.glob("data_gen/*.py"))]
+    kit = [Path(__file__), *(path for room in ROOMS for path in sorted(ROOT.glob(f"{room}/**/*.py")))]
     code = hashlib.sha256(b"".join(path.read_bytes() for path in kit))
 
     def names(page: str) -> list[str]:

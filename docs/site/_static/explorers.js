@@ -46,4 +46,5 @@ function revive(explorer) {
   // Whoever touches one control will soon want the other pictures.
   const fetchAll = () => words.forEach((_, state) => (new Image().src = `${folder}${state}.webp`));
   explorer.addEventListener("focusin", fetchAll, { once: true });
+  picture.addEventListener("click", () => picture.parentElement.classList.toggle("large")); // seen on a phone alone
 }
