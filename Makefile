@@ -1,28 +1,33 @@
 # Each target works first on a fresh machine that has only Python 3.11 to 3.13, and reuses its environment after that.
 #   make demo    set up .venv, then one scene from the camera's image to the lifted object
-#   make test    set up .venv, then lint and every test
+#   make test    set up .venv, then lint, tests and notebooks; ARGS="labkit data_gen" the tests of these rooms alone
+#   make nightly the tests that `make test` leaves out, because they only repeat others at length
+#   make prose   what is written, not what it does: numbers of README, links, names, words and lint of the notebooks
 #   make lab     JupyterLab; alone on a machine, it installs what students need and no more
 #   make release generate labs/ from solutions/
-#   make train   make the data again and train the shipped weights again (over two hours on two cores)
+#   make train   make the data again and train the shipped weights again (over three hours on two cores)
 #   make stacks  build the same in C++, Java and Octave where they are installed, and compare
 #   make ros2    set up .venv-ros2 with wheels of ROS 2, then the node beside a simulated camera, until Ctrl-C
 #   make test-ros2  the tests of ROS 2, there
 #   make site    set up .venv-site, then a static site of lessons, labs, guides and reference in out/site
+#   make pictures  README's pictures of the demo, a lab and the site, made anew in Chromium; ARGS=lab one of them
 #   make test-site  its links, its words for figures, and what axe-core says of it
+#   make slides  set up .venv-site, then a deck of slides per topic in out/slides, with notes, for a room without a network
 #   make hub     set up .venv-hub, then a JupyterHub for trying on this machine alone (docs/hub.md)
 #   make test-hub  three users through lab 04 on it, in Chromium
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make evidence write docs/evidence.md, README's promises and what shows them, from results that are there
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
 #   make everywhere  the same on two Debians, with Python 3.11 and 3.13; what both make of fixed seeds is compared
+#   make colab   lessons and labs with Google Colab's versions and the wheel alone; a stand-in is no Colab
 #   make clean   remove what can be made again in seconds; environments and data/ stay
-# make PYTHON=/path/to/python3.12 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (README.md).
+# make PYTHON=/path/to/python3.12 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (docs/install.md).
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site test-site hub test-hub
+.PHONY: colab demo test nightly prose lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site slides pictures test-site hub test-hub
 
 BIN := .venv/bin
 ARGS ?=
@@ -33,9 +38,20 @@ demo: .venv/installed
 test: .venv/installed
 	tests/run $(ARGS)
 
+nightly: .venv/installed
+	tests/run --nightly $(ARGS)
+
+# Cells: names that are undefined or unused, statements that do nothing, old NumPy, errors of syntax; a lab's answers are
+# missing, which would have used what is unused there.
+LINT := ruff check --isolated --no-cache --line-length 120 --target-version py311 --select E4,E7,E9,F,W,B,PLE,NPY,UP
+prose: .venv/installed
+	$(BIN)/$(LINT) lessons solutions
+	$(BIN)/$(LINT) --ignore F401,F841 labs
+	$(BIN)/python -m pytest -q tests/prose $(ARGS)
+
 # JupyterLab with the course's settings and kernel. A .venv that has everything is used as it is. A new one gets all but
 # PyTorch, which is a third of it or, with CUDA, most: that comes while the first lesson is read.
-lab: export JUPYTER_CONFIG_PATH := $(CURDIR)/labkit/course/jupyter
+lab: export JUPYTER_CONFIG_PATH := $(CURDIR)/labcourse/jupyter
 lab: export JUPYTER_PATH := $(JUPYTER_CONFIG_PATH)
 lab: $(or $(wildcard .venv/installed),.venv/installed-lab)
 	@if [ ! -e .venv/installed ] && [ ! -e .venv/torch ]; then
@@ -58,27 +74,35 @@ release: .venv/installed
 	$(BIN)/labkit release $(ARGS)
 
 stacks: .venv/installed
-	$(BIN)/python -m pytest -q tests/stacks/test_programs.py $(ARGS)
+	$(BIN)/python -m pytest -q tests/labkit/stacks/test_programs.py $(ARGS)
 
 ros2: .venv-ros2/installed
-	.venv-ros2/bin/labkit node --ros --sim $(ARGS)
+	.venv-ros2/bin/labkit node ros --sim $(ARGS)
 
 test-ros2: export OMP_NUM_THREADS := 1
 test-ros2: .venv-ros2/installed
-	.venv-ros2/bin/python -m pytest tests/node/test_ros2.py $(ARGS)
+	.venv-ros2/bin/python -m pytest tests/labkit/node/test_ros2.py $(ARGS)
 
 bench: .venv-bench/installed
-	.venv-bench/bin/python -m tests.bench.run $(ARGS)
+	.venv-bench/bin/python -m bench.run $(ARGS)
 
 evidence: .venv/installed
-	$(BIN)/python tests/evidence.py
+	$(BIN)/python tests/prose/evidence.py
 
 fresh: .venv/installed
 	$(BIN)/python tests/fresh/run $(ARGS)
 
+# With Chromium each lesson is there as a PDF, too.
+site: export LABKIT_PDF := $(wildcard /usr/bin/chromium)
 site: .venv-site/installed
 	.venv-site/bin/python -m sphinx -q -W --keep-going -b html -c docs/site . out/site
 	@echo "wrote out/site/index.html"
+
+pictures: .venv/installed
+	$(BIN)/python docs/pictures.py $(ARGS)
+
+slides: .venv-site/installed
+	.venv-site/bin/python docs/slides/deck.py out/slides
 
 test-site: .venv-site/installed
 	.venv-site/bin/python -m pytest tests/test_site.py $(ARGS)
@@ -87,10 +111,13 @@ hub: .venv-hub/installed
 	.venv-hub/bin/python -m jupyterhub -f deploy/try_hub.py $(ARGS)
 
 test-hub: .venv-hub/installed
-	.venv-hub/bin/python -m pytest tests/course/test_hub.py $(ARGS)
+	.venv-hub/bin/python -m pytest tests/labcourse/test_hub.py $(ARGS)
 
 everywhere: .venv/installed
 	$(BIN)/python tests/fresh/run --suite bookworm trixie $(ARGS)
+
+colab: .venv/installed
+	$(BIN)/python tests/colab/run $(ARGS)
 
 clean:
 	rm -rf out build *.egg-info .pytest_cache .ruff_cache .hypothesis .coverage
@@ -100,18 +127,22 @@ clean:
 TRAIN_SCENES ?= 3000
 WIDE_SCENES ?= 1500
 ANY_SCENES ?= 1000
+CLUTTER_SCENES ?= 700
+BIN_SCENES ?= 300
 VAL_SCENES ?= 120
 SIZE ?= 320x240
 WORKERS ?= 2
 EPOCHS ?=
 DEVICE ?= auto
 
-# Each step goes on where it was stopped, and does nothing if it was finished; the last one replaces the shipped weights.
+# Each step goes on where it was stopped, and does nothing if it was finished; the last ones replace the shipped weights.
 train: .venv/installed
 	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/wide --scenes $(WIDE_SCENES) --first-seed 0 --config wide --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/any --scenes $(ANY_SCENES) --first-seed 0 --config any --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/python -m data_gen data/clutter --scenes $(CLUTTER_SCENES) --first-seed 0 --config clutter --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/python -m data_gen data/bin --scenes $(BIN_SCENES) --first-seed 0 --config bin --size $(SIZE) --workers $(WORKERS)
 	for model in smallsegnet unet; do
 	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	done
@@ -120,7 +151,9 @@ train: .venv/installed
 	$$rgbd data/wide --init data/runs/unet_rgbd.pt --epochs $(or $(EPOCHS),24) --lr 2e-3 --seed 1 --out data/runs/again
 	$(BIN)/labkit train data/any data/train --scenes $(ANY_SCENES) --init data/runs/again/unet_rgbd.pt --epochs $(or $(EPOCHS),40) \
 	    --lr 1.5e-3 --seed 2 --device $(DEVICE) --out data/runs/any
-	cp data/runs/{smallsegnet,unet}.pt data/runs/any/unet_rgbd.pt labkit/weights/
+	$(BIN)/labkit train data/any data/clutter data/bin --scenes $(CLUTTER_SCENES) --things \
+	    --init data/runs/any/unet_rgbd.pt --epochs $(or $(EPOCHS),10) --seed 3 --device $(DEVICE) --out data/runs/things
+	cp data/runs/{smallsegnet,unet}.pt data/runs/things/unet_rgbd.pt labkit/weights/
 	for model in smallsegnet unet; do $(BIN)/labkit export --model $$model --onnx labkit/weights/$$model.onnx; done
 
 # pip's arguments for the build of PyTorch that TORCH_INDEX asks for; what it requires comes from the usual index.
@@ -143,7 +176,7 @@ export define ALL_BUT_TORCH
 import sys, tomllib
 project = tomllib.load(open("pyproject.toml", "rb"))["project"]
 lists = [project["dependencies"], *map(project["optional-dependencies"].get, sys.argv[1:])]
-print(*[name for names in lists for name in names if name != "torch"], sep="\n")
+print(*[name for names in lists for name in names if name.partition(">")[0] != "torch"], sep="\n")
 endef
 COMMA := ,
 
@@ -186,6 +219,7 @@ COMMA := ,
 	        exit 1
 	    fi
 	}
+	$(@D)/bin/python -m pip uninstall --quiet --yes labkit 2> /dev/null # the kit under its former name
 	install -c constraints.txt setuptools
 	if [ $@ = .venv/installed-lab ]; then
 	    $(@D)/bin/python -c "$$ALL_BUT_TORCH" $(subst $(COMMA), ,$(EXTRAS)) > $(@D)/first.txt

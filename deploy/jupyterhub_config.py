@@ -9,7 +9,7 @@ from pathlib import Path
 
 KIT = Path(__file__).resolve().parents[1]
 BIN = Path(sys.executable).parent
-SETTINGS = KIT / "labkit/course/jupyter"
+SETTINGS = KIT / "labcourse/jupyter"
 
 c = get_config()  # JupyterHub defines it
 

@@ -11,7 +11,7 @@ c = get_config()
 
 HERE = Path(os.environ.get("LABKIT_HUB", "out/hub")).resolve()
 (HERE / "exchange").mkdir(parents=True, exist_ok=True)
-(HERE / "exchange").chmod(0o777)  # nbgrader asks for it
+(HERE / "exchange").chmod(0o1777)  # nbgrader asks for 777; sticky, so that only its owner renames a folder
 
 c.JupyterHub.authenticator_class = "dummy"
 c.Authenticator.allow_all = True

@@ -3,10 +3,15 @@
 Two things go without: modules of kernels (the hook wraps every function, and numba cannot compile the wrapper), and
 tests marked `bad_input`, in which the functions' own validation must answer.
 
+Tests marked `nightly` repeat at length what others show at once; `--nightly` runs them and no others, everything else
+leaves them out (`make nightly`).
+
 Tests marked `debian` need Debian packages beside the environment: where those are missing, the tests skip, and the run
 ends with a table of what was skipped and the command that would enable it.
 """
 
+import os
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -17,11 +22,12 @@ import jaxtyping
 import pytest
 
 ROOT = Path(__file__).parent.parent
+PACKAGES = ("labkit", "labgrader", "labcourse", "labcli", "data_gen")
 
 
 def annotated_modules() -> list[str]:
-    """Dotted names of the modules of labkit and data_gen that hold no numba kernels."""
-    files = [path for package in ("labkit", "data_gen") for path in (ROOT / package).rglob("*.py")]
+    """Dotted names of the packages' modules that hold no numba kernels."""
+    files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
     pure = [path for path in files if path.stem != "__init__" and not path.stem.endswith("_kernels")]
     return [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in pure]
 
@@ -41,7 +47,7 @@ def shape_checks_off_for_bad_input(request):
 @pytest.fixture
 def labkit(monkeypatch):
     """A function that runs a command of the kit in this process and returns its exit status."""
-    from labkit.apps import cli
+    from labcli import cli
 
     def run(*words) -> int:
         monkeypatch.setattr(sys, "argv", ["labkit", *map(str, words)])
@@ -67,17 +73,28 @@ def one_thread():
 
 # What is tested on some systems only: the start of a test's id, the systems, and why not on others.
 NOT_EVERYWHERE = {
-    "tests/course/grading/": ("linux", "`labkit grade` needs Linux"),
+    "tests/labgrader/grading/": ("linux", "`labkit grade` needs Linux"),
     "tests/test_repository.py": ("linux", "needs GNU make 4 and bash"),
-    "tests/course/checker/test_judge.py": ("linux darwin", "Windows has no alarm that stops an endless answer"),
     "tests/data_gen/test_data_gen.py::test_the_command_says_a_full_disk": ("linux darwin", "needs a limit on files"),
-    "tests/test_scale.py": ("linux darwin", "Windows has no signal that kills"),
-    "tests/apps/test_cli.py::test_ctrl_c": ("linux darwin", "Windows sends no Ctrl-C to one process"),
+    "tests/labkit/test_scale.py": ("linux darwin", "Windows has no signal that kills"),
+    "tests/labcli/test_cli.py::test_ctrl_c": ("linux darwin", "Windows sends no Ctrl-C to one process"),
 }
 
 
-def pytest_collection_modifyitems(items):
-    """Skip what this system cannot do."""
+def pytest_addoption(parser):
+    """`--nightly`; `--no-skip`, for a machine that is meant to have every Debian package."""
+    parser.addoption("--nightly", action="store_true", help="run the tests marked nightly, and no others")
+    parser.addoption("--no-skip", action="store_true", help="fail tests whose Debian packages are missing")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out what is for another hour, and skip what this system cannot do."""
+    parts = {True: [], False: []}
+    for item in items:
+        parts[item.get_closest_marker("nightly") is not None].append(item)
+    wanted = config.getoption("--nightly")
+    items[:] = parts[wanted]
+    config.hook.pytest_deselected(items=parts[not wanted])
     for item in items:
         for start, (systems, reason) in NOT_EVERYWHERE.items():
             if item.nodeid.startswith(start) and sys.platform not in systems.split():
@@ -87,11 +104,6 @@ def pytest_collection_modifyitems(items):
 # ------------------------------------------------------------------------------------------- Debian packages
 
 NEEDS = "needs Debian's "
-
-
-def pytest_addoption(parser):
-    """`--no-skip`: for a machine that is meant to have every Debian package."""
-    parser.addoption("--no-skip", action="store_true", help="fail tests whose Debian packages are missing")
 
 
 @cache
@@ -126,3 +138,34 @@ def pytest_terminal_summary(terminalreporter):
     if packages:
         command = "apt-get install --no-install-recommends " + " ".join(sorted(packages))
         terminalreporter.write_line(f"To test that as well, as root: {command}")
+
+
+# --------------------------------------------------------------------------------------------------- a browser
+
+PATIENCE_MS = 500_000  # a kernel that imports torch on a busy machine takes its time: twelve seconds of a processor
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """One Chromium without a window."""
+    from playwright.sync_api import sync_playwright
+
+    options = ["--no-sandbox", "--disable-dev-shm-usage"] if os.geteuid() == 0 else ["--disable-dev-shm-usage"]
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), headless=True, args=options)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser, tmp_path):
+    """A page that remembers the errors of its console in `page.errors`, and leaves a picture of how it ended."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    page.errors = []
+    page.on("console", lambda message: page.errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    yield page
+    page.screenshot(path=tmp_path / "end.png")
+    context.close()

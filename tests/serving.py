@@ -26,7 +26,7 @@ def jupyterlab(folder: Path, home: Path) -> Iterator[str]:
     environment |= {f"JUPYTER_{name}_DIR": str(home / place) for name, place in places.items()}
     environment |= {"IPYTHONDIR": str(home / "ipython"), "JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces")}
     environment["JUPYTERLAB_SETTINGS_DIR"] = str(home / "settings")
-    environment |= dict.fromkeys(("JUPYTER_PATH", "JUPYTER_CONFIG_PATH"), str(ROOT / "labkit/course/jupyter"))
+    environment |= dict.fromkeys(("JUPYTER_PATH", "JUPYTER_CONFIG_PATH"), str(ROOT / "labcourse/jupyter"))
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -22,7 +23,8 @@ PAGES = [
     "docs/ten_minutes.html",
     "lessons/02_crf.html",
     "labs/04_iou/04_iou.html",
-    "out/reference/labkit.geometry.projection.html",
+    "reference/index.html",
+    "reference/labkit.geometry.projection.html",
     "genindex.html",
 ]
 
@@ -83,12 +85,22 @@ def test_readers_are_two_clicks_from_what_they_look_for(site, pages):
         "lessons/errata.html",
         "lessons/01_labels.html",
         "docs/teaching.html",
+        "reference/index.html",
         "genindex.html",
     }
     assert wanted <= set(re.findall(r'href="([^"#]+)', text))
     assert "syllabus" in text
-    places = "out/reference/labkit.geometry.projection.html#labkit.geometry.projection.back_project"
+    places = "reference/labkit.geometry.projection.html#labkit.geometry.projection.back_project"
     assert places in pages[site / "genindex.html"].links
+
+
+def test_the_reference_is_found_by_topic(pages, site):
+    """From the topic to its functions' page; where the kit is not published, no page offers to edit it."""
+    assert {"labkit.geometry.projection.html", "../lessons/06_back_projection.html"} <= set(
+        pages[site / "reference/index.html"].links
+    )
+    published = "urls" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert ("Suggest edit" in (site / "lessons/04_iou.html").read_text()) == published
 
 
 def test_no_page_loads_anything_from_a_network(pages):
@@ -179,14 +191,20 @@ def test_a_double_click_turns_a_view_back(site, browser):
 @pytest.mark.debian("chromium")
 @pytest.mark.parametrize("page", PAGES)
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
-def test_axe_finds_nothing_serious_and_nothing_is_wider_than_the_screen(site, browser, page, width, scheme):
+def test_axe_finds_nothing_serious_and_nothing_is_cut_or_dimmed(site, browser, page, width, scheme):
     from axe_playwright_python.sync_playwright import Axe
 
     tab = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
     tab.goto((site / page).as_uri())
     found = Axe().run(tab).response["violations"]
     widest = tab.evaluate("document.documentElement.scrollWidth")
+    cut = tab.evaluate(
+        "[...document.querySelectorAll('pre, .picture')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
+    )
+    dimmed = tab.evaluate(
+        "[...document.querySelectorAll('.picture img')].filter((e) => getComputedStyle(e).filter != 'none').length"
+    )
     tab.close()
     serious = [f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in found if v["impact"] in ("serious", "critical")]
     assert not serious
-    assert widest <= width
+    assert widest <= width and not cut and not dimmed

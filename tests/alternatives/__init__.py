@@ -12,9 +12,8 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from labkit.course.checker.program import Program
-from labkit.course.checker.question import Question
-from labkit.course.checker.run import define
+from labgrader.checker.live_program import LiveProgram
+from labgrader.checker.question import Question
 
 RIGHT = json.loads((Path(__file__).parents[1] / "data/right.json").read_text())
 
@@ -31,6 +30,6 @@ def alternatives(question: Question) -> tuple[Callable, ...]:
 @cache
 def written(name: str, text: str) -> Callable:
     """The function that a text defines, after NumPy was imported."""
-    answer = define(Program((("quiet", "import numpy as np"), (name, text))), name)
+    answer = LiveProgram(name, (("quiet", "import numpy as np"), (name, text))).answer
     answer.source = text
     return answer

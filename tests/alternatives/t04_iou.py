@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.topics.t04_iou.confusion_matrix import counted_pairs
+from labcourse.questions.t04_iou.confusion_matrix import counted_pairs
 
 
 def confusion_matrix__one_hot(y_true, y_pred, num_classes, ignore):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labkit.course.topics.t07_grasp.grasp_pose import pose, unit
+from labcourse.questions.t07_grasp.grasp_pose import pose, unit
 
 
 def closing_yaw__across_the_long_axis(Sigma, now):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from labkit.course.topics.t08_node.pose_at import neighbours, outside
-from labkit.course.topics.t08_node.quaternion import quaternion
+from labcourse.questions.t08_node.pose_at import neighbours, outside
+from labcourse.questions.t08_node.quaternion import quaternion
 
 
 def pack_cloud__torch(P):

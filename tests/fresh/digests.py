@@ -38,18 +38,18 @@ def main() -> None:
         run("data_gen", data, "--scenes", 8, "--config", "hard", "--size", "160x120")
         say("data", files(data))
         for model in ("smallsegnet", "unet_rgbd"):
-            run("labkit.apps.cli", "train", data, "--model", model, "--epochs", 2, "--device", "cpu", "--out", runs)
+            run("labcli.cli", "train", data, "--model", model, "--epochs", 2, "--device", "cpu", "--out", runs)
             weights = torch.load(runs / f"{model}.pt", weights_only=True)["state_dict"]
             say(f"weights {model}", [tensor.numpy().tobytes() for tensor in weights.values()])
         for model in ("unet", "unet_rgbd"):
-            run("labkit.apps.cli", "evaluate", "--model", model, "--scenes", 3, "--json", runs / "scores.json")
+            run("labcli.cli", "evaluate", "--model", model, "--scenes", 3, "--json", runs / "scores.json")
             scores = json.loads((runs / "scores.json").read_bytes())
             del scores["seconds"]
             say(f"scores {model}", [json.dumps(scores).encode()])
         shutil.copytree(ROOT / "labs" / "04_iou", course / "labs" / "04_iou")
         submitted = ROOT / "tests" / "data" / "submitted"
         grading = ("grade", "04_iou", "--seed", "everywhere", "--course", course, "--submissions", submitted)
-        subprocess.run([sys.executable, "-m", "labkit.apps.cli", *map(str, grading)], cwd=ROOT, stdout=sys.stderr)
+        subprocess.run([sys.executable, "-m", "labcli.cli", *map(str, grading)], cwd=ROOT, stdout=sys.stderr)
         say("grades", files(course / "grades", "grades.csv") + files(course / "grades", "results.json"))
 
 

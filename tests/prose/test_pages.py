@@ -1,0 +1,100 @@
+"""What the notebooks hold beside what they do: links, names, spelling, pictures, lengths of cells."""
+
+import base64
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from notebooks import LABS, LESSONS, ROOT, SOLUTIONS, code, is_compared, prose
+
+from labgrader.course import topics
+
+MAX_LINES, MAX_PNG = 25, 150_000
+
+
+def each(paths):
+    """Run a test once a notebook, named by its folder and topic."""
+    return pytest.mark.parametrize("path", paths, ids=[f"{p.relative_to(ROOT).parts[0]}-{p.stem}" for p in paths])
+
+
+@each([*LESSONS, *SOLUTIONS, *LABS])
+def test_cells_are_short(path):
+    for cell in code(path):
+        assert len(cell.source.splitlines()) <= MAX_LINES, cell.source[:200]
+
+
+def test_prose_is_spelled_as_in_the_dictionary(tmp_path):
+    for path in (*LESSONS, *SOLUTIONS):
+        # Formulas, code and targets of links are not words.
+        text = re.sub(r"\$\$.*?\$\$|\$[^$\n]*\$|```.*?```|`[^`\n]*`|\]\([^)]*\)", " ", prose(path), flags=re.DOTALL)
+        (tmp_path / f"{path.parent.name}-{path.stem}.txt").write_text(text)
+    done = subprocess.run([sys.executable, "-m", "codespell_lib", str(tmp_path)], capture_output=True, text=True)
+    assert done.returncode == 0 and not done.stdout, done.stdout + done.stderr
+
+
+@each([*LESSONS, *SOLUTIONS, *LABS])
+def test_links_lead_to_files_and_headings(path):
+    text = prose(path)
+    headings = {re.sub(r"\s+", "-", h.strip()) for h in re.findall(r"^#+ (.+)$", text, re.MULTILINE)}
+    targets = re.findall(r"\]\(([^)\s]+)", text) + re.findall(r"(?:src|href)=[\"']([^\"']+)", text)
+    for target in targets:
+        if target.startswith("#"):
+            assert target[1:] in headings, target
+        elif not re.match(r"https?://|mailto:|attachment:|data:", target):
+            assert (path.parent / target.partition("#")[0]).exists(), target
+
+
+# --------------------------------------------------------------------------------- names in prose
+
+
+def resolve(dotted: str) -> None:
+    """Raise if a dotted name of the packages leads nowhere."""
+    parts = dotted.split(".")
+    found = importlib.import_module(parts[0])
+    for i, part in enumerate(parts[1:], start=2):
+        if not hasattr(found, part):
+            found = importlib.import_module(".".join(parts[:i]))
+        else:
+            found = getattr(found, part)
+        if not hasattr(found, "__path__") and not isinstance(found, type(sys)) and not isinstance(found, type):
+            return  # an object: its attributes are its own business
+
+
+@each([*LESSONS, *SOLUTIONS, *LABS])
+def test_every_symbol_that_prose_names_exists(path):
+    """Those that code names exist: nbval runs it."""
+    for name in sorted(set(re.findall(r"`((?:labkit|labgrader|labcourse|labcli|data_gen)(?:\.\w+)+)", prose(path)))):
+        resolve(name)
+
+
+# --------------------------------------------------------------------------------------------- lessons
+
+
+def pictures(path: Path) -> list[bytes]:
+    """The PNG pictures among a notebook's outputs."""
+    data = [output.get("data", {}) for cell in code(path) for output in cell.outputs]
+    return [base64.b64decode(d["image/png"]) for d in data if "image/png" in d]
+
+
+@each([*LESSONS, *SOLUTIONS])
+def test_pictures_are_there_and_small(path):
+    found = pictures(path)
+    assert len(found) >= (2 if path in LESSONS else 1)
+    for picture in found:
+        assert picture.startswith(b"\x89PNG") and len(picture) < MAX_PNG, f"{len(picture)} bytes"
+
+
+@pytest.mark.parametrize("topic", [topic for topic in topics() if any(p.name.startswith(topic) for p in LESSONS)])
+def test_each_topics_lessons_have_an_explorer(topic):
+    cells = [cell for path in LESSONS if path.name.startswith(topic) for cell in code(path)]
+    texts = [output.get("data", {}).get("text/plain", "") for cell in cells for output in cell.outputs]
+    assert any(text.startswith("an explorer: ") for text in texts)
+
+
+@each(LESSONS)
+def test_at_least_half_of_the_cells_with_output_are_compared(path):
+    shown = [cell for cell in code(path) if cell.outputs]
+    assert 2 * sum(map(is_compared, shown)) >= len(shown)
