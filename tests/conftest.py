@@ -44,6 +44,12 @@ def shape_checks_off_for_bad_input(request):
     jaxtyping.config.update("jaxtyping_disable", False)
 
 
+@pytest.fixture(autouse=True)
+def course_of_this_folder(monkeypatch):
+    """A command of one test that names a course names it to no other."""
+    monkeypatch.setenv("LABGRADER_COURSE", "")  # what is changed after this is undone, too
+
+
 @pytest.fixture
 def labkit(monkeypatch):
     """A function that runs a command of the kit in this process and returns its exit status."""

@@ -56,6 +56,10 @@ def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
     """Recipes at single places, at each occurrence of an expression, and in parallel lines."""
     places = list(expressions(function))
     recipes = {place: {(r.kind, r.key): r for r in recipes_for(place, scope)} for place in places}
+    for node, name in kept_in(function):  # a list that holds itself fills the memory when it becomes an array
+        for place in (place for place in places if place.node is node):
+            made = recipes[place].items()
+            recipes[place] = {key: recipe for key, recipe in made if getattr(recipe.make(), "id", "") != name}
     for place in places:
         for recipe in recipes[place].values():
             yield at([place], [recipe])
@@ -73,6 +77,17 @@ def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
     yield from exchanged_names(function, scope, places)
     for inside in lines:
         yield from exchanged_parts(inside)
+
+
+def kept_in(function: ast.stmt) -> Iterator[tuple[ast.expr, str]]:
+    """What is put into a list as it is, or as an entry of a tuple, with the list's name."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("append", "insert"):
+            held = list(node.args)
+            while held:
+                part = held.pop()
+                held += part.elts if isinstance(part, ast.Tuple | ast.List) else []
+                yield part, ast.unparse(node.func.value)
 
 
 def at(places: Sequence[Place], recipes: Sequence[Recipe]) -> Mutation:

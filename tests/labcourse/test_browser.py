@@ -59,7 +59,7 @@ def test_a_blank_filled_in_lab_04_gets_its_tick(jupyterlab, page, tmp_path):
     tick.wait_for()
     wait_until_idle(page)
     assert page.locator(".jp-OutputArea-output", has_text="not answered yet").count() >= 2
-    assert page.locator(".jp-OutputArea-output[data-mime-type='application/vnd.jupyter.error']").count() == 0
+    assert page.locator(".jp-OutputArea-output[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
     cell_with(page, 'iou = check("04_iou.iou"').evaluate("cell => cell.scrollIntoView({block: 'start'})")
     page.screenshot(path=tmp_path / "lab_04.png")
     assert page.errors == []
@@ -129,7 +129,7 @@ def test_a_slider_moved_in_lesson_02_changes_the_picture(jupyterlab, page, tmp_p
 
 def test_every_explorers_labels_are_read_in_full_and_pressed_pixels_have_the_things_colour(jupyterlab, page):
     """Run one cell that shows the explorers of all topics, as test_explorer.py makes them."""
-    places = [str(ROOT / "tests"), str(ROOT / "tests/labcourse/explorers")]
+    places = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/labcourse/explorers")]  # labkit is not tests/labkit
     open_notebook(page, jupyterlab, "lessons/04_iou.ipynb")
     cell = page.locator(".jp-CodeCell").first
     cell.locator(".cm-content").click()
@@ -138,7 +138,7 @@ def test_every_explorers_labels_are_read_in_full_and_pressed_pixels_have_the_thi
     page.keyboard.insert_text("for make, _ in EXPLORERS.values(): display(make())")
     page.keyboard.press("Shift+Enter")
     slider = cell.locator(".widget-slider", has_text="saturation")
-    error = cell.locator("[data-mime-type='application/vnd.jupyter.error']")
+    error = cell.locator("[data-mime-type='application/vnd.jupyter.stderr']")
     slider.or_(error).first.wait_for()
     assert error.count() == 0, error.inner_text()
     wait_until_idle(page)

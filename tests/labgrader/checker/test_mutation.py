@@ -135,3 +135,10 @@ def test_parallel_places_count_as_one():
 def test_a_line_that_writes_into_an_array_is_not_turned_into_one_that_does_nothing():
     for mutation, text in made("def f(y):\n    out = y * 2\n    out[y == 255] = 0\n    return out"):
         assert "out.copy()[" not in text and ".astype(float)[" not in text, mutation
+
+
+def test_a_list_is_not_put_into_itself():
+    """np.array of such a list wants all memory."""
+    texts = [text for _, text in made("def f(a, b):\n    b = []\n    b.append((len(a), a + 1))\n    b.append(b[0])")]
+    assert any("b.append((a, a + 1))" in text for text in texts)
+    assert not [text for text in texts for part in ("append(b)", "append((b,", "a + 1, b)", ", b))") if part in text]
