@@ -3,12 +3,12 @@
 `sentences` asks in this order: is it a listed misconception; does it run (what an exception means in this task); what
 do instruments and repair find in the student's own program; which relation of the outputs would a student see at once;
 what stands idle in the program; which property of right answers does it lack; what do the wrong cases have in common;
-and at last, which cases are wrong.
+up to which step is it right; and at last, which cases are wrong.
 """
 
 import copy
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from labgrader.checker.comparison import Case, Problem, alike, parts, trusted
 from labgrader.checker.contrast import contrast
 from labgrader.checker.errors import explain
-from labgrader.checker.finding import IDLE, REPAIRS, WATCHES, Finding
+from labgrader.checker.finding import IDLE, REPAIRS, RIGHT, WATCHES, Finding
 from labgrader.checker.messages import Marked, marked, said
 from labgrader.checker.question import Misconception, Property, Question
 from labgrader.checker.relations import View, related
@@ -29,8 +29,8 @@ class Sentence:
     """Something true of a wrong answer.
 
     kind: "exception", "misconception", a kind of finding (`finding.WATCHES`, `finding.IDLE`, `finding.REPAIRS`) or
-    "relation" name a mistake; "property", "contrast" and "case" are true of more mistakes than one. marked: lines of
-    the student's that it is about.
+    "relation" name a mistake; "property", "contrast", "reached" and "case" are true of more mistakes than one. marked:
+    lines of the student's that it is about.
     """
 
     kind: str
@@ -40,7 +40,7 @@ class Sentence:
     @property
     def names_the_mistake(self) -> bool:
         """Whether one knows from it what to change."""
-        return self.kind not in ("property", "contrast", "case")
+        return self.kind not in ("property", "contrast", "reached", "case")
 
 
 def diagnose(
@@ -70,19 +70,20 @@ def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sent
     yield from exceptions(question, cases, outputs, pieces)
     pairs = wrong_ones_first(question, cases, outputs)
     values_are_right = bool(pairs) and alike(question, pairs[0][0].expected, pairs[0][1])
-    yield from found_in_the_program(pieces, findings, values_are_right)
+    yield from found_in_the_program(question, pieces, findings, values_are_right)
     if not pairs or values_are_right:
         return
     yield from outputs_exchanged(question, cases, outputs)
     for name, view in views_of(question, cases, outputs):
         yield from (Sentence("relation", name + says) for says in related(view))
-    yield from idle_in_the_program(pieces, findings)
+    yield from of_kinds(IDLE, pieces, findings)
     right = [alike(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)]
     yield from broken_properties(question, pairs[:1])  # that is the case that is shown, as a rule
     if says := contrast(question, cases, right):
         yield Sentence("contrast", says)
     for sentence in broken_properties(question, pairs[1:]):
         yield replace(sentence, says=f"In another wrong case: {sentence.says[0].lower()}{sentence.says[1:]}")
+    yield from of_kinds(RIGHT, pieces, findings)
     yield which_cases(cases, right)
 
 
@@ -146,7 +147,7 @@ def output_of(misconception: Misconception, args: tuple) -> object:
 
 
 def found_in_the_program(
-    pieces: Sequence[tuple[str, str]], findings: Sequence[Finding], values_are_right: bool
+    question: Question, pieces: Sequence[tuple[str, str]], findings: Sequence[Finding], values_are_right: bool
 ) -> Iterator[Sentence]:
     """What instruments show, then what repair finds, with the student's lines.
 
@@ -163,13 +164,18 @@ def found_in_the_program(
         says = said(replace(finding, kind="type") if changes_values else finding)
         if finding in repairs and equal:
             says = f"Change one of the two marked places, not both. {says}"
+        if finding.of_two and 0 <= finding.value < len(question.misconceptions):
+            one = question.misconceptions[int(finding.value)].hint
+            says = f"Two things are wrong. One is this: {one} The other: {says[0].lower()}{says[1:]}"
         yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
 
 
-def idle_in_the_program(pieces: Sequence[tuple[str, str]], findings: Sequence[Finding]) -> Iterator[Sentence]:
-    """An argument that is never read, and what is computed and never used."""
+def of_kinds(
+    kinds: Collection[str], pieces: Sequence[tuple[str, str]], findings: Sequence[Finding]
+) -> Iterator[Sentence]:
+    """What stands idle: an argument that is never read, what is computed and never used; or the last right step."""
     for finding in findings:
-        if finding.kind in IDLE:
+        if finding.kind in kinds:
             yield Sentence(finding.kind, said(finding), marked([finding], pieces))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labgrader.checker.comparison import Case, Problem, canonical, differences, different, parts
-from labgrader.checker.finding import IDLE, REPAIRS, WATCHES, Finding
+from labgrader.checker.finding import IDLE, REPAIRS, RIGHT, WATCHES, Finding
 from labgrader.checker.question import Question
 
 LONGEST = 100  # characters of a line
@@ -130,8 +130,8 @@ def said(finding: Finding) -> str:
     if finding.kind == "overflow" and math.isfinite(finding.value):
         value = f": a number as large as {finding.value:.4g} goes into it"
     several = "s" if len(finding.spans) > 1 else ""
-    says = (WATCHES | IDLE | REPAIRS)[finding.kind].replace("{value}", value).replace("{s}", several)
-    if not finding.of_two:
+    says = (WATCHES | IDLE | RIGHT | REPAIRS)[finding.kind].replace("{value}", value).replace("{s}", several)
+    if not finding.of_two or math.isfinite(finding.value):
         return says
     return "Two things are wrong. First: " + says.replace(": every case is right without it", "").replace(
         "Without the marked line every case is right", "The marked line does harm"

@@ -3,9 +3,10 @@
     repairs(pieces, "iou", cases, fresh, right)      what was found, the best first
 
 Every mutation of the program (`mutation`) runs on the cases until one is wrong. What survives is right on every public
-case and on fresh ones, drawn wider, so that what is said about its place is true. Where none survives, mutations that
-make some numbers right and none wrong are each tried together with a second one (`two_repairs`). The mutated text is
-never shown: a student reads where to look, and is asked what belongs there.
+case and on fresh ones, drawn wider, so that what is said about its place is true. Where none survives, a mutation is
+told with which the program gives what a listed mistake gives, since then both are known; or else mutations that make
+some numbers right and none wrong are each tried together with a second one (`two_repairs`). The mutated text is never
+shown: a student reads where to look, and is asked what belongs there.
 
 Of several repairs the nearest to what the student wrote is told: the one that changes the fewest nodes, of these the
 kind that stands first in `finding.REPAIRS`, of these the one that marks least.
@@ -34,12 +35,19 @@ MOST_FIRSTS = 4  # mutations with which others are tried together
 MOST_SECONDS = 1000  # others that are tried together with the best first one; half as many with the next one ...
 MOST_GAINERS = 60  # second ones that are tried because they make something right themselves
 DEAREST_OF_TWO = 2.0  # nodes that each of two changes at most
-MOST_S = 4.0  # CPU seconds of the whole search: then what has been found is told, if there is something
+MOST_S = 2.7  # CPU seconds of the whole search: then what has been found is told, if there is something
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
 MORE_COST = 0.5  # repairs that change so much more than the smallest are looked for, too
+LEFT_OUT = (
+    "line too many",
+    "too much",
+    "call too many",
+    "moved",
+)  # what a mistake beside which is no mistake of its own
 PROBES = 4  # wrong cases on which it is seen what a mutation makes right
 
 Cases = Sequence[tuple[tuple, object]]  # (arguments, expected) each
+Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
 
 
 class SearchIsOver(Exception):
@@ -54,13 +62,14 @@ class Search:
     """A program, and how its outputs are judged. end: of the search, in CPU seconds of this process.
 
     right: function (expected, got) -> bool; entries: function (expected, got) -> which of its numbers are right, None
-    for an output of another form.
+    for an output of another form. listed: what the question's listed mistakes give in each case, as `Listed`.
     """
 
     program: LiveProgram
     right: Callable[[object, object], bool]
     entries: Callable[[object, object], np.ndarray | None]
     end: float
+    listed: "dict[int, Listed]"
 
 
 @dataclass(frozen=True)
@@ -94,25 +103,27 @@ def repairs(
     fresh: Callable[[], Cases],
     right: Callable[[object, object], bool],
     entries: Callable[[object, object], np.ndarray | None],
+    listed: Sequence[Listed] = (),
 ) -> list[Finding]:
     """Find the places of a program whose mutation makes all cases right, the best first.
 
     pieces: (label, text) of the program, as `program` cuts it; name: of its function. cases: (arguments, expected) of
     the public cases; fresh: gives more of them, asked for once, when a mutation passes the public ones. right, entries:
-    as in `Search`. Empty if there is none, or if the time is up.
+    as in `Search`; listed: one for each of the cases. Empty if there is none, or if the time is up.
     """
     with quiet():
         try:
             with limited(MOST_S):
                 program = LiveProgram(name, pieces)
-            search = Search(program, right, entries, time.process_time() + MOST_S)
+            of_cases = {id(case): told for case, told in zip(cases, listed, strict=False)}
+            search = Search(program, right, entries, time.process_time() + MOST_S, of_cases)
             by_use = sorted_by_use(search, cases)
             trials = [Trial(k, statement, m) for k, statement in program.functions() for m in mutations(statement)]
             trials.sort(key=lambda trial: trial.rank[:2])
             firsts = Firsts(search, by_use)
             more = Asked(fresh)
-            found = one_repair(search, trials[:MOST_MUTATIONS], by_use, more, firsts)
-            return found or two_repairs(search, trials, by_use, more, firsts)
+            found, beside = one_repair(search, trials[:MOST_MUTATIONS], by_use, more, firsts)
+            return found or beside or two_repairs(search, trials, by_use, more, firsts)
         except ENDS:  # nothing can be said about such a program
             return []
 
@@ -140,10 +151,17 @@ class Asked:
         return self.cases
 
 
-def one_repair(search: Search, trials: Sequence[Trial], cases: Cases, more: Asked, firsts: "Firsts") -> list[Finding]:
-    """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs."""
+def one_repair(
+    search: Search, trials: Sequence[Trial], cases: Cases, more: Asked, firsts: "Firsts"
+) -> tuple[list[Finding], list[Finding]]:
+    """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs.
+
+    Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does.
+    """
     found: dict[Finding, tuple] = {}  # with what decides which one is told first
-    with over_if(found):
+    beside: dict[Finding, tuple] = {}
+    before = rightness(search, cases)
+    with over_if(found, beside):
         for trial in trials:
             if found and trial.mutation.cost > min(found.values())[0] + MORE_COST:
                 break
@@ -154,16 +172,50 @@ def one_repair(search: Search, trials: Sequence[Trial], cases: Cases, more: Aske
                     found[trial.finding] = trial.rank
                 elif runs and not found and trial.mutation.cost <= DEAREST_OF_TWO:
                     firsts.look(trial)
-    return sorted(found, key=found.get)
+                    number = listed_mistake(search, cases) if trial.mutation.kind not in LEFT_OUT else None
+                    if number is not None and rightness(search, cases) > before:  # one mistake is less than two
+                        beside[replace(trial.finding, value=float(number), of_two=True)] = trial.rank
+    return sorted(found, key=found.get), sorted(beside, key=beside.get)[:1]
+
+
+def listed_mistake(search: Search, cases: Cases) -> int | None:
+    """The number of a listed mistake that gives in all cases what the program gives now; None if there is none."""
+    numbers: frozenset[int] | None = None
+    for case in cases:
+        given = search.listed.get(id(case), {}).get(fingerprint(outcome(search, case[0])[0]), frozenset())
+        numbers = given if numbers is None else numbers & given
+        if not numbers:
+            return None
+    return min(numbers, default=None) if numbers else None
+
+
+def rightness(search: Search, cases: Cases) -> float:
+    """How many cases are right, those in part counted by their share of right numbers."""
+    entries = [search.entries(expected, outcome(search, args)[0]) for args, expected in cases]
+    return sum(float(right.mean()) for right in entries if right is not None and right.size)
+
+
+def fingerprint(output: object) -> bytes:
+    """The numbers of an output, rounded, and its shape; of outputs that differ by rounding most have the same.
+
+    >>> fingerprint([1, 0.1 + 0.2]) == fingerprint(np.array([1.0, 0.3]))
+    True
+    """
+    several = output if isinstance(output, tuple) else (output,)
+    try:
+        arrays = [np.asarray(part).astype(float) for part in several]
+    except (TypeError, ValueError):
+        return b""
+    return b"".join(bytes(str(a.shape), "ascii") + (np.round(a, 7) + 0.0).tobytes() for a in arrays)
 
 
 @contextlib.contextmanager
-def over_if(found: dict) -> Iterator[None]:
+def over_if(*found: dict) -> Iterator[None]:
     """A search whose time is up ends with what it has found, if that is something."""
     try:
         yield
     except SearchIsOver:
-        if not found:
+        if not any(found):
             raise
 
 

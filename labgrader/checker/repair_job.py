@@ -16,11 +16,12 @@ from labgrader.checker.comparison import (
     plain,
     trusted,
 )
+from labgrader.checker.diagnosis import output_of
 from labgrader.checker.finding import write
 from labgrader.checker.idle import idle
 from labgrader.checker.instruments import readings
 from labgrader.checker.question import PUBLIC_SEED, Question
-from labgrader.checker.repair import repairs
+from labgrader.checker.repair import Listed, fingerprint, repairs
 
 MOST_REPAIRS = 4  # that are told of
 FRESH = 50  # cases of a kind, beside those that a check shows
@@ -32,12 +33,20 @@ Pairs = Sequence[tuple[tuple, object]]  # the arguments of cases, and what is ex
 class Job:
     """A look at the program of the function `name`, where the question is not: a worker runs a student's lines.
 
-    comparing, canonical: what `comparing_of` gives; pieces: the program; public: cases as `repairs` takes them.
+    comparing, canonical: what `comparing_of` gives; pieces: the program; public, listed: as `repairs` takes them.
     """
 
-    def __init__(self, comparing: dict, canonical: str, name: str, pieces: Sequence[tuple[str, str]], public: Pairs):
+    def __init__(
+        self,
+        comparing: dict,
+        canonical: str,
+        name: str,
+        pieces: Sequence[tuple[str, str]],
+        public: Pairs,
+        listed: Sequence[Listed] = (),
+    ):
         self.question = Question(reference=None, inputs=None, **comparing)
-        self.name, self.pieces, self.public = name, pieces, public
+        self.name, self.pieces, self.public, self.listed = name, pieces, public, listed
         if canonical:
             namespace = {"np": np}
             exec(canonical, namespace)
@@ -61,7 +70,7 @@ class Job:
 
     def repair(self, fresh: Callable[[], Pairs]) -> str:
         """What repair finds, and what stands idle, as JSON; fresh: more cases, as `repairs` takes them."""
-        found = repairs(self.pieces, self.name, self.public, fresh, self.right, self.entries)
+        found = repairs(self.pieces, self.name, self.public, fresh, self.right, self.entries, self.listed)
         return write([*found[:MOST_REPAIRS], *idle(self.pieces, self.name)])
 
 
@@ -74,6 +83,17 @@ def comparing_of(question: Question) -> tuple[dict, str]:
     fields = {name: getattr(question, name) for name in COMPARING}
     named = question.canonical.__name__ != "<lambda>"
     return fields, inspect.getsource(inspect.unwrap(question.canonical)) if named else ""
+
+
+def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
+    """What the listed mistakes of a question give in each case; those that raise give nothing."""
+    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
+    for number, mistake in enumerate(question.misconceptions):
+        for found, case in zip(told, cases, strict=True):
+            output = output_of(mistake, case.args)
+            if not isinstance(output, Problem):
+                found.setdefault(fingerprint(output), set()).add(number)
+    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
 
 
 def fresh_cases(question: Question, seed: int = PUBLIC_SEED) -> list[Case]:

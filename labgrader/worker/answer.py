@@ -10,18 +10,22 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 
-from labgrader.checker.comparison import Case, Problem, expected_cases
+import numpy as np
+
+from labgrader.checker.comparison import Case, Problem, alike, expected_cases
 from labgrader.checker.finding import MOST_FINDINGS, Finding, read
 from labgrader.checker.judge import Verdict, verdict
 from labgrader.checker.program import Program
 from labgrader.checker.question import PUBLIC_SEED, Question
-from labgrader.checker.repair_job import comparing_of, fresh_cases, pairs
+from labgrader.checker.repair import Listed
+from labgrader.checker.repair_job import comparing_of, fresh_cases, listed_in, pairs
+from labgrader.checker.steps import MOST_CASES, MOST_NUMBERS, Values, values_of_a_right_answer
 from labgrader.course import course
 from labgrader.worker.channel import MOST_FOUND, Changed, Worker, WorkerLost
 from labgrader.worker.process import MORE
 from labgrader.worker.stopwatch import Stopwatch
 
-LOOK_S = 60.0  # for a look: its own limits come before
+LOOK_S = 6.0  # for a look: its own limits come before, but where a compiled function does not come back
 drawing = threading.Lock()  # references are called with Python's warnings off, which no thread has for itself
 
 
@@ -64,6 +68,20 @@ def more_public_cases(question: Question) -> tuple[Case, ...]:
         return tuple(fresh_cases(question))
 
 
+@functools.cache
+def listed_mistakes(question: Question) -> list[Listed]:
+    """What the listed mistakes give in the public cases; computed once in a process."""
+    with drawing:
+        return listed_in(question, public_cases(question))
+
+
+@functools.cache
+def right_steps(question: Question, number: int) -> Values:
+    """What the question's own answer computes on its way in a public case; computed once in a process."""
+    with drawing:
+        return values_of_a_right_answer(question.reference, public_cases(question)[number].args)
+
+
 @dataclass
 class Budget:
     """What the answers of one notebook may use together, in one run on public or on secret cases."""
@@ -82,6 +100,7 @@ class Answer:
     """An answer to a question as a program, in a worker that has run nothing before; a context manager.
 
     budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took.
+    wrong: numbers of the cases, judged last, that a step is sought in.
     """
 
     def __init__(
@@ -90,7 +109,7 @@ class Answer:
         self.question, self.program, self.limits = question, program, limits
         self.budget = Budget(limits) if budget is None else budget
         self.name, self.seconds, self.used_s = program.name or question.function, self.budget.for_one, 0.0
-        self.starting = start(packages_of(question, program), limits)
+        self.starting, self.wrong = start(packages_of(question, program), limits), []
 
     def __enter__(self) -> "Answer":
         self.worker = self.starting.__enter__()
@@ -151,6 +170,7 @@ class Answer:
             return Verdict(worded[0], None, "", outputs=worded), outputs
         try:
             judged = verdict_on(self.question, cases, worded)
+            self.wrong = wrong_and_small(self.question, cases, worded)
             return replace(judged, pieces=self.program.pieces), outputs
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
@@ -159,13 +179,17 @@ class Answer:
     def findings(self) -> list[Finding]:
         """What instruments and repair find in the program; they get public cases and nothing else."""
         question, pieces = self.question, self.program.pieces
-        job = (*comparing_of(question), self.name, pieces, pairs(public_cases(question)))
+        job = (*comparing_of(question), self.name, pieces, pairs(public_cases(question)), listed_mistakes(question))
         found: list[Finding] = []
         with suppress(WorkerLost):
             for look in ("watch", "repair"):
                 reply = self.worker.ask((look, *job), LOOK_S, MOST_FOUND)
                 if reply == MORE[1:].decode():
                     reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S, MOST_FOUND)
+                found += read(reply, pieces) if isinstance(reply, str) else []
+            if not found:
+                cases = [(public_cases(question)[k].args, right_steps(question, k)) for k in self.wrong[:MOST_CASES]]
+                reply = self.worker.ask(("steps", pieces, self.name, cases), LOOK_S, MOST_FOUND)
                 found += read(reply, pieces) if isinstance(reply, str) else []
         return found[:MOST_FINDINGS]
 
@@ -178,6 +202,14 @@ class Answer:
         lines = pieces[int(piece)][1].split("\n") if int(piece) < len(pieces) else []
         own = ((number, lines[number - 1].strip()),) if 1 <= number <= len(lines) else ()
         return replace(output, says=output.says.removeprefix("it raises "), lines=own)
+
+
+def wrong_and_small(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[int]:
+    """The numbers of wrong cases that are not large, those by hand last."""
+    wrong = [
+        k for k, (case, got) in enumerate(zip(cases, outputs, strict=True)) if not alike(question, case.expected, got)
+    ]
+    return [k for k in reversed(wrong) if sum(map(np.size, cases[k].args)) <= MOST_NUMBERS]
 
 
 def packages_of(question: Question, program: Program) -> tuple[str, ...]:

@@ -33,8 +33,10 @@ import numpy as np
 from labgrader.checker import ast_fingerprint, program
 from labgrader.checker.cell import Cell
 from labgrader.checker.comparison import Problem, parts, plain, quiet
+from labgrader.checker.finding import write
 from labgrader.checker.live_program import LiveProgram, altered, own_entry
 from labgrader.checker.repair_job import Job
+from labgrader.checker.steps import last_right_step
 
 DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
 MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
@@ -149,6 +151,10 @@ class Session:
     def repair(self, *job: object) -> bytes:
         """Look for the place of a program's mistake."""
         return b"J" + Job(*job).repair(self.more).encode()
+
+    def steps(self, *arguments: object) -> bytes:
+        """Look for the last step that is right: arguments are those of `steps.last_right_step`."""
+        return b"J" + write(last_right_step(*arguments)).encode()
 
 
 def message_of(error: BaseException) -> str:
