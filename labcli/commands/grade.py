@@ -94,6 +94,7 @@ def tell(graded, folder: Path, tidy: bool) -> None:
     if graded.gone:
         done = "removed what there was" if tidy else "--tidy removes the pages and grades"
         typer.echo(f"{done} of students without a submission: {', '.join(graded.gone)}")
-    typer.echo(f"{len(graded.records)} students, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
+    students = f"{len(graded.records)} student{'s' * (len(graded.records) != 1)}"
+    typer.echo(f"{students}, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
     for line in told(graded.alike, folder / "alike.html"):
         typer.echo(line)

@@ -32,12 +32,11 @@ import numpy as np
 
 from labgrader.checker import ast_fingerprint, program
 from labgrader.checker.cell import Cell
-from labgrader.checker.comparison import Problem, parts, plain, quiet
+from labgrader.checker.comparison import MOST_BYTES, Problem, parts, plain, quiet
 from labgrader.checker.live_program import LiveProgram, altered, own_entry
 from labgrader.checker.repair_job import Job
 
 DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
-MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
 MOST_PARTS = 16
 MOST_AXES = 8
 MOST_MESSAGE = 160  # characters of an exception's message

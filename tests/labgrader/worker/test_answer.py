@@ -98,6 +98,7 @@ PROBLEMS = [
     ("def iou(n): return None", "kind", "it returns None: is a `return` missing?"),
     ("def iou(n): return np.ones(n.shape) + 0j", "dtype", "expected real numbers, got dtype complex128"),
     ("def iou(n): return np.zeros((1000, 1000))", "size", "it returns more than 1 MB"),
+    ("def iou(n):\n    a = [0.5]\n    a.append(a)\n    return a, a", "size", "it returns more than 1 MB"),
     ("def iou(n):\n    n[:] = 0\n" + RIGHT, "finite", "2 of 2 values are NaN"),
     ("def iou(n):\n    n += 0\n    n = n.copy()\n" + RIGHT, None, ""),
     ("def iou(n):\n" + RIGHT + "raise ValueError", None, ""),
