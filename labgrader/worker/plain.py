@@ -1,6 +1,8 @@
 """A worker as a plain process, on every system: for a student's own check, and for grading without a sandbox.
 
-It is no defence. One is always started ahead, so that a check waits for nothing and each answer has a fresh one.
+It is no defence. One is always started ahead, so that a check waits for nothing and each answer has a fresh one. Time
+of a processor is limited everywhere. Linux limits memory, too; on macOS and Windows, which do not, it is looked at
+while an answer runs (`channel.Worker.watch`).
 """
 
 import atexit
@@ -47,8 +49,10 @@ def started(packages: Sequence[str], limits: Limits) -> Worker:
     own = {name: os.environ[name] for name in ("SYSTEMROOT", "PATH") if os.name == "nt" and name in os.environ}
     place = {"HOME": tempfile.gettempdir(), "TMPDIR": tempfile.gettempdir()}
     printed = tempfile.TemporaryFile()  # noqa: SIM115 (the worker's, and gone with it)
+    # On Windows an environment's python.exe only starts another process, in which everything would happen.
+    python = getattr(sys, "_base_executable", sys.executable) if os.name == "nt" else sys.executable
     process = subprocess.Popen(
-        [sys.executable, "-P", "-s", "-S", "-c", START_PLAIN, json.dumps(options)],
+        [python, "-P", "-s", "-S", "-c", START_PLAIN, json.dumps(options)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=printed,
@@ -60,7 +64,8 @@ def started(packages: Sequence[str], limits: Limits) -> Worker:
         process.kill()
         process.wait()
 
-    return Worker(process.stdin, process.stdout, kill, printed, process.pid)
+    memory = None if sys.platform == "linux" else options["memory"]
+    return Worker(process.stdin, process.stdout, kill, printed, process.pid, memory)
 
 
 class Spare:

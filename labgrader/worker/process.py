@@ -195,7 +195,7 @@ def limit(options: dict) -> None:
     except ImportError:
         return
     wanted = {
-        "AS": options["memory"],
+        "AS": options["memory"] if sys.platform == "linux" else None,  # macOS refuses a smaller one than it shows
         "FSIZE": options["file_size"],
         "NPROC": options["threads"],
         "CPU": options["cpu_s"] + int(time.process_time()),
