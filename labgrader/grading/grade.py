@@ -122,7 +122,8 @@ class Grading:
             with self.start(("numpy",), self.limits) as worker:
                 return worker.programs(cells, asked, self.limits.case_s)
         except WorkerLost as lost:
-            return [(Program(refused=f"its notebook cannot be read: {lost.problem.says}"), []) for _ in names]
+            why = "that takes too long" if lost.problem.kind == "time" else lost.problem.says
+            return [(Program(refused=f"its notebook cannot be read: {why}"), []) for _ in names]
 
     def program(self, name: str, is_right: Callable[[str], bool]) -> Program:
         """The program of an answer, with the kit's answers in the place of wrong ones that it calls."""
