@@ -22,7 +22,14 @@ from labgrader.packages import requirements
 from labgrader.worker.answer import Limits
 from labgrader.worker.channel import Worker, WorkerLost
 
-ENVIRONMENT = {"LANG": "C.UTF-8", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
+# A sandbox has the files of no locale, so that "" names C in both.
+ENVIRONMENT = {
+    "LC_ALL": "C",
+    "PYTHONUTF8": "1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "PYTHONHASHSEED": "0",
+}
 ROOT = Path(__file__).resolve().parents[2]
 # What an interpreter begins with that is to be a worker: its options are the argument that follows.
 START = "import json, sys; options = json.loads(sys.argv[1]); sys.path[:0] = options['path']; "

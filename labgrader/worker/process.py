@@ -46,11 +46,11 @@ MOST_PRINTED = 600  # characters that are kept of what an answer prints
 # What a plain worker refuses, since a sandbox has none of it: it is no defence, but a tick here is a tick there.
 REFUSED = ("subprocess.", "socket.connect", "socket.bind", "socket.send", "socket.get", "shutil.", "os.exec", "os.fork")
 REFUSED += ("os.posix_spawn", "os.system", "os.kill", "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link")
-REFUSED += ("os.symlink", "os.truncate", "webbrowser.")
+REFUSED += ("os.symlink", "os.truncate", "os.chmod", "os.chown", "os.utime", "webbrowser.")
 # Modules whose locks and memory need a file system for them, and functions of os that ask for a filtered system call.
 SHARED = ("multiprocessing.synchronize", "multiprocessing.shared_memory")
 CALLS = "memfd_create pidfd_open posix_fadvise sched_setaffinity sched_setparam sched_setscheduler setns setpriority"
-CALLS += " sync fsync fdatasync unshare"
+CALLS += " sync fsync fdatasync unshare nice mkfifo mknod"
 
 
 def encode(value: object) -> bytes:
