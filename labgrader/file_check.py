@@ -2,7 +2,8 @@
 
 The answers are cut out of the file (`labgrader.checker.program`), each runs in a worker of its own that has the
 packages of the grader and nothing of the kit, and other answers that one calls are the kit's where they are wrong. No
-sandbox is needed, since it is one's own notebook. What is ticked here is right with the grader.
+sandbox is needed, since it is one's own notebook; a stranger's is for `grade`. What is ticked here is right with the
+grader.
 """
 
 import json
@@ -22,6 +23,7 @@ from labgrader.course import asked, course, of_topic, topics
 from labgrader.grading.reading import released_by
 from labgrader.notebook import Unreadable, code_of, parse
 from labgrader.running import live_notebook, running_file
+from labgrader.support import counted
 from labgrader.worker.answer import Budget
 
 
@@ -60,7 +62,7 @@ def check_file(path: Path | str | None = None) -> bool:
     empty = [name for name, text in texts.items() if text.strip() in ("", course().no_text)]
     if empty or not names:
         said = f"still empty: {', '.join(empty)}." if empty else "none of them is empty."
-        print(f"{path.name}, {state}, has {len(texts)} texts that a person grades; {said}")
+        print(f"{path.name}, {state}, has {counted(len(texts), 'text')} that a person grades; {said}")
     for name in not_saved(names, cells) if state == "as it is saved" else ():
         print(f"The {name} that you ran last is not in the file: save the notebook (Ctrl+S), then run this cell again.")
     return right == len(names) if names else not empty

@@ -35,6 +35,15 @@ def require(name: str, fits, expected: str, got) -> None:
         raise ValueError(f"{name}: expected {expected}, got {got}")
 
 
+def counted(number: int, thing: str) -> str:
+    """A number of things in words.
+
+    >>> counted(1, "student"), counted(0, "text")
+    ('1 student', '0 texts')
+    """
+    return f"{number} {thing}{'s' * (number != 1)}"
+
+
 @contextmanager
 def inherited(variables: dict[str, str]) -> Iterator[None]:
     """Processes that are started meanwhile have these environment variables; this one has its own again afterwards."""

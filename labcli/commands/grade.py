@@ -75,6 +75,7 @@ def tell(graded, folder: Path, tidy: bool) -> None:
     """Print the table of a grading, `run.Graded`, what an instructor should know of it, and where its files are."""
     from labgrader.grading.alike_page import told
     from labgrader.grading.outputs import terminal_table
+    from labgrader.support import counted
 
     topic = graded.lab.topic
     typer.echo(terminal_table(graded.lab, graded.records, graded.late))
@@ -94,6 +95,8 @@ def tell(graded, folder: Path, tidy: bool) -> None:
     if graded.gone:
         done = "removed what there was" if tidy else "--tidy removes the pages and grades"
         typer.echo(f"{done} of students without a submission: {', '.join(graded.gone)}")
-    typer.echo(f"{len(graded.records)} students, {graded.graded_now} of them graded now: {folder / 'grades.csv'}")
+    typer.echo(
+        f"{counted(len(graded.records), 'student')}, {graded.graded_now} of them graded now: {folder / 'grades.csv'}"
+    )
     for line in told(graded.alike, folder / "alike.html"):
         typer.echo(line)

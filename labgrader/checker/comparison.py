@@ -20,6 +20,7 @@ import numpy as np
 from labgrader.checker.question import Question
 
 LONGEST_TUPLE = 16
+MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
 FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, np.ufunc)
 
 
@@ -115,14 +116,18 @@ def plain_part(got: object) -> object:
     return plain_array(got)
 
 
-def array_of_list(got: list) -> np.ndarray | None:
+def array_of_list(got: list) -> np.ndarray | Problem | None:
     """The array that a list of numbers stands for; None if its rows differ in length, or hold anything else.
 
-    Truth values beside numbers are outputs of several kinds, and no array.
+    Truth values beside numbers are outputs of several kinds, and no array. What holds more values than an output has
+    bytes is a Problem: a list that holds itself has no end.
     """
-    waiting, truths = [got], set()
+    waiting, truths, count = [got], set(), 0
     while waiting:
         for part in waiting.pop():
+            count += 1
+            if count > MOST_BYTES:
+                return Problem("size", f"it returns more than {MOST_BYTES >> 20} MB")
             if issubclass(type(part), list | tuple):
                 waiting.append(part)
             elif not issubclass(type(part), bool | int | float | np.generic | np.ndarray):

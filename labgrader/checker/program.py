@@ -29,6 +29,7 @@ QUIET = {
     "clear_output": "lambda *things, **options: None",
 }
 QUIET_MODULES = ("tqdm", "IPython")
+WINDOWS = {"tkinter", "turtle"}  # of the standard library, and not there without a screen: editors import them unasked
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def program(
     (('cell 1', 'import numpy as np\\n'), ('cell 2', 'half = 0.5\\n'), ('f', 'def f(x):\\n    return half * np.abs(x)'))
     """
     without = {module.partition(".")[0] for module in forbidden}
-    modules = {*packages, *sys.stdlib_module_names} - without
+    modules = {*packages, *sys.stdlib_module_names} - WINDOWS - without
     asked = (list(map(parsed, cells)), name, blanks, given or {}, modules, without, kit, latest)
     first = Slice(*asked)
     made = first.program()

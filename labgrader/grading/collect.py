@@ -31,7 +31,10 @@ MOODLE = re.compile(r"(?P<name>[^_]+)_(?P<number>[0-9]+)_assignsubmission_file_?
 CANVAS = re.compile(
     r"(?P<name>.+?)(?P<late>_LATE)?_(?P<number>[0-9]+)_[0-9]+_(?P<file>(?!assignsubmission_file).+)", re.DOTALL
 )
+# What browsers and systems make of a notebook's name when they save it.
+NOTEBOOK = re.compile(r"(.+)\.ipynb(?:\.json|\.txt)?", re.DOTALL | re.IGNORECASE)
 MOST_NOTEBOOKS = 20  # in a zip of a student's
+MOST_NAMED = 3  # files of a student who handed in no notebook
 MOST_OF_A_STUDENT = 40 << 20  # bytes of notebooks, unpacked: two of the largest
 MOST_OF_A_CLASS = 4 << 30
 
@@ -99,13 +102,14 @@ class LmsExtractor(ExtractorPlugin):
     """Takes the notebooks out of a platform's zips, and out of zips that students handed in.
 
     What cannot be read, or is more than a student or a class may have, is named and left: nbgrader's own extractor
-    stops at a student's broken zip, and never ends with one that holds itself. A file has the time of the platform's
-    entry, 1970 for none.
+    stops at a student's broken zip, and never ends with one that holds itself. Students without any notebook are named,
+    too. A file has the time of the platform's entry, 1970 for none.
     """
 
     def __init__(self, **options):
         super().__init__(**options)
         self.taken: Counter[str] = Counter()  # bytes by student
+        self.files: dict[str, list[str]] = {}  # their names by student
 
     def extract(self, archive_path: str, extracted_path: str) -> None:
         """Extract what is in a folder of zips; notebooks that lie there without a zip are copied."""
@@ -120,22 +124,28 @@ class LmsExtractor(ExtractorPlugin):
                     except Exception as error:  # of one student's file: the others' are extracted all the same
                         why = str(error) if isinstance(error, LeftOut) else type(error).__name__
                         self.log.warning("Left out %a: %s", entry.filename, why)
+        for student, names in self.files.items():
+            if student not in self.taken:
+                self.log.warning("No notebook of %a, only %s", student, ", ".join(map(ascii, names[:MOST_NAMED])))
 
     def take(self, packed: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
         """Write the notebook that an entry of a platform's zip is, or those in the zip that it is."""
-        path, when = PurePosixPath(entry.filename), datetime.datetime(*entry.date_time)
-        found = {path: entry}
+        path, when = PurePosixPath(usual(entry.filename)), datetime.datetime(*entry.date_time)
+        whose = student_and_notebook(str(path))
+        student, found = whose[0] if whose else str(path), {path: entry}
+        if whose and not entry.is_dir():
+            self.files.setdefault(student, []).append(path.name)
         if path.suffix == ".zip":
             if entry.file_size > LARGEST_NOTEBOOK:
                 raise LeftOut(f"it is a zip of more than {LARGEST_NOTEBOOK >> 20} MB")
             packed = zipfile.ZipFile(io.BytesIO(content(packed, entry)))
-            found = {path / PurePosixPath(inner.filename).name: inner for inner in packed.infolist()}
+            found = {path / PurePosixPath(usual(inner.filename)).name: inner for inner in packed.infolist()}
         notebooks = [place for place in found if place.suffix == ".ipynb" and not place.name.startswith(".")]
         notebooks = notebooks[:MOST_NOTEBOOKS]
         if any(place.is_absolute() or ".." in place.parts for place in notebooks):
             raise LeftOut("it names a place outside")
-        whose = student_and_notebook(str(path))
-        self.count(whose[0] if whose else str(path), sum(size_of(found[place]) for place in notebooks))
+        if notebooks:
+            self.count(student, sum(size_of(found[place]) for place in notebooks))
         for place in notebooks:
             self.write(folder / place, content(packed, found[place]), when.timestamp() if when.year > 1980 else 0.0)
 
@@ -154,6 +164,18 @@ class LmsExtractor(ExtractorPlugin):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
         os.utime(path, (time, time))
+
+
+def usual(name: str) -> str:
+    r"""The name of a file in a zip without signs that a terminal obeys, and with the ending that it was meant to have.
+
+    >>> usual("04_iou.IPYNB"), usual("04_iou.ipynb.txt"), usual("lab.ZIP"), usual("04_iou\u202e.ipynb")
+    ('04_iou.ipynb', '04_iou.ipynb', 'lab.zip', '04_iou.ipynb')
+    """
+    name = "".join(character for character in name if character.isprintable())
+    if found := NOTEBOOK.fullmatch(name):
+        return f"{found[1]}.ipynb"
+    return name[:-4] + ".zip" if name.lower().endswith(".zip") else name
 
 
 def size_of(entry: zipfile.ZipInfo) -> int:

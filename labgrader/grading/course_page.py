@@ -80,12 +80,20 @@ def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
 
 
 def rows_of(finals: Mapping[str, Mapping[str, Final]], roster: dict[str, Person]) -> list[Row]:
-    """A row per person, in the order of names; who is in the roster and handed in nothing has an empty one."""
+    """A row per person, in the order of names; who is in the roster and handed in nothing has an empty one.
+
+    Raises ValueError if two folders of a lab are one person's.
+    """
     rows: dict[str, Row] = {}
     for lab, of_lab in finals.items():
         for student, final in of_lab.items():
             person = person_of(roster, student) or person_by_name(student)
-            rows.setdefault(identity(roster, student), Row(student, person)).finals[lab] = final
+            who = identity(roster, student)
+            row = rows.setdefault(who, Row(student, person))
+            if lab in row.finals:
+                both = " and ".join(other for other in of_lab if identity(roster, other) == who)
+                raise ValueError(f"{lab}: {both} are both {who}; rename the folder of one")
+            row.finals[lab] = final
     here = {key for of_lab in finals.values() for student in of_lab for key in keys_of(student)}
     for person in roster.values():
         if person.id not in here:

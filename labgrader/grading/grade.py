@@ -122,7 +122,8 @@ class Grading:
             with self.start(("numpy",), self.limits) as worker:
                 return worker.programs(cells, asked, self.limits.case_s)
         except WorkerLost as lost:
-            return [(Program(refused=f"its notebook cannot be read: {lost.problem.says}"), []) for _ in names]
+            why = "that takes too long" if lost.problem.kind == "time" else lost.problem.says
+            return [(Program(refused=f"its notebook cannot be read: {why}"), []) for _ in names]
 
     def program(self, name: str, is_right: Callable[[str], bool]) -> Program:
         """The program of an answer, with the kit's answers in the place of wrong ones that it calls."""
@@ -163,6 +164,7 @@ class Grading:
             refused = not_gradable(self.lab, name, program.refused)
             return replace(refused, program=self.submission.cells.get(name, ""))
         flags = copied_code.of_the_kit(self.cuts[name][1], question.reference)
+        flags += [f"uses the kit's {other}, a later task, of which its own is wrong" for other in self.later(name)]
         first, late = program, program.late
         program = late if first.refused else first
         result = Result(name, 0.0, worth, "", flag="; ".join(flags), program=text_of(program), late=program is late)
@@ -190,6 +192,15 @@ class Grading:
             behaviour="" if found.named else behaviour_of(outputs),
             parts=() if problem.kind in LOOK_AT else right_parts(question, public_cases(question), outputs),
         )
+
+    def later(self, name: str) -> list[str]:
+        """The answers to tasks below its own that an answer calls, and has from the kit, since they are wrong.
+
+        A later answer may hold an earlier one: mean IoU of one class alone is its IoU.
+        """
+        order = list(self.lab.answers)
+        below = [other for other in self.cuts[name][0].calls if order.index(other) > order.index(name)]
+        return [other for other in below if not self.draft(other).right]
 
     def is_right(self, question: Question, program: Program) -> bool:
         """Whether a program is right in the public cases."""

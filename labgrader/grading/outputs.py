@@ -18,7 +18,7 @@ from labgrader.grading.grade import Result
 from labgrader.grading.overview import COUNTED, Group, Standing, group_of, standings
 from labgrader.grading.reading import Lab
 from labgrader.grading.sandbox import NO_SANDBOX
-from labgrader.support import write_atomically
+from labgrader.support import counted, write_atomically
 
 COLUMNS = ("student", "lab", "question", "points", "max_points", "verdict", "hint", "look_at")
 CLASS_COLUMNS = ("question", "group", "students", "tried", "passed", "discrimination", *COUNTED, "named", "says")
@@ -220,7 +220,7 @@ def attempted(records: Sequence[Record]) -> str:
 
 def group_section(group: Group, comment: str) -> str:
     """One group: who is in it, what they were told, and the program of the first."""
-    count = f"{len(group.students)} student{'s' if len(group.students) > 1 else ''}"
+    count = counted(len(group.students), "student")
     kind = "" if group.named else " <em>unnamed</em>"
     said = f"<p><b>Your comment:</b> {escape(comment)}</p>" if comment else ""
     sample = escape(group.sample[:LONGEST_SAMPLE])

@@ -100,7 +100,7 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
     new_gradebook = bool(known_students(out)) and not (course / "gradebook.db").is_file()
     with private():
         secret = secret_for(out, how.seed, how.new_round)
-        renamed = rename_students(course, out, topic, read)
+        renamed = rename_students(course, out, topic, read, roster)
         batch = Batch(lab, read, out, secret, how.workers, how.force, how.unsafe, how.limits)
         earned, graded_now = grade_batch(batch, how.progress)
         known = read_all([result.program for record in (*earned, *old) for result in record.results])

@@ -281,7 +281,8 @@ def shown_files(packages: tuple[str, ...]) -> tuple[str, list[tuple[str, str | N
     done = subprocess.run(run, capture_output=True, text=True, check=True, env=dict(ENVIRONMENT))
     python, library, mapped = json.loads(done.stdout)
     tops = package_files(packages)
-    covered = (library + os.sep, *(f"{path}{os.sep}" for path in tops.values()), *map(str, tops.values()))
+    real = [os.path.realpath(path) for path in tops.values()]  # as the kernel names what is mapped
+    covered = (os.path.realpath(library) + os.sep, *(path + os.sep for path in real), *real)
     shown = [(python, python), (library, library)]
     shown += [(f"{library}/site-packages", None)] if os.path.isdir(f"{library}/site-packages") else []
     for path in mapped:

@@ -1,13 +1,14 @@
 """Students who are gone from the submissions: one who was renamed keeps what there was, the others are listed.
 
-A record whose notebook now lies in exactly one new folder is the same student's. `grade --tidy` removes what is
-left of the others.
+A record whose notebook now lies in exactly one new folder is the same student's, unless platform or roster tell two
+people: whoever hands in a copy, byte by byte, of somebody whose folder is missing gets nothing of theirs. `grade
+--tidy` removes what is left of the others.
 """
 
 import os
 import shutil
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from nbgrader.api import MissingEntry
 from labgrader.grading.batch import read_record, record_path, write_record
 from labgrader.grading.gradebook import opened
 from labgrader.grading.reading import Submission
+from labgrader.grading.roster import Person, keys_of, person_of
 
 
 def known_students(out: Path) -> set[str]:
@@ -24,7 +26,9 @@ def known_students(out: Path) -> set[str]:
     return {path.stem for path in (Path(out) / "records").glob("*.json")}
 
 
-def rename_students(course: Path, out: Path, topic: str, submissions: Sequence[Submission]) -> dict[str, str]:
+def rename_students(
+    course: Path, out: Path, topic: str, submissions: Sequence[Submission], roster: Mapping[str, Person]
+) -> dict[str, str]:
     """Move what belongs to students whose folder has another name now; returns the new names by the old ones."""
     known = known_students(out)
     new = [submission for submission in submissions if submission.student not in known and not submission.reason]
@@ -35,6 +39,8 @@ def rename_students(course: Path, out: Path, topic: str, submissions: Sequence[S
     moved = {}
     for record in gone:
         if record is not None and found[record.digest] == left[record.digest] == 1:
+            if are_two(roster, record.student, names[record.digest]):
+                continue
             moved[record.student] = names[record.digest]
             write_record(out, replace(record, student=names[record.digest]))
     if moved:
@@ -49,6 +55,12 @@ def rename_students(course: Path, out: Path, topic: str, submissions: Sequence[S
             move(course / step / old / topic, course / step / name / topic)
         remove_pages(course, out, topic, old)
     return moved
+
+
+def are_two(roster: Mapping[str, Person], old: str, new: str) -> bool:
+    """Whether two names are of two people: by the platform's numbers at their ends, or by the roster."""
+    numbers, people = [keys_of(name)[1:] for name in (old, new)], [person_of(roster, name) for name in (old, new)]
+    return (all(numbers) and numbers[0] != numbers[1]) or (None not in people and people[0] != people[1])
 
 
 def move(folder: Path, target: Path) -> None:

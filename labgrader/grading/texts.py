@@ -14,6 +14,7 @@ from pathlib import Path
 from labgrader.grading.gradebook import opened, rubrics_of
 from labgrader.grading.outputs import STYLE, key_of
 from labgrader.grading.reading import Lab, grade_id, plain_text, source_of
+from labgrader.support import counted
 
 LONGEST_COMMENT = 5_000  # characters
 
@@ -164,8 +165,8 @@ def texts_page(lab: Lab, texts: Texts, questions: Sequence[str], nonce: str) -> 
     title = escape(f"{lab.topic}: {texts.question}")
     left = sum(text.points is None for text in texts.answers)
     links = "".join(f'<a href="{escape(name)}">{escape(name)}</a>' for name in questions)
-    count = f'{len(texts.answers)} answers, <span id="left" role="status">{left}</span> without points'
-    empty = f"; {texts.empty} students wrote nothing" if texts.empty else ""
+    count = f'{counted(len(texts.answers), "answer")}, <span id="left" role="status">{left}</span> without points'
+    empty = f"; {counted(texts.empty, 'student')} wrote nothing" if texts.empty else ""
     rubric = f'<div class="rubric" tabindex="0">{escape(texts.rubric)}</div>' if texts.rubric else ""
     articles = "\n".join(article(text, texts.most, i) for i, text in enumerate(texts.answers, start=1))
     return (

@@ -23,7 +23,7 @@ import numpy as np
 from labgrader.checker.comparison import Problem
 from labgrader.checker.program import Program
 from labgrader.worker.process import DTYPES, MOST_AXES, MOST_BYTES, MOST_MESSAGE, MOST_PARTS, MOST_PRINTED, ONE
-from labgrader.worker.stopwatch import Stopwatch
+from labgrader.worker.stopwatch import Stopwatch, memory_of
 
 # What a worker may say of an output that is none, and of a cell: a text, or a text and the name of a type of Python's.
 KNOWN = {
@@ -38,6 +38,7 @@ UNKNOWN = {"kind": "expected an array or a number, got something else", "dtype":
 MOST_REPLY = MOST_BYTES + 1024  # bytes: an output, or an exception, with what is around it
 MOST_PROGRAMS = 32 << 20  # bytes; the programs of a long notebook are long
 SHORTEST_LOOK_S = 0.02  # between two looks at a worker's time
+MEMORY_LOOK_S = 0.1  # and at its memory, where that is looked at
 MOST_FOUND = 1 << 20  # bytes of what is found in a program, which may have written them itself
 
 
@@ -66,7 +67,7 @@ class Worker:
 
     requests, replies: its pipes; kill: ends its process and everything that it started. own: a file of what it prints,
     where it runs the code of whoever reads what comes of it; None for a stranger's. pid: of its process; None
-    if it is not known: then the clock limits.
+    if it is not known: then the clock limits. memory: bytes that it may hold, where the kernel does not see to that.
     """
 
     def __init__(
@@ -76,9 +77,10 @@ class Worker:
         kill: Callable[[], None],
         own: BinaryIO | None = None,
         pid: int | None = None,
+        memory: int | None = None,
     ):
         self.requests, self.replies, self.kill, self.own, self.pid = requests, replies, kill, own, pid
-        self.late = self.closed = False
+        self.memory, self.stopped, self.closed = memory, None, False
         self.ending = threading.Lock()
 
     def __enter__(self) -> "Worker":
@@ -121,8 +123,8 @@ class Worker:
             return decode(self.read(max(text, MOST_REPLY)), text > 0, self.own is not None)
         except (OSError, EOFError, ValueError) as error:
             self.close()
-            if self.late:
-                raise WorkerLost(Problem("time", "it did not return in time: does a loop never end?")) from None
+            if self.stopped is not None:
+                raise WorkerLost(self.stopped) from None
             if isinstance(error, ValueError):
                 raise WorkerLost(
                     Problem("channel", "it wrote to the grader's channel, or returned far too much")
@@ -139,13 +141,16 @@ class Worker:
         return self.own.read(4 * (MOST_PRINTED + 1)).decode(errors="replace").replace("\r\n", "\n")
 
     def watch(self, stopwatch: Stopwatch, limit_s: float, done: threading.Event) -> None:
-        """Kill the worker unless it is done in time, which ends the reading and writing of `exchange`."""
-        left = limit_s
-        while left > 0.0:
-            if done.wait(max(left / 2.0, SHORTEST_LOOK_S)):
+        """Kill the worker unless it is done within its limits, which ends the reading and writing of `exchange`."""
+        left, stopped = limit_s, None
+        while left > 0.0 and stopped is None:
+            pause = max(left / 2.0, SHORTEST_LOOK_S)
+            if done.wait(pause if self.memory is None else min(pause, MEMORY_LOOK_S)):
                 return
+            if self.memory is not None and memory_of(self.pid) > self.memory:
+                stopped = Problem("ended", f"it used more than {self.memory >> 20} MB of memory")
             left = limit_s - stopwatch.used()
-        self.late = True
+        self.stopped = stopped or Problem("time", "it did not return in time: does a loop never end?")
         self.end()
 
     def end(self) -> None:

@@ -1,6 +1,8 @@
 """A worker as a plain process, on every system: for a student's own check, and for grading without a sandbox.
 
-It is no defence. One is always started ahead, so that a check waits for nothing and each answer has a fresh one.
+It is no defence. One is always started ahead, so that a check waits for nothing and each answer has a fresh one. Time
+of a processor is limited everywhere. Linux limits memory, too; on macOS and Windows, which do not, it is looked at
+while an answer runs (`channel.Worker.watch`).
 """
 
 import atexit
@@ -20,7 +22,14 @@ from labgrader.packages import requirements
 from labgrader.worker.answer import Limits
 from labgrader.worker.channel import Worker, WorkerLost
 
-ENVIRONMENT = {"LANG": "C.UTF-8", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
+# A sandbox has the files of no locale, so that "" names C in both.
+ENVIRONMENT = {
+    "LC_ALL": "C",
+    "PYTHONUTF8": "1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "PYTHONHASHSEED": "0",
+}
 ROOT = Path(__file__).resolve().parents[2]
 # What an interpreter begins with that is to be a worker: its options are the argument that follows.
 START = "import json, sys; options = json.loads(sys.argv[1]); sys.path[:0] = options['path']; "
@@ -47,8 +56,10 @@ def started(packages: Sequence[str], limits: Limits) -> Worker:
     own = {name: os.environ[name] for name in ("SYSTEMROOT", "PATH") if os.name == "nt" and name in os.environ}
     place = {"HOME": tempfile.gettempdir(), "TMPDIR": tempfile.gettempdir()}
     printed = tempfile.TemporaryFile()  # noqa: SIM115 (the worker's, and gone with it)
+    # On Windows an environment's python.exe only starts another process, in which everything would happen.
+    python = getattr(sys, "_base_executable", sys.executable) if os.name == "nt" else sys.executable
     process = subprocess.Popen(
-        [sys.executable, "-P", "-s", "-S", "-c", START_PLAIN, json.dumps(options)],
+        [python, "-P", "-s", "-S", "-c", START_PLAIN, json.dumps(options)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=printed,
@@ -60,7 +71,8 @@ def started(packages: Sequence[str], limits: Limits) -> Worker:
         process.kill()
         process.wait()
 
-    return Worker(process.stdin, process.stdout, kill, printed, process.pid)
+    memory = None if sys.platform == "linux" else options["memory"]
+    return Worker(process.stdin, process.stdout, kill, printed, process.pid, memory)
 
 
 class Spare:

@@ -32,14 +32,13 @@ import numpy as np
 
 from labgrader.checker import ast_fingerprint, program
 from labgrader.checker.cell import Cell
-from labgrader.checker.comparison import Problem, parts, plain, quiet
+from labgrader.checker.comparison import MOST_BYTES, Problem, parts, plain, quiet
 from labgrader.checker.finding import write
 from labgrader.checker.live_program import LiveProgram, altered, own_entry
 from labgrader.checker.repair_job import Job
 from labgrader.checker.steps import last_right_step
 
 DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
-MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
 MOST_PARTS = 16
 MOST_AXES = 8
 MOST_MESSAGE = 160  # characters of an exception's message
@@ -49,11 +48,11 @@ MOST_PRINTED = 600  # characters that are kept of what an answer prints
 # What a plain worker refuses, since a sandbox has none of it: it is no defence, but a tick here is a tick there.
 REFUSED = ("subprocess.", "socket.connect", "socket.bind", "socket.send", "socket.get", "shutil.", "os.exec", "os.fork")
 REFUSED += ("os.posix_spawn", "os.system", "os.kill", "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link")
-REFUSED += ("os.symlink", "os.truncate", "webbrowser.")
+REFUSED += ("os.symlink", "os.truncate", "os.chmod", "os.chown", "os.utime", "webbrowser.")
 # Modules whose locks and memory need a file system for them, and functions of os that ask for a filtered system call.
 SHARED = ("multiprocessing.synchronize", "multiprocessing.shared_memory")
 CALLS = "memfd_create pidfd_open posix_fadvise sched_setaffinity sched_setparam sched_setscheduler setns setpriority"
-CALLS += " sync fsync fdatasync unshare"
+CALLS += " sync fsync fdatasync unshare nice mkfifo mknod"
 
 
 def encode(value: object) -> bytes:
@@ -202,7 +201,7 @@ def limit(options: dict) -> None:
     except ImportError:
         return
     wanted = {
-        "AS": options["memory"],
+        "AS": options["memory"] if sys.platform == "linux" else None,  # macOS refuses a smaller one than it shows
         "FSIZE": options["file_size"],
         "NPROC": options["threads"],
         "CPU": options["cpu_s"] + int(time.process_time()),

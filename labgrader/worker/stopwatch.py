@@ -2,6 +2,8 @@
 
 Time in which it could run but waits for a processor counts nowhere. Time in which it does neither counts a fifth: an
 answer that only sleeps, and uses no CPU time, ends after five times its limit.
+
+Its memory is asked for here as well, on systems whose kernel sets no limit to that.
 """
 
 import sys
@@ -24,6 +26,16 @@ def cpu_s(pid: int) -> float:
     except Exception as error:
         raise OSError(f"no CPU time of process {pid}") from error
     return times.user + times.system
+
+
+def memory_of(pid: int) -> int:
+    """Bytes of memory that a process holds; 0 if it has ended, or if nobody can say."""
+    try:
+        import psutil
+
+        return psutil.Process(pid).memory_info().rss
+    except Exception:
+        return 0
 
 
 def waited_s(pid: int | None) -> float:

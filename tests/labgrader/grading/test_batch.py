@@ -435,8 +435,30 @@ def test_an_answer_that_calls_a_wrong_one_gets_the_kits_in_its_place(graded):
     wrong = "def iou(n):\n    return np.zeros(len(n))\n"
     calling = "def mean_iou(n):\n    return np.nanmean(iou(n.sum(axis=0) if n.ndim == 3 else n))\n"
     kit.submit(graded, "ada", TOPIC, kit.right_answers(TOPIC) | {"iou": wrong, "mean_iou": calling})
-    earned = {result.question: result.points for result in grade(graded).records[0].results}
-    assert earned == POINTS | {"iou": 0.0}
+    ada = grade(graded).records[0]
+    assert {result.question: result.points for result in ada.results} == POINTS | {"iou": 0.0}
+    assert not any(result.flag for result in ada.results)
+
+
+OF_MEANS = """
+def iou(n):
+    found = []
+    for c in range(len(n)):
+        tp, fn, fp = n[c, c], n[c].sum() - n[c, c], n[:, c].sum() - n[c, c]
+        alone = np.array([[[tp, fn], [fp, 0]]])  # the others together have the IoU 0
+        found.append(2 * mean_iou(alone) if fn + fp else 1.0 if tp else np.nan)
+    return np.array(found)
+"""
+
+
+def test_an_answer_out_of_the_kits_to_a_later_task_is_for_a_person_to_judge(graded):
+    """Whoever leaves mean IoU wrong gets the kit's where it is called, and it tells each class's IoU."""
+    right, wrong = kit.right_answers(TOPIC) | {"iou": OF_MEANS}, {"mean_iou": "def mean_iou(n):\n    return 0.0\n"}
+    kit.submit(graded, "ada", TOPIC, right)
+    kit.submit(graded, "ben", TOPIC, right | wrong)
+    ada, ben, _ = (next(r for r in record.results if r.question == "iou") for record in grade(graded).records)
+    assert ada.right and not ada.flag
+    assert ben.right and ben.flag == "uses the kit's mean_iou, a later task, of which its own is wrong"
 
 
 def test_a_task_that_was_another_one_when_the_lab_was_released_is_named_and_not_graded(course):

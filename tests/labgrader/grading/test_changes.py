@@ -196,7 +196,7 @@ GOOD = '[[change]]\nlab = "04_iou"\nquestion = "iou"\ndrop = true\ndate = 2026-1
         ),
         (
             GOOD.replace('"iou"', '"oiu"'),
-            "course.toml, [[change]] number 1: question: expected one of confusion_matrix, iou",
+            f"course.toml, [[change]] number 1: question: expected one of {', '.join(POINTS)}",
         ),
         (
             GOOD.replace("drop", "halve"),
@@ -217,7 +217,7 @@ def test_a_file_that_a_person_broke_stops_grading_with_its_place(course, text, s
 @pytest.mark.parametrize(
     "options, says",
     [
-        (("--drop", "oiu", "--reason", "unfair"), "question: expected one of confusion_matrix, iou"),
+        (("--drop", "oiu", "--reason", "unfair"), f"question: expected one of {', '.join(POINTS)}"),
         (("--drop", "iou"), "and a --reason"),
         (("--points", "iou", "--reason", "unfair"), "points: expected QUESTION=NUMBER"),
         (("--points", "explain=1", "--reason", "short"), "points: a person gives those of an answer in words"),

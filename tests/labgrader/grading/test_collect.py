@@ -194,6 +194,23 @@ def test_a_zip_is_measured_before_it_is_unpacked(tmp_path, monkeypatch):
     assert kept == {f"Eve Adams_1{IN_MOODLE}/04_iou.ipynb", f"Grace Hopper_7{IN_MOODLE}/04_iou.ipynb"}
 
 
+def test_a_notebook_is_known_by_whatever_ending_a_browser_gave_it_and_who_has_none_is_named(tmp_path, monkeypatch):
+    extractor, said = LmsExtractor(), []
+    monkeypatch.setattr(extractor.log, "warning", lambda text, *words: said.append(text % words))
+    (tmp_path / "archive").mkdir()
+    names = ["04_iou.IPYNB", "04_iou.ipynb.txt", "04_iou.ipynb.json", "04_iou\u202e\x1b[2J.ipynb", "04_iou.ipynb"]
+    files = {f"S_{i}{IN_MOODLE}/{name}": "1" for i, name in enumerate(names)}
+    files |= {f"S_5{IN_MOODLE}/X.ZIP": zipped({"04_iou.IPYNB": "1"}), f"S_6{IN_MOODLE}/04_iou.pdf\x1b[2J": "1"}
+    files |= {f"S_7{IN_MOODLE}/x.zip": zipped({"04_iou.py": "1"}), "README": "1", f"S_8{IN_MOODLE}/": ""}
+    (tmp_path / "archive/all.zip").write_bytes(zipped(files))
+    extractor.extract(str(tmp_path / "archive"), str(tmp_path / "out"))
+    found = [path for path in sorted((tmp_path / "out").rglob("*")) if path.is_file()]
+    assert [student_and_notebook(str(path)) for path in found] == [
+        (f"S_{i}", "04_iou[2J.ipynb" if i == 3 else "04_iou.ipynb") for i in range(6)
+    ]
+    assert said == ["No notebook of 'S_6', only '04_iou.pdf[2J'", "No notebook of 'S_7', only 'x.zip'"]
+
+
 def test_a_student_and_a_class_have_a_limit_whatever_the_number_of_files(tmp_path, monkeypatch):
     monkeypatch.setattr("labgrader.grading.collect.MOST_OF_A_STUDENT", 10)
     monkeypatch.setattr("labgrader.grading.collect.MOST_OF_A_CLASS", 18)

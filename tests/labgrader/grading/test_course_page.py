@@ -11,14 +11,16 @@ from typer.testing import CliRunner
 from labcli.cli import app
 from labgrader.course import of_topic
 from labgrader.grading.batch import Record
-from labgrader.grading.deadlines import read_deadline
+from labgrader.grading.course_page import rows_of
+from labgrader.grading.deadlines import Lateness, read_deadline
 from labgrader.grading.forget import forget
 from labgrader.grading.grade import Result
 from labgrader.grading.gradebook import opened, write_gradebook
 from labgrader.grading.outputs import write_outputs
 from labgrader.grading.policy import Policy, read_bonus, read_policy
 from labgrader.grading.reading import read_lab, read_submissions
-from labgrader.grading.totals import settle
+from labgrader.grading.roster import Person
+from labgrader.grading.totals import Final, settle
 
 FIRST, SECOND, THIRD = LABS = ("04_iou", "07_grasp", "09_other_stacks")
 ROSTER = "id,name,email\n77,Ada Lovelace,ada@x.org\n78,Ada Lovelace,ada@x.org\n5,=Ben,ben@x.org\n6,Cher,cher@x.org\n"
@@ -157,6 +159,15 @@ def test_a_policy_that_cannot_be_used_is_refused_with_its_place(tmp_path, text, 
     with pytest.raises(ValueError) as refusal:
         read_policy(tmp_path)
     assert "course.toml" in str(refusal.value) and says in str(refusal.value)
+
+
+def test_two_folders_of_one_person_in_a_lab_are_refused():
+    """The letters of one name are composed in the roster's way, of the other they are not."""
+    roster = {"Zo\u00eb": Person("Zo\u00eb")}
+    final = Final("", 1.0, 1.0, False, Lateness(), "")
+    assert len(rows_of({FIRST: {"Zo\u00eb": final}, SECOND: {"Zoe\u0308": final}}, roster)) == 1
+    with pytest.raises(ValueError, match=r"04_iou: .* are both Zo\u00eb; rename the folder of one"):
+        rows_of({FIRST: {"Zo\u00eb": final, "Zoe\u0308": final}}, roster)
 
 
 def test_one_lab_always_stays_and_a_weight_of_0_does_not_count():

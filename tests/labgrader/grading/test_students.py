@@ -96,6 +96,25 @@ def test_who_is_gone_is_listed_and_removed_when_that_is_asked_for(course):
         assert [submission.student.id for submission in book.assignment_submissions(TOPIC)] == ["ben"]
 
 
+@pytest.mark.parametrize("roster", ["", "id,name\nada,Ada L\neve,Eve A\n"])
+def test_a_copy_of_what_somebody_missing_handed_in_inherits_nothing(course, roster):
+    """Eve hands in Ada's file, byte by byte, and for one run Ada's folder is not there."""
+    ada, eve = ("ada", "eve") if roster else ("Ada L_1", "Eve A_2")
+    (course / "roster.csv").write_text(roster or "id\n")
+    (course / "submitted/ada").rename(course / "submitted" / ada)
+    grade(course)
+    (course / "submitted" / ada).rename(course / "submitted" / eve)
+    graded = grade(course)
+    assert graded.renamed == {} and graded.gone == [ada]
+
+
+def test_a_platforms_number_tells_who_was_renamed(course):
+    (course / "submitted/ada").rename(course / "submitted/Ada L_1")
+    grade(course)
+    (course / "submitted/Ada L_1").rename(course / "submitted/Ada B_1")
+    assert grade(course).renamed == {"Ada L_1": "Ada B_1"}
+
+
 def test_of_two_who_handed_in_the_same_nobody_is_taken_for_the_other(course):
     shutil.copy(course / f"submitted/ada/{TOPIC}/{TOPIC}.ipynb", course / f"submitted/ben/{TOPIC}/{TOPIC}.ipynb")
     grade(course)

@@ -7,6 +7,7 @@ import textwrap
 import threading
 import time
 import warnings
+from contextlib import contextmanager
 
 import numpy as np
 import psutil
@@ -98,6 +99,7 @@ PROBLEMS = [
     ("def iou(n): return None", "kind", "it returns None: is a `return` missing?"),
     ("def iou(n): return np.ones(n.shape) + 0j", "dtype", "expected real numbers, got dtype complex128"),
     ("def iou(n): return np.zeros((1000, 1000))", "size", "it returns more than 1 MB"),
+    ("def iou(n):\n    a = [0.5]\n    a.append(a)\n    return a, a", "size", "it returns more than 1 MB"),
     ("def iou(n):\n    n[:] = 0\n" + RIGHT, "finite", "2 of 2 values are NaN"),
     ("def iou(n):\n    n += 0\n    n = n.copy()\n" + RIGHT, None, ""),
     ("def iou(n):\n" + RIGHT + "raise ValueError", None, ""),
@@ -123,7 +125,7 @@ def test_each_kind_of_problem_is_said_and_costs_nothing_else(source, kind, says)
 def test_time_in_which_it_cannot_run_is_not_an_answers():
     """Stopped by the system for longer than its limits, as on a busy machine, it is as right as before."""
     slow = Program((("numpy", "import numpy as np"), ("iou", SLOW.format(0.02) + RIGHT)))
-    limits, cases = Limits(case_s=0.3, question_s=1.0), public_cases(IOU)
+    limits, cases = Limits(case_s=0.5, question_s=1.0), public_cases(IOU)
     with Answer(IOU, slow, plain.fresh_worker, limits) as answer:
         process = psutil.Process(answer.worker.pid)
         process.suspend()
@@ -131,6 +133,22 @@ def test_time_in_which_it_cannot_run_is_not_an_answers():
         begin = time.monotonic()
         verdict, _ = answer.judged(cases)
         assert verdict.passed and time.monotonic() - begin > 1.0 > answer.used_s >= 0.02 * len(cases)
+
+
+def test_where_the_kernel_limits_no_memory_it_is_looked_at():
+    """As on macOS and Windows: here the kernel's limit is far off."""
+
+    @contextmanager
+    def start(packages, limits):
+        with plain.fresh_worker(packages, Limits(memory_mb=8192)) as worker:
+            worker.memory = 400 << 20
+            yield worker
+
+    fill = "import numpy as np\nkept = []\ndef iou(n):\n    while len(kept) < 60: kept.append(np.ones(1 << 21))\n"
+    for source, says in ((fill + "    while True: pass", "it used more than 400 MB of memory"), (fill, "returns None")):
+        source = source.replace("60", "60" if "True" in source else "2")
+        with Answer(IOU, Program((("iou", source),)), start, PATIENT) as answer:
+            assert says in answer.judged(public_cases(IOU))[0].problem.says
 
 
 def test_answers_of_one_notebook_share_its_time_but_each_has_enough_for_a_right_one():
