@@ -18,7 +18,10 @@ def counts(rng):
 
 
 def counts_of_frames(rng):
-    """Draw the confusion matrices of a few frames of unlike size; a class is often absent from a frame, or from all."""
+    """Draw the confusion matrices of a few frames of unlike size; a class is often absent from a frame, or from all.
+
+    Each frame has a pixel.
+    """
     F, C = int(rng.choice([3, 6])), int(rng.choice([4, 5]))
     n = rng.integers(0, 30, (F, C, C)) + np.eye(C, dtype=np.int64) * rng.integers(10, 500, (F, C, 1))
     n *= rng.integers(1, 200, (F, 1, 1))  # more pixels than 16 bits count
@@ -32,6 +35,7 @@ def counts_of_frames(rng):
     if rng.random() < 0.7:
         n[:, 3], n[:, :, 3] = 0, 0
         n[0, 3, 3] = 1  # one pixel
+    n[~n.any(axis=(1, 2)), 0, 0] = 7  # no frame is empty
     return (n.astype(np.int64),)
 
 
