@@ -89,6 +89,20 @@ def addresses(C: int, H: int, W: int, v: int, u: int, layout: str) -> Integer[np
     return classes * H * W + pixel if layout == "NCHW" else pixel * C + classes
 
 
+def engine_buffer(scores: Float[np.ndarray, "C H W"], block: int, align: int) -> tuple[UInt8[np.ndarray, " n"], int]:
+    """Write scores as an engine may: 16-bit floats, classes in blocks, rows from multiples of `align` bytes on.
+
+    block: how many classes of a pixel stand side by side. Returns the bytes, and how many lie from row to row. What
+    fills up the last block and each row is larger than any score.
+    """
+    C, H, W = scores.shape
+    blocks, step = -(-C // block), -(-2 * block * W // align) * align
+    numbers = np.full((blocks, H, step // 2), np.finfo("<f2").max, "<f2")
+    for c, plane in enumerate(scores):
+        numbers[c // block, :, c % block : block * W : block] = plane
+    return numbers.view(np.uint8).ravel(), step
+
+
 def memory(scores: Float[np.ndarray, "C H W"]) -> Explorer:
     """Read one pixel's classes from the memory of an NCHW blob. Controls: the pixel, and the layout that is believed.
 

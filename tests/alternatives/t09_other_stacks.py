@@ -27,3 +27,31 @@ def hsv_mask__torch(hsv, lower, upper):
     above, below = x >= low, x <= high
     hue = above[..., 0] | below[..., 0] if low[0] > high[0] else above[..., 0] & below[..., 0]
     return hue & (above & below)[..., 1:].all(dim=-1)
+
+
+def labels_of_buffer__entry_by_entry(buffer, C, H, W, block, step):
+    data, labels = buffer.tobytes(), np.zeros((H, W), int)
+    for v in range(H):
+        for u in range(W):
+            at = [(c // block * H + v) * step + 2 * (u * block + c % block) for c in range(C)]
+            labels[v, u] = np.argmax([np.frombuffer(data, "<f2", 1, place)[0] for place in at])
+    return labels
+
+
+def labels_of_buffer__strides(buffer, C, H, W, block, step):
+    blocks = -(-C // block)
+    strides = (H * step, 2, step, 2 * block)
+    scores = np.lib.stride_tricks.as_strided(buffer.view("<f2"), (blocks, block, H, W), strides, writeable=False)
+    return scores.reshape(blocks * block, H, W)[:C].argmax(axis=0)
+
+
+def labels_of_buffer__class_after_class(buffer, C, H, W, block, step):
+    rows = buffer.view(np.float16).reshape(-1, step // 2)
+    planes = [rows[c // block * H :][:H, c % block : block * W : block] for c in range(C)]
+    return torch.from_numpy(np.stack(planes).astype(np.float32)).max(dim=0).indices
+
+
+def labels_of_buffer__blocks_side_by_side(buffer, C, H, W, block, step):
+    numbers = np.split(np.frombuffer(bytes(buffer), np.float16), -(-C // block))
+    blocks = [part.reshape(H, -1)[:, : W * block].reshape(H, W, block) for part in numbers]
+    return np.concatenate(blocks, axis=-1)[..., :C].argmax(axis=-1).astype(np.uint8)

@@ -10,7 +10,7 @@ from grading_course import lab_notebook, right_answers
 
 from labgrader.check import why_its_file_is_not_graded
 from labgrader.checker.cell import Cell
-from labgrader.course import of_topic, topics
+from labgrader.course import asked, of_topic, topics
 from labgrader.file_check import check_file, is_lab, topic_of
 from labgrader.running import running_file
 
@@ -171,13 +171,14 @@ def test_without_a_name_it_is_the_folders_only_lab_or_the_one_that_the_editor_na
 def test_on_colab_it_is_the_notebook_on_the_page_whatever_its_name(name, tmp_path, monkeypatch, capsys):
     """Colab's kernel has no file of the notebook, and asks the page for it."""
     monkeypatch.chdir(tmp_path)
-    asked, page = [], json.loads((ROOT / "solutions" / TOPIC / f"{TOPIC}.ipynb").read_text(encoding="utf-8"))
+    requests, page = [], json.loads((ROOT / "solutions" / TOPIC / f"{TOPIC}.ipynb").read_text(encoding="utf-8"))
     colab, message = ModuleType("google.colab"), ModuleType("google.colab._message")
-    message.blocking_request = lambda kind, **options: asked.append(kind) or {"ipynb": page}
+    message.blocking_request = lambda kind, **options: requests.append(kind) or {"ipynb": page}
     colab._message = message
     for module in (colab, message):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(sys.modules, "google", ModuleType("google"))
     assert check_file(*name)
-    assert asked == ["get_ipynb"]
-    assert f"as it is now: {ANSWERS} of {ANSWERS} answers are right" in capsys.readouterr().out
+    assert requests == ["get_ipynb"]
+    n = len(asked(TOPIC))
+    assert f"as it is now: {n} of {n} answers are right" in capsys.readouterr().out

@@ -13,8 +13,8 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from labgrader.bundle import bundle, topics_of_week
+from labgrader.course import asked
 from labgrader.course import course as course_here
-from labgrader.course import of_topic
 from labgrader.release import mistakes, read, release, tidy, to_bytes
 
 ROOT = Path(__file__).parents[2]
@@ -247,7 +247,7 @@ def test_mistakes_of_other_cells():
 
 
 def test_a_topic_of_the_kit_answers_all_its_questions_for_their_points():
-    questions = of_topic("04_iou")
+    questions = asked("04_iou")
     iou = questions["iou"]
     wrong_points = solution_notebook(SOLUTION.replace("double", "iou"), "iou", points=iou.points + 1)
     said = mistakes(wrong_points, "04_iou")

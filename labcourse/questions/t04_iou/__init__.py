@@ -2,6 +2,8 @@
 
 import numpy as np
 
+RETIRED = ("mean_iou",)  # no lab asks it any more; those that were released when one did are graded all the same
+
 
 def counts(rng):
     """Draw an asymmetric confusion matrix; in most one class is absent, and in most one is predicted and never true."""
@@ -12,6 +14,28 @@ def counts(rng):
         n[absent] = n[:, absent] = 0
     if rng.random() < 0.7:
         n[never_true] = 0
+    return (n.astype(np.int64),)
+
+
+def counts_of_frames(rng):
+    """Draw the confusion matrices of a few frames of unlike size; a class is often absent from a frame, or from all.
+
+    Each frame has a pixel.
+    """
+    F, C = int(rng.choice([3, 6])), int(rng.choice([4, 5]))
+    n = rng.integers(0, 30, (F, C, C)) + np.eye(C, dtype=np.int64) * rng.integers(10, 500, (F, C, 1))
+    n *= rng.integers(1, 200, (F, 1, 1))  # more pixels than 16 bits count
+    for frame in n[1:]:
+        absent = rng.integers(C)
+        frame[absent], frame[:, absent] = 0, 0
+    if rng.random() < 0.7:
+        n[:, 1], n[:, :, 1] = 0, 0
+    if rng.random() < 0.7:
+        n[:, 2] = 0
+    if rng.random() < 0.7:
+        n[:, 3], n[:, :, 3] = 0, 0
+        n[0, 3, 3] = 1  # one pixel
+    n[~n.any(axis=(1, 2)), 0, 0] = 7  # no frame is empty
     return (n.astype(np.int64),)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcourse.questions.t04_iou import iou_of, parts
+from labcourse.questions.t04_iou import counts_of_frames, iou_of, parts
 from labgrader.checker.question import Question, wrong
 
 
@@ -14,27 +14,9 @@ def mean_iou(n_frames):
         return np.nanmean(correct / (n.sum(axis=0) + n.sum(axis=1) - correct))
 
 
-def _counts_of_frames(rng):
-    """Draw the confusion matrices of a few frames of unlike size; a class is often absent from a frame, or from all."""
-    F, C = int(rng.choice([3, 6])), int(rng.choice([4, 5]))
-    n = rng.integers(0, 30, (F, C, C)) + np.eye(C, dtype=np.int64) * rng.integers(10, 500, (F, C, 1))
-    n *= rng.integers(1, 200, (F, 1, 1))  # more pixels than 16 bits count
-    for frame in n[1:]:
-        absent = rng.integers(C)
-        frame[absent], frame[:, absent] = 0, 0
-    if rng.random() < 0.7:
-        n[:, 1], n[:, :, 1] = 0, 0
-    if rng.random() < 0.7:
-        n[:, 2] = 0
-    if rng.random() < 0.7:
-        n[:, 3], n[:, :, 3] = 0, 0
-        n[0, 3, 3] = 1  # one pixel
-    return (n.astype(np.int64),)
-
-
 QUESTION = Question(
     reference=mean_iou,
-    inputs=_counts_of_frames,
+    inputs=counts_of_frames,
     by_hand=(
         (np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),),  # class 1: 1/1 in one frame, 0/99 in the other
         (np.array([[[6, 2, 0], [0, 4, 0], [0, 0, 0]]]),),

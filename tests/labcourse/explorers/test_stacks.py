@@ -5,6 +5,7 @@ import pytest
 from scenes import random_frame
 
 from labcourse.explorers import stacks
+from labgrader.course import find
 from labkit.labels import overlay
 from labkit.learning.engines import labels_of_scores
 from labkit.stacks.threshold import HSVRange, hsv_mask
@@ -45,6 +46,18 @@ def test_addresses_are_those_of_numpys_memory():
         np.testing.assert_array_equal(x.ravel()[stacks.addresses(3, 4, 5, v, u, "NCHW")], x[:, v, u])
         nhwc = np.ascontiguousarray(x.transpose(1, 2, 0)).ravel()
         np.testing.assert_array_equal(nhwc[stacks.addresses(3, 4, 5, v, u, "NHWC")], x[:, v, u])
+
+
+@pytest.mark.parametrize("block, step", [(1, 16), (2, 32), (4, 48), (8, 80)])
+def test_an_engines_buffer_holds_the_scores_where_it_says(block, step):
+    scores = np.random.default_rng(2).permutation(3 * 4 * 5).reshape(3, 4, 5) / 4.0
+    buffer, found = stacks.engine_buffer(scores, block, 16)
+    assert found == step and len(buffer) == -(-3 // block) * 4 * step
+    for c, v, u in np.ndindex(3, 4, 5):
+        at = (c // block * 4 + v) * step + 2 * (u * block + c % block)
+        assert buffer[at : at + 2].view("<f2")[0] == scores[c, v, u]
+    labels = find("09_other_stacks.labels_of_buffer").reference(buffer, 3, 4, 5, block, step)
+    np.testing.assert_array_equal(labels, labels_of_scores(scores[None]))
 
 
 def test_the_right_layout_gives_the_right_label_and_the_other_does_not():

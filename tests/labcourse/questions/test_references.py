@@ -70,6 +70,7 @@ KIT = {
     "04_iou.confusion_matrix": metrics.confusion_matrix,
     "04_iou.iou": metrics.iou,
     "04_iou.mean_iou": lambda n_frames: metrics.mean_iou(n_frames.sum(axis=0)),
+    "04_iou.jackknife": lambda n_frames: metrics.mean_iou(n_frames.sum(axis=0)),
     "06_back_projection.back_project": back_project,
     "06_back_projection.height_noise": height_noise,
     "08_node.decode_depth": decode_depth,

@@ -21,7 +21,7 @@ PAGES = [
 ]
 # What the students of tests/data/submitted have right.
 RIGHT = {
-    "ada": {"confusion_matrix", "iou", "mean_iou", "merge_classes", "trimap_band"},
+    "ada": {"confusion_matrix", "iou", "jackknife", "merge_classes", "trimap_band"},
     "ben": {"confusion_matrix", "trimap_band"},
     "eve": {"confusion_matrix", "merge_classes"},
 }

@@ -1,0 +1,224 @@
+"""04_iou.jackknife: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t04_iou import counts_of_frames, iou_of, parts
+from labgrader.checker.question import Question, holds, wrong
+
+
+def jackknife(n_frames):
+    """Pool the frames' counts to one mean IoU; its standard error, by leaving out one frame after the other."""
+    F, total = len(n_frames), n_frames.sum(axis=0)
+    scores = []
+    for n in (total, *(total - n_frames)):
+        correct = np.diagonal(n)
+        union = n.sum(axis=0) + n.sum(axis=1) - correct
+        scores.append(np.mean(correct[union > 0] / union[union > 0]))
+    mean, *left = scores
+    return mean, np.sqrt((F - 1) / F * np.square(left - np.mean(left)).sum())
+
+
+_ONE_PIXEL = np.array(
+    [[[5, 0, 1], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]], [[4, 2, 0], [1, 7, 0], [0, 0, 0]]]
+)
+
+
+QUESTION = Question(
+    reference=jackknife,
+    inputs=counts_of_frames,
+    by_hand=(
+        (
+            np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),
+        ),  # without one frame class 1 scores 0/99, without the other 1/1
+        (np.array([[[1, 1], [0, 2]], [[3, 0], [1, 0]], [[2, 0], [0, 2]]]),),
+        (_ONE_PIXEL,),  # one pixel is called class 2
+        (np.array([[[30_000, 2_000], [0, 500]]] * 3),),  # no frame differs; more pixels than 16 bits count
+    ),
+    random_cases=6,
+    points=3,
+    forbidden=("sklearn", "torchmetrics", "scipy"),
+)
+
+
+@holds("frames that are all alike have a standard error of 0")
+def alike_frames_say_the_same(n_frames, out):
+    return np.isclose(out[1], 0.0, atol=1e-6) if (n_frames == n_frames[0]).all() else out[1] > 0.0
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def pooled(n_frames):
+    return np.nanmean(iou_of(n_frames.sum(axis=0)))
+
+
+def without_each(n_frames, score):
+    """The score of all frames but one, for each."""
+    return np.array([score(np.delete(n_frames, k, axis=0)) for k in range(len(n_frames))])
+
+
+def spread(left, factor):
+    """The root of the squared deviations from their mean, added up and multiplied by a factor of F."""
+    return np.sqrt(factor(len(left)) * np.square(left - left.mean()).sum())
+
+
+def by(n_frames, score):
+    """A jackknife of another score."""
+    return score(n_frames), spread(without_each(n_frames, score), lambda F: (F - 1) / F)
+
+
+def with_factor(n_frames, factor):
+    return pooled(n_frames), spread(without_each(n_frames, pooled), factor)
+
+
+@wrong("The scores without one frame lie close together, as they share nearly all frames: by which factor too close?")
+def spread_of_the_scores(n_frames):
+    return with_factor(n_frames, lambda F: 1 / F)
+
+
+@wrong("The scores without one frame lie close together, as they share nearly all frames: by which factor too close?")
+def spread_of_the_scores_of_a_sample(n_frames):
+    return with_factor(n_frames, lambda F: 1 / (F - 1))
+
+
+@wrong("That divides the scores' spread by the root of F, as for F numbers that do not depend on each other. Do these?")
+def as_if_they_were_independent(n_frames):
+    return with_factor(n_frames, lambda F: 1 / (F * (F - 1)))
+
+
+@wrong("That divides the scores' spread by the root of F, as for F numbers that do not depend on each other. Do these?")
+def as_if_they_were_independent_by_f(n_frames):
+    return with_factor(n_frames, lambda F: 1 / F**2)
+
+
+@wrong("A factor of F is missing: try it on numbers. What is it for the mean of 1 and 3, whose standard error is 1?")
+def no_factor(n_frames):
+    return with_factor(n_frames, lambda F: 1.0)
+
+
+@wrong(
+    "Your factor is too large. What is it for the mean of 1 and 3, whose standard error is 1?", of=("F - 1", "F", "up")
+)
+def factor_too_large(n_frames, of):
+    return with_factor(n_frames, {"F - 1": lambda F: F - 1, "F": lambda F: F, "up": lambda F: F / (F - 1)}[of])
+
+
+@wrong("The factor belongs to the squares: it stands under the root, too.")
+def factor_outside_the_root(n_frames):
+    return with_factor(n_frames, lambda F: ((F - 1) / F) ** 2)
+
+
+@wrong("That is the square of the standard error.")
+def squared(n_frames):
+    score, error = jackknife(n_frames)
+    return score, error**2
+
+
+@wrong("Deviations are squared one by one, and then added up: yours are not squared.")
+def absolute_deviations(n_frames):
+    left = without_each(n_frames, pooled)
+    return pooled(n_frames), (len(left) - 1) / len(left) * np.abs(left - left.mean()).sum()
+
+
+@wrong(
+    "The deviations are those from the mean of the scores without one frame. Yours are from the score of all frames."
+)
+def deviations_from_the_score_of_all(n_frames):
+    left = without_each(n_frames, pooled)
+    return pooled(n_frames), np.sqrt((len(left) - 1) / len(left) * np.square(left - pooled(n_frames)).sum())
+
+
+def alone(n_frames):
+    return np.array([np.nanmean(iou_of(n)) for n in n_frames])
+
+
+@wrong("You score each frame alone. The pooled score is no mean of these: leave one frame out, score the others.")
+def standard_error_of_the_frames(n_frames):
+    return pooled(n_frames), spread(alone(n_frames), lambda F: 1 / (F * (F - 1)))
+
+
+@wrong("You score each frame alone. Leave it out, and score all the others.")
+def one_frame_in(n_frames):
+    return pooled(n_frames), spread(alone(n_frames), lambda F: (F - 1) / F)
+
+
+@wrong("Your score is the mean of those without one frame. It is to be that of all frames, pooled.")
+def mean_of_what_is_left(n_frames):
+    return without_each(n_frames, pooled).mean(), jackknife(n_frames)[1]
+
+
+@wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
+def mean_of_frames_means(n_frames):
+    return by(n_frames, lambda some: alone(some).mean())
+
+
+@wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
+def mean_and_standard_error_of_the_frames(n_frames):
+    return alone(n_frames).mean(), spread(alone(n_frames), lambda F: 1 / (F * (F - 1)))
+
+
+def occurring(n_frames):
+    return ~np.isnan(iou_of(n_frames.sum(axis=0)))
+
+
+@wrong("A class that only the frame left out holds occurs no more: does it count in the mean of the others?")
+def a_class_left_out_scores_0(n_frames):
+    left = without_each(n_frames, lambda some: iou_of(some.sum(axis=0), empty=0.0)[occurring(n_frames)].mean())
+    return pooled(n_frames), spread(left, lambda F: (F - 1) / F)
+
+
+@wrong(
+    "A class that only the frame left out holds occurs no more, and its score is NaN. What is a mean with a NaN in it?"
+)
+def a_class_left_out_is_nan(n_frames):
+    left = without_each(n_frames, lambda some: iou_of(some.sum(axis=0))[occurring(n_frames)].mean())
+    return pooled(n_frames), spread(left, lambda F: (F - 1) / F)
+
+
+@wrong("What is the mean of some numbers if one of them is NaN?")
+def nan_in_the_mean(n_frames):
+    return by(n_frames, lambda some: iou_of(some.sum(axis=0)).mean())
+
+
+@wrong(
+    "A class that no frame holds or predicts moves your mean: over how many classes do you average?", empty=(0.0, 1.0)
+)
+def absent_classes_count(n_frames, empty):
+    return by(n_frames, lambda some: iou_of(some.sum(axis=0), empty=empty).mean())
+
+
+@wrong("A class that is predicted but never true is a mistake: its IoU is 0, and it counts.")
+def truth_only(n_frames):
+    def score(some):
+        n = some.sum(axis=0)
+        return iou_of(n)[n.sum(axis=1) > 0].mean()
+
+    return by(n_frames, score)
+
+
+@wrong("A class whose IoU is 0 occurs all the same: it counts. Which number says whether a class occurs?")
+def found_only(n_frames):
+    def score(some):
+        scores = iou_of(some.sum(axis=0))
+        return scores[scores > 0.0].mean() if (scores > 0.0).any() else 0.0
+
+    return by(n_frames, score)
+
+
+@wrong("In your sum a class with many pixels outweighs the others: each class has one vote here, whatever its size.")
+def sum_over_sum(n_frames):
+    def score(some):
+        correct, predicted, true = parts(some.sum(axis=0))
+        return correct.sum() / (predicted + true - correct).sum()
+
+    return by(n_frames, score)
+
+
+@wrong("That is the share of pixels that are right; where are the unions?")
+def accuracy(n_frames):
+    return by(n_frames, lambda some: np.trace(some.sum(axis=0)) / some.sum())
+
+
+@wrong("Background is a class like the others: over which classes do you average?")
+def without_background(n_frames):
+    return by(n_frames, lambda some: np.nanmean(np.append(iou_of(some.sum(axis=0))[1:], np.nan)))

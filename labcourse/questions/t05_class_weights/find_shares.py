@@ -1,0 +1,189 @@
+"""05_class_weights.find_shares: the question, and wrong answers with the hints that they earn."""
+
+import numpy as np
+
+from labcourse.questions.t05_class_weights import SURE, draw_shares, draw_weights, some_logits
+from labgrader.checker.question import Question, holds, wrong
+
+
+def find_shares(z, w, shares, rounds):
+    """Estimate the classes' shares in new scenes: a guess is the mean of the probabilities that the last one gives."""
+    likelihoods = z.reshape(-1, z.shape[-1]) - np.log(w * shares)
+    guess = shares
+    for _ in range(rounds):
+        a = likelihoods + np.log(guess)
+        e = np.exp(a - a.max(axis=1, keepdims=True))
+        guess = (e / e.sum(axis=1, keepdims=True)).mean(axis=0)
+    return guess
+
+
+def _network(rng):
+    """Logits (H, W, C), weights, the classes' shares in the scenes of training, and a number of rounds."""
+    H, W, C = int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(6, 8))
+    return some_logits(rng, H, W, C), draw_weights(rng, C), draw_shares(rng, C), int(rng.integers(2, 6))
+
+
+_THREE = np.array([[2.0, 0.0], [0.0, 1.0], [0.0, 3.0]])
+
+
+QUESTION = Question(
+    reference=find_shares,
+    inputs=_network,
+    by_hand=(
+        (np.array([[0.0, 0.0]]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), 1),  # weights alone
+        (_THREE, np.ones(2), np.array([0.5, 0.5]), 1),  # a mean of probabilities
+        (_THREE, np.ones(2), np.array([0.9, 0.1]), 1),
+        (_THREE, np.ones(2), np.array([0.9, 0.1]), 2),  # the second round begins with the network's logits, too
+        (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), 3),
+        (_THREE + 1000.0, np.array([1.0, 4.0]), np.array([0.8, 0.2]), 1),  # exp overflows
+        (SURE, np.array([0.5, 4.0, 1.0]), np.array([0.6, 0.1, 0.3]), 2),  # with one maximum for both, exp gives 0
+    ),
+    random_cases=8,
+    points=4,
+    forbidden=("scipy", "torch"),
+)
+
+
+@holds("the shares are above 0 and sum to 1")
+def shares_sum_to_1(z, w, shares, rounds, out):
+    return np.all(out > 0.0) and np.isclose(np.sum(out), 1.0, atol=1e-4)
+
+
+# ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def softmax(a):
+    return np.exp(a - np.logaddexp.reduce(a, axis=-1, keepdims=True))
+
+
+def of_rounds(z, shares, rounds, believed, first=None):
+    """Rounds with another step: believed(logits (N, C), guess) -> probabilities (N, C)."""
+    z, guess = z.reshape(-1, z.shape[-1]), shares if first is None else first
+    for _ in range(rounds):
+        guess = believed(z, guess).mean(axis=0)
+    return guess
+
+
+@wrong("The network was trained with weights, and its logits still hold them. Where do you take them out?")
+def weights_left_in(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / shares)))
+
+
+@wrong("Training with weights has raised each logit by log w already. Yours raises it once more.")
+def weights_put_in_again(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(w * guess / shares)))
+
+
+@wrong("The network's logits hold the shares of its training. A guess is to take their place: what do you divide by?")
+def old_shares_left_in(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / w)))
+
+
+@wrong("More of a class in the new scenes makes it likelier there: which of the two shares is divided by the other?")
+def ratio_upside_down(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(shares / guess / w)))
+
+
+@wrong(
+    "You change what the last round has changed. A guess replaces the shares of training: what does a round begin with?"
+)
+def shifts_added_up(z, w, shares, rounds):
+    a, guess = z.reshape(-1, z.shape[-1]) - np.log(w), shares
+    for _ in range(rounds):
+        a = a + np.log(guess / shares)
+        guess = softmax(a).mean(axis=0)
+    return guess
+
+
+@wrong("You take the weights out in every round. Once they are out, the logits hold them no more.")
+def weights_taken_out_each_time(z, w, shares, rounds):
+    a, guess = z.reshape(-1, z.shape[-1]), shares
+    for _ in range(rounds):
+        a = a - np.log(w)
+        guess = softmax(a + np.log(guess / shares)).mean(axis=0)
+    return guess
+
+
+@wrong("The network's logits changed, round after round: yours start from those of the round before, weights and all.")
+def all_shifts_added_up(z, w, shares, rounds):
+    a, guess = z.reshape(-1, z.shape[-1]), shares
+    for _ in range(rounds):
+        a = a + np.log(guess / shares / w)
+        guess = softmax(a).mean(axis=0)
+    return guess
+
+
+@wrong("A pixel's probabilities sum to 1 over its classes; yours sum to 1 over the pixels. Which axis is which?")
+def summed_over_pixels(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax((z + np.log(guess / shares / w)).T).T)
+
+
+@wrong("You count each pixel for its likeliest class. A pixel of 60 and 40 % is 0.6 and 0.4 of a pixel.")
+def pixels_counted(z, w, shares, rounds):
+    def one_hot(z, guess):
+        a = z + np.log(np.maximum(guess, 1e-300)) - np.log(w * shares)
+        return (a.argmax(axis=-1)[:, None] == np.arange(a.shape[-1])).astype(float)
+
+    return of_rounds(z, shares, rounds, one_hot)
+
+
+@wrong("The mean is one of probabilities, each pixel's own. Yours is one of logits, of which you take the softmax.")
+def mean_of_logits(z, w, shares, rounds):
+    def one(z, guess):
+        return softmax((z + np.log(guess) - np.log(w * shares)).mean(axis=0, keepdims=True))
+
+    return of_rounds(z, shares, rounds, one)
+
+
+@wrong("Each pixel's probabilities must sum to 1 before you take their mean; yours only do on the average.")
+def normalised_after_the_mean(z, w, shares, rounds):
+    q, guess = softmax(z.reshape(-1, z.shape[-1])), shares
+    for _ in range(rounds):
+        guess = (q * guess / (w * shares)).mean(axis=0)
+        guess = guess / guess.sum()
+    return guess
+
+
+@wrong("That is the guess after the first round, whatever `rounds` says.")
+def one_round(z, w, shares, rounds):
+    return find_shares(z, w, shares, 1)
+
+
+@wrong("Your guess is that of another round. Where does your loop begin, after which step does it end?", more=(-1, 1))
+def rounds_miscounted(z, w, shares, rounds, more):
+    return find_shares(z, w, shares, rounds + more)
+
+
+@wrong("The first guess is the shares of training. Yours gives all classes the same one.")
+def from_equal_shares(z, w, shares, rounds):
+    first = np.full(len(shares), 1.0 / len(shares))
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / shares / w)), first)
+
+
+@wrong("If a probability is multiplied by a factor, what is added to its logit?")
+def ratios_added(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + guess / (w * shares)))
+
+
+@wrong("Probabilities are multiplied by a ratio; what does that do to logits?")
+def ratios_multiplied(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z * guess / (w * shares)))
+
+
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
+def that_overflows(z, w, shares, rounds):
+    def believed(z, guess):
+        e = np.exp(z + np.log(guess / shares / w))
+        return e / e.sum(axis=-1, keepdims=True)
+
+    return of_rounds(z, shares, rounds, believed)
+
+
+@wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
+def one_maximum_for_all(z, w, shares, rounds):
+    def believed(z, guess):
+        a = z + np.log(guess / shares / w)
+        e = np.exp(a - a.max())
+        return e / e.sum(axis=-1, keepdims=True)
+
+    return of_rounds(z, shares, rounds, believed)
