@@ -23,7 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from labgrader.checker.comparison import Case, Problem, expected_cases, parts, right_outputs
-from labgrader.checker.diagnosis import found_in_the_program, idle_in_the_program
+from labgrader.checker.diagnosis import found_in_the_program, of_kinds
+from labgrader.checker.finding import IDLE
 from labgrader.checker.judge import Verdict
 from labgrader.checker.program import Program
 from labgrader.checker.question import Question
@@ -274,8 +275,8 @@ def looked_at(found: Diagnosis, answer: Answer, values_are_right: bool) -> Diagn
     """What to tell when the answer's program has been looked at, too: its line and a question, if there is a place."""
     pieces = answer.program.pieces
     findings = answer.findings()
-    found_there = found_in_the_program(pieces, findings, values_are_right), idle_in_the_program(pieces, findings)
-    sentence = next(itertools.chain(*found_there), None)
+    in_the_program = found_in_the_program(answer.question, pieces, findings, values_are_right)
+    sentence = next(itertools.chain(in_the_program, of_kinds(IDLE, pieces, findings)), None)
     if sentence is None:
         return found
     lines = [line for marked in sentence.marked for line in marked.plain()]

@@ -47,6 +47,8 @@ QUESTION = Question(
             np.array([[(1 << 17) + 1, (1 << 18) + 2, (1 << 19) + 3, 0]], np.int32),  # 17 to 19 bits are too few
             (np.arange(3, 600_003) // 3 % 4).astype(np.uint8)[:, None],
         ),
+        # sixteen links are 10 in hexadecimal
+        (np.array([[9 << 24, 16 << 24, 17 << 24]], np.int32), (np.arange(18)[None] // 3 % 4).astype(np.uint8)),
         (np.array([[1 << 24, 3 + (1 << 24)]], np.int32), np.array([[2, 1], [0, 1], [0, 1], [1, 255]], np.uint8)),
     ),
     random_cases=8,

@@ -45,6 +45,7 @@ QUESTION = Question(
         (np.array(_IN[:1]), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
+        (np.tile(_IN + _OUT, (300, 1)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # as many points as a cloud has
     ),
     random_cases=12,
     points=3,

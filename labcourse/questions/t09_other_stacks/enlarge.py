@@ -33,6 +33,7 @@ QUESTION = Question(
         (np.arange(14)[:, None], (1, 9)),  # in floats 4.5 / (9 / 14) is not 7
         (np.arange(6000)[:, None], (1, 4129)),  # in float32 3419.5 * 6000 / 4129 is off
         (np.array([[300, 2]]), (4, 1)),  # labels need not be bytes
+        (np.arange(100, dtype=np.uint8).reshape(10, 10), (20, 20)),  # and 19.5 * 10 * 2 is no byte
     ),
     random_cases=8,
     forbidden=("cv2", "PIL"),
