@@ -66,10 +66,10 @@ def facts_of(value: object) -> Iterator[str]:
         yield f"holds {course().ignored}"
     if array.dtype.kind == "b":
         yield from (f"is {words}" for words, so in (("all true", array.all()), ("nowhere true", not array.any())) if so)
-    elif (array < 0).any():
-        yield "holds a negative number"
-    elif (array == 0).any():
-        yield "holds a 0"
+    else:
+        yield from (
+            f"holds {words}" for words, so in (("a negative number", array < 0), ("a 0", array == 0)) if so.any()
+        )
     for axis, length in enumerate(array.shape):
         if length == 1 and array.ndim > 1:
             yield f"has one {('row', 'column')[axis]}" if array.ndim == 2 else f"is 1 long along axis {axis}"

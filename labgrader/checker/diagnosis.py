@@ -149,12 +149,12 @@ def output_of(misconception: Misconception, args: tuple) -> object:
 def found_in_the_program(
     question: Question, pieces: Sequence[tuple[str, str]], findings: Sequence[Finding], values_are_right: bool
 ) -> Iterator[Sentence]:
-    """What instruments show, then what repair finds, with the student's lines.
+    """What instruments show, an argument that is never read, then what repair finds, with the student's lines.
 
     That an argument is changed is told at once where that is all that is wrong, and else at last. Of a cast that mends
     wrong values is not said that the values are right.
     """
-    shown = [f for f in findings if f.kind in WATCHES and f.kind != "writes"]
+    shown = [f for f in findings if f.kind in (*WATCHES, "unread") and f.kind != "writes"]
     repairs = [f for f in findings if f.kind in REPAIRS]
     written = [f for f in findings if f.kind == "writes"]
     for finding in (*written, *shown, *repairs[:1]) if values_are_right else (*shown, *repairs[:1], *written):
@@ -175,7 +175,7 @@ def of_kinds(
 ) -> Iterator[Sentence]:
     """What stands idle: an argument that is never read, what is computed and never used; or the last right step."""
     for finding in findings:
-        if finding.kind in kinds:
+        if finding.kind in kinds and finding.kind != "unread":  # which is told before
             yield Sentence(finding.kind, said(finding), marked([finding], pieces))
 
 

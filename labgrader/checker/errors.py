@@ -243,8 +243,8 @@ TABLE = {
         "The list is shorter than you think in this case: how long is it, and where does the index start?"
     ),
     r"ValueError: matmul.*?size (\d+) is different from (\d+)": (
-        "In a product A @ B the columns of A ({2}) must be as many as the rows of B ({1}). Is a .T "
-        "missing (of rows that are points: P @ R.T), or is there one too many?"
+        "In a product A @ B the columns of A ({2}) must be as many as the rows of B ({1}). Print both "
+        "shapes: has one of them other axes than you meant, a .T too many, or one too few?"
     ),
     r"ValueError: shapes \(([\d,]*)\) and \(([\d,]*)\) not aligned": (
         "Shapes ({1}) and ({2}) have no product: the first has other columns than the second has rows."
@@ -253,8 +253,8 @@ TABLE = {
         "You put something of shape ({1}) into a place of shape ({2})."
     ),
     r"(?:Value|Index)Error: (?:shape mismatch|could not be broadcast|.*shape mismatch)": (
-        "Index arrays are taken together entry by entry, so that they need one shape. For each row with each column "
-        "one of them has an axis more, as in rows[:, None]."
+        "Index arrays are taken together entry by entry, so that their shapes have to fit. Print both: which one has "
+        "fewer axes than the other, and what should stand there?"
     ),
     r"ValueError: need at least one array": "In this case there is nothing to stack or join: is a list empty?",
     r"ValueError: all the input array|ValueError: all input arrays": (
@@ -297,7 +297,8 @@ TABLE = {
         "The left side names another number of values than there are on the right: print what stands there."
     ),
     r"ValueError: (?:setting an array element|.*inhomogeneous)": (
-        "The parts of the array have different lengths: which of them is a list or an array by mistake?"
+        "The parts of the array have different lengths. Print each of them: which one is longer or shorter than you "
+        "meant?"
     ),
     r"ZeroDivisionError": "Something that you divide by is 0 in this case.",
     r"OverflowError: Python integer (-?\d+) out of bounds for (\w+)": (

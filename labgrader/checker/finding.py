@@ -18,6 +18,8 @@ WATCHES = {
     "no number": "The marked part has no result (0 / 0, for example). In which case is that, and what is right then?",
     "wraps": "The marked part is computed in bytes or other small integers. Behind their largest number they begin "
     "again. Which type is wide enough?",
+    "aliased": "All rows of this list are one and the same list: what is written into one row is in all of them. How "
+    "is a new list made for each row?",
     "writes": "This line changes an argument, perhaps through another name for it or for a part of it. Whoever calls "
     "the function still needs the old values: work on a copy.",
 }

@@ -1,7 +1,7 @@
 """What stands idle in a program: an argument that is never read, and a value that is computed and never used.
 
-Both are true of the text alone, and say much where nothing else is known of a wrong answer. The module needs the
-standard library alone.
+Beside these, rows that are one and the same list. All are true of the text alone, and say much where nothing else is
+known of a wrong answer. The module needs the standard library alone.
 """
 
 import ast
@@ -12,7 +12,7 @@ from labgrader.checker.syntax import span_of
 
 
 def idle(pieces: Sequence[tuple[str, str]], name: str) -> list[Finding]:
-    """The idle parts of the function `name`, arguments first.
+    """Such parts of the function `name`, arguments first.
 
     >>> text = "def f(a, b):\\n    c = a + 1\\n    return a"
     >>> [(finding.kind, finding.spans[0].line) for finding in idle([("f", text)], "f")]
@@ -26,7 +26,10 @@ def idle(pieces: Sequence[tuple[str, str]], name: str) -> list[Finding]:
 
 
 def idle_parts(function: ast.FunctionDef) -> list[tuple[str, ast.AST]]:
-    """Arguments that are never read, and names that get a value alone which is never read; none where text is run."""
+    """A name's [[0] * n] * m, arguments that are never read, and names that get a value alone which is never read.
+
+    None where a text is run.
+    """
     inside = list(ast.walk(function))
     read = {node.id for node in inside if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
     read |= {node.target.id for node in inside if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name)}
@@ -38,4 +41,12 @@ def idle_parts(function: ast.FunctionDef) -> list[tuple[str, ast.AST]]:
     values = [
         node for node in alone if isinstance(node.targets[0], ast.Name) and node.targets[0].id not in read | outside
     ]
-    return [("unread", arg) for arg in arguments] + [("unused", node) for node in values]
+    repeated = [n.value for n in alone if is_repeated(n.value) and is_repeated(n.value.left.elts[0])]
+    found = {"aliased": repeated, "unread": arguments, "unused": values}
+    return [(kind, node) for kind, nodes in found.items() for node in nodes]
+
+
+def is_repeated(node: ast.AST) -> bool:
+    """Whether an expression is a list of one entry, many times: [x] * n."""
+    repeats = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult) and isinstance(node.left, ast.List)
+    return repeats and len(node.left.elts) == 1

@@ -23,7 +23,7 @@ EXCEPTIONS = [
     (lambda: np.zeros(3)[0, 1], "2 indices for an array of 1 axes"),
     (lambda: np.float64(3)[0], "single number"),
     (lambda: np.zeros((5, 3)) + np.zeros((3, 5)), "(the shape of P)"),
-    (lambda: np.eye(3) @ np.zeros((5, 3)), "P @ R.T"),
+    (lambda: np.eye(3) @ np.zeros((5, 3)), "other axes than you meant"),
     (lambda: np.zeros(3).reshape(2, 2), "3 numbers do not fill the shape (2,2)"),
     (lambda: 1 if np.zeros(3) > 0 else 2, "np.where"),
     (lambda: np.zeros(3).sum(axis=1), "no axis 1 here"),

@@ -133,3 +133,12 @@ def test_nothing_is_told_where_no_kind_tells_them_apart():
     assert contrasted([True, False, True], SOME, SOME, SOME) == ""
     assert contrasted([False, False], IGNORED, IGNORED) == ""
     assert contrasted([True, True], SOME, IGNORED) == ""
+
+
+def test_rows_that_are_one_list_are_told_before_anything_else_and_an_unread_argument_before_a_repair():
+    text = "def f(a, b):\n    n = [[0] * 3] * 3\n    n[0][0] = a[0]\n    return n"
+    assert [(f.kind, f.spans[0].line) for f in idle([("f", text)], "f")] == [("aliased", 2), ("unread", 1)]
+    harmless = "def f(a, b):\n    n = np.array([[0] * 3] * 3)\n    return n + a + b"
+    assert idle([("f", harmless)], "f") == []
+    repair, unread = Finding("name", 0, (Span(2, 11, 2, 12),)), Finding("unread", 0, (Span(1, 6, 1, 7),))
+    assert said(repair, unread)[0].startswith("Your function never reads the marked argument")
