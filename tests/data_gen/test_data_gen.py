@@ -72,7 +72,9 @@ def test_no_family_is_both_target_and_obstacle_and_colours_do_not_tell():
     assert np.abs(means[TARGET] - means[OBSTACLE]).max() < 0.06
 
 
-@pytest.mark.parametrize("config", ["train", "wide", "any"])
+@pytest.mark.parametrize(
+    "config", ["train", *(pytest.param(config, marks=pytest.mark.nightly) for config in ("wide", "any"))]
+)
 def test_training_shows_nothing_that_hard_asks_about(config):
     scenes = {c: drawn(c) for c in (config, "hard")}
     things = {c: [thing for spec in scenes[c] for thing in spec.objects] for c in scenes}

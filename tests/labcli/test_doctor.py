@@ -123,6 +123,7 @@ def test_one_broken_check_leaves_the_others_standing(monkeypatch):
 # labkit doctor --warm -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_warming_up_compiles_every_kernel():
     doctor.warm_up()
     assert [kernel.py_func.__name__ for kernel in compiled.KERNELS if not kernel.signatures] == []

@@ -107,6 +107,7 @@ def test_ctrl_c_stops_a_round_whose_answer_never_ends(tmp_path):
         running.kill()
 
 
+@pytest.mark.nightly
 def test_the_open_task_of_lab_05_can_be_won():
     """With its own cells, on its first twenty scenes: the interval of what each of its two ideas gains lies above 0."""
     with np.printoptions(), matplotlib.rc_context():  # which the lab's first cell sets

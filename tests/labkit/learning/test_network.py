@@ -184,6 +184,7 @@ def test_weights_of_ones_own_network_load_into_it(tmp_path):
         load_model(tmp_path / "w.pt", model=torch.nn.Conv2d(3, 2, 1))
 
 
+@pytest.mark.nightly
 def test_taking_class_weights_out_gives_the_target_its_share_of_probability():
     """On 12 of the scenes that both networks were trained on; SmallSegNet cannot tell what a target is, and hedges."""
     frames = [data_gen.render(data_gen.sample_scene(seed, "train"), (320, 240)) for seed in range(1000, 1012)]

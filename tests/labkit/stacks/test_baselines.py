@@ -34,6 +34,7 @@ def twenty_scenes():
     return [data_gen.render(data_gen.sample_scene(seed, "test"), (320, 240)) for seed in range(600_016, 600_036)]
 
 
+@pytest.mark.nightly
 def test_in_how_many_of_twenty_scenes_a_tables_range_holds(twenty_scenes):
     """In other light and on the next table, as the lesson on colour says."""
     tables = [frame.labels == SURFACE for frame in twenty_scenes]
@@ -51,6 +52,7 @@ def test_in_how_many_of_twenty_scenes_a_tables_range_holds(twenty_scenes):
     assert f"If each range is used on the next table of the twenty, {holds(np.copy, shift=1)} keep it." in said
 
 
+@pytest.mark.nightly
 def test_how_many_labels_of_twenty_scenes_are_right_by_luck(twenty_scenes):
     """Where scores in NCHW order are read as NHWC."""
     engine = shipped("unet")
