@@ -25,7 +25,8 @@ ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 KINDS = {"question": "Question", "picture": "Look", "formula": "Formula", "answer": "Answer"}
 REACH = 2  # texts below a picture in which its sentences may stand; the one above comes after them
-LEAD = r"^(?:\*+[^*]{1,30}[.:]\*+:?|\*\*(?:Predict|Play|Task)[^*]*\*\*:?(?= [^a-z])|Predict first(?: \(\d\))?[.:]) +"  # not shown
+# Not shown.
+LEAD = r"^(?:\*+[^*]{1,30}[.:]\*+:?|\*\*(?:Predict|Play|Task)[^*]*\*\*:?(?= [^a-z])|Predict first(?: \(\d\))?[.:]) +"
 
 
 def topics() -> dict[str, list[Path]]:
