@@ -4,13 +4,18 @@ A marked number is found in the old output by its value, and in the new one at t
 same but for its numbers: where it does not, or where two places would give two numbers, a person has to look.
 """
 
+import ast
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
+from functools import cache
+from itertools import combinations, product
 from pathlib import Path
 
 from labcli.marks import CONSTANTS, MARK, NUMBER, OPERAND, computed, numbers, printed, rounds_to, value
+from labkit.support.validation import require
+
+LEAST_SEED, MOST_SEED = 600_000, 700_000  # seeds of lessons and labs; a smaller one stands in a call alone
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,57 @@ def run(path: Path) -> dict[str, str]:
     notebook.metadata = metadata
     nbformat.write(notebook, path)
     return before
+
+
+def scenes_of(path: Path) -> list[tuple[int, str]]:
+    """Seeds and configs of the scenes that a notebook names in its code, and perhaps some more.
+
+    A seed in a list or a range goes with each config that the notebook names. A seed that is computed is not found.
+    """
+    import nbformat
+
+    from data_gen.scenes import CONFIGS
+
+    cells = [cell for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+    code = "\n".join(re.sub(r"^[%!].*", "pass", cell.source, flags=re.MULTILINE) for cell in cells)
+    nodes = list(ast.walk(ast.parse(code)))
+    named = {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    found, seeds, ends = set(), set(), set()
+    for node in nodes:
+        if isinstance(node, ast.Call) and node.args:
+            values = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
+            name = ast.unparse(node.func).rpartition(".")[2]
+            if name == "sample_scene" and len(values) == len(node.args):
+                found.add((values[0], values[1] if len(values) > 1 else "train"))
+            elif name == "range" and len(values) == len(node.args) > 1 and values[0] >= LEAST_SEED:
+                seeds |= set(range(*values))
+                ends.add(id(node.args[1]))  # ast.walk comes to it later
+        elif (
+            isinstance(node, ast.Constant)
+            and id(node) not in ends
+            and type(node.value) is int
+            and LEAST_SEED <= node.value < MOST_SEED
+        ):
+            seeds.add(node.value)
+    return sorted(found | set(product(seeds, named & CONFIGS.keys() or {"train"})))
+
+
+def holding(family: str, paths: list[Path]) -> dict[Path, list[tuple[int, str]]]:
+    """Notebooks whose scenes hold a thing of a family, and which of their scenes do.
+
+    Raises ValueError if no scene can hold such a thing.
+    """
+    import data_gen
+    from data_gen.families import FAMILIES
+
+    require("family", family in FAMILIES, f"one of {', '.join(FAMILIES)}", repr(family))
+
+    @cache
+    def holds(seed: int, config: str) -> bool:
+        return any(thing.family == family for thing in data_gen.sample_scene(seed, config).objects)
+
+    found = {path: [scene for scene in scenes_of(path) if holds(*scene)] for path in paths}
+    return {path: scenes for path, scenes in found.items() if scenes}
 
 
 def renumber(path: Path, before: dict[str, str]) -> tuple[int, list[Doubt]]:

@@ -7,7 +7,8 @@ A cell of a lesson that shows on slides says so in its metadata, and says no sen
     "slides": [{"kind": "question", "begin": ["What appears at"], "minutes": 2, "ask": "...", "wrong": "..."}]
 
 kind: question, picture, formula or answer. begin: the first words of each sentence that is shown, of this cell or,
-beside a picture, of the texts next to it. formula: which displayed formula of the cell, from 0. picture: which drawing
+beside a picture, of the texts next to it. formula: which displayed formula of the cell, from 0; it stands where the
+lesson has it. picture: which drawing
 or image. The title is the heading that the cell stands under. ask, wrong, minutes: the speaker's notes. nbconvert
 writes reveal.js pages; the same slides are a notebook with all code of the lessons, in which explorers move.
 """
@@ -24,7 +25,8 @@ ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 KINDS = {"question": "Question", "picture": "Look", "formula": "Formula", "answer": "Answer"}
 REACH = 2  # texts below a picture in which its sentences may stand; the one above comes after them
-LEAD = r"^(?:\*+[^*]{1,30}[.:]\*+:?|\*\*(?:Predict|Play|Task)[^*]*\*\*:?|Predict first(?: \(\d\))?[.:]) +"  # not shown
+# Not shown.
+LEAD = r"^(?:\*+[^*]{1,30}[.:]\*+:?|\*\*(?:Predict|Play|Task)[^*]*\*\*:?(?= [^a-z])|Predict first(?: \(\d\))?[.:]) +"
 
 
 def topics() -> dict[str, list[Path]]:
@@ -104,16 +106,39 @@ def chosen(cells: list, place: int, slide: dict) -> list[str]:
     found = []
     for begin in slide.get("begin", ()):
         for cell in texts:
-            said = [re.sub(LEAD, "", sentence) for sentence in sentences(cell["source"])]
-            fits = list(dict.fromkeys(s for s in said if plain(s).startswith(plain(begin))))
+            fits = list(dict.fromkeys(s for s in said(cell["source"]) if plain(s).startswith(plain(begin))))
             if fits:
                 break
         if len(fits) != 1:
             raise ValueError(
                 f"begin: expected the first words of one sentence of the lesson, {len(fits)} are {begin!r}"
             )
-        found += [s[0].upper() + s[1:] for s in fits if s[0].upper() + s[1:] not in found]
+        found += [capital(s) for s in fits if capital(s) not in found]
     return found
+
+
+def said(source: str) -> list[str]:
+    """The sentences of a text without their leads."""
+    return [re.sub(LEAD, "", sentence) for sentence in sentences(source)]
+
+
+def capital(sentence: str) -> str:
+    """A sentence that begins with a capital, which one has lost that had a lead or a formula before it."""
+    return sentence[0].upper() + sentence[1:]
+
+
+def in_lines(formula: str) -> str:
+    r"""A formula of several parts with a line for each, so that it can be large; the lesson has them in one line.
+
+    >>> in_lines(r"a = 1, \qquad\text{and}\qquad b = 2")
+    '\\begin{gathered} a = 1, \\\\ \\text{and} \\quad b = 2 \\end{gathered}'
+    """
+    parts = [part.strip() for part in re.split(r"(?:\\qquad\s*)+", formula)]
+    whole = all(p.count("{") == p.count("}") and p.count(r"\begin") == p.count(r"\end") for p in parts)
+    if len(parts) == 1 or not whole:
+        return formula
+    lines = re.sub(r"(\\text\{[^{}]*\}) \\\\", r"\1 \\quad", r" \\ ".join(parts))
+    return rf"\begin{{gathered}} {lines} \end{{gathered}}"
 
 
 def title(cells: list, place: int) -> str:
@@ -153,12 +178,15 @@ def one_slide(cells: list, place: int, slide: dict) -> dict:
     if slide["kind"] not in KINDS:
         raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {slide['kind']!r}")
     words, parts = chosen(cells, place, slide), []
+    first = len(words)  # how many sentences come before the formula
     if "formula" in slide:
-        formulas = re.findall(r"\$\$(.*?)\$\$", cells[place]["source"], re.DOTALL)
-        parts = [f"$${formulas[slide['formula']]}$$"]
+        source = cells[place]["source"]
+        formula = list(re.finditer(r"\$\$(.*?)\$\$", source, re.DOTALL))[slide["formula"]]
+        parts = [f"$${formula[1]}$$"]
+        first = len(set(words) & {capital(sentence) for sentence in said(source[: formula.start()])})
     if "picture" in slide and cells[place]["cell_type"] == "markdown":
         parts = [re.findall(r"!\[[^]]*\]\([^)]*\)", cells[place]["source"])[slide["picture"]]]
-    texts = [*parts, *words] if slide["kind"] == "picture" else [*words, *parts]
+    texts = [*parts, *words] if slide["kind"] == "picture" else [*words[:first], *parts, *words[first:]]
     return {
         "kind": slide["kind"],
         "title": title_of(cells, place, words if slide["kind"] != "picture" else []),
@@ -240,6 +268,9 @@ def write(out: Path) -> list[Path]:
     pages = []
     for topic, lessons in topics().items():
         book = deck(topic, lessons)
+        for cell in book.cells:
+            if cell.cell_type == "markdown":
+                cell.source = re.sub(r"(?<=\$\$)[^$]+(?=\$\$)", lambda formula: in_lines(formula[0]), cell.source)
         nbformat.write(book, out / f"{topic}.ipynb")
         page, _ = exporter.from_notebook_node(book)
         pages.append(out / f"{topic}.html")

@@ -8,6 +8,9 @@ import typer
 
 def renumber(
     lessons: Annotated[list[Path] | None, typer.Argument(help="Notebooks; all lessons if none is named.")] = None,
+    family: Annotated[
+        str, typer.Option(help="Run nothing: list the lessons and solutions whose scenes hold a thing of this family.")
+    ] = "",
 ) -> None:
     """Run lessons again, write their marked numbers anew, and list the sentences whose claim may no longer hold.
 
@@ -16,7 +19,13 @@ def renumber(
     """
     from labcli import renumber as again
 
-    paths = lessons or sorted(Path("lessons").glob("*.ipynb"))
+    paths = lessons or sorted(
+        [*Path("lessons").glob("*.ipynb"), *(Path().glob("solutions/*/*.ipynb") if family else [])]
+    )
     if not paths:
         raise ValueError("lessons: expected notebooks, or a folder lessons/ here, found neither")
+    if family:
+        for path, scenes in again.holding(family, paths).items():
+            typer.echo(f"{path}: {', '.join(f'{seed} {config}' for seed, config in scenes)}")
+        return
     raise typer.Exit(0 if again.all_of(paths, typer.echo) else 1)

@@ -3,7 +3,9 @@
 import nbformat
 import pytest
 
-from labcli.renumber import in_prose, renumber
+from data_gen import sample_scene
+from data_gen.families import FAMILIES
+from labcli.renumber import holding, in_prose, renumber, scenes_of
 
 OLD, NEW = "IoU [0.616 0.9], of 1250 pixels, shift -4", "IoU [0.655 0.8], of 980 pixels, shift -5"
 
@@ -57,3 +59,24 @@ def test_a_notebook_is_written_back_and_says_how_many_changed(tmp_path):
     nbformat.write(made.new_notebook(cells=[code, made.new_markdown_cell("x is 0.7<!--=-->.", id="prose")]), path)
     assert renumber(path, {"code": "x 0.7\n", "prose": ""}) == (1, [])
     assert nbformat.read(path, as_version=4).cells[1].source == "x is 0.8<!--=-->."
+
+
+def test_a_familys_notebooks_are_those_that_draw_a_scene_with_it(tmp_path):
+    codes = {
+        "a.ipynb": '%matplotlib inline\nframe = data_gen.render(data_gen.sample_scene(7, "test"))',
+        "b.ipynb": 'frames = [scene(seed, "hard") for seed in range(600_000, 600_003)]',
+        "c.ipynb": "print(600_000 // 3)",
+    }
+    for name, code in codes.items():
+        nbformat.write(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)]), tmp_path / name)
+    drawn = [[(7, "test")], [(seed, "hard") for seed in range(600_000, 600_003)], [(600_000, "train")]]
+    paths = sorted(tmp_path.glob("*.ipynb"))
+    assert [scenes_of(path) for path in paths] == drawn
+    for family in FAMILIES:
+        holding_it = {
+            path: [scene for scene in scenes if family in {thing.family for thing in sample_scene(*scene).objects}]
+            for path, scenes in zip(paths, drawn, strict=True)
+        }
+        assert holding(family, paths) == {path: scenes for path, scenes in holding_it.items() if scenes}
+    with pytest.raises(ValueError, match=r"family: expected one of mug, .*, got 'jug'"):
+        holding("jug", paths)

@@ -45,6 +45,16 @@ def test_a_notebook_opens_unchanged_and_asks_nothing(jupyterlab, page, path, cel
     page.locator(CHANGED).wait_for()
 
 
+@pytest.mark.parametrize("path, word", [("lessons/04_iou.ipynb", "lesson "), ("labs/04_iou/04_iou.ipynb", "lab ")])
+def test_a_tab_says_whether_it_is_the_lesson_or_the_lab(jupyterlab, page, path, word):
+    open_notebook(page, jupyterlab, path)
+    page.wait_for_function(
+        """word => [...document.querySelectorAll(".lm-DockPanel-tabBar .lm-TabBar-tabLabel")].some(label =>
+            label.innerText == "04_iou.ipynb" && getComputedStyle(label, "::before").content == `"${word}"`)""",
+        arg=word,
+    )
+
+
 def test_a_blank_filled_in_lab_04_gets_its_tick(jupyterlab, page, tmp_path):
     """Open the lab, write the solution's text into one blank, run all: a tick for it, "not yet" for the others."""
     solution = nbformat.read(ROOT / "solutions/04_iou/04_iou.ipynb", as_version=4)

@@ -290,6 +290,7 @@ REFUSED = {
     r"\bnobody can \w+ for himself\b": "say who does what",
     r"\b[Oo]f course\b|\b[Ss]imply\b|\b[Oo]bviously\b|\b[Tt]rivially\b": "leave it out",
     r"\bthe text(?:'s| says| has| asks| writes)\b": "the formula itself",
+    r"\) \d+ [-+=]|\) \d+\)": "the sign of the product, which Markdown may have eaten",
     r"\b[Uu]tili[sz]e|\b[Ii]n order to\b|w\.r\.t\.|\baka\b|\betc\.": "use, to, with respect to, also called, and so on",
 }  # fmt: skip
 
