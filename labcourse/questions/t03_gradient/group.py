@@ -33,8 +33,8 @@ _BEYOND = {(0, 0): (-0.5, 0), (0, 1): (0, -0.5), (0, 2): (6.5, 1), (0, 3): (1, 6
 _OUT = pointing((5, 5), _BEYOND | {(4, 4): (4, 4), (4, 3): (4.5, 4.5), (3, 4): (4.5, 4)})
 # Eight votes in one cell, and eight in a row of four: one wins before it is smoothed, one after it.
 _SPREAD = pointing((12, 12), {(0, u): (2, 2) for u in range(6)} | {(11, u): (6 + u % 4, 9 + u // 4) for u in range(8)})
-# Four votes in one cell make the highest peak, and are too few: six, scattered round another cell, are not looked for.
-_ROUND = ((6, 8), (8, 8), (6, 10), (8, 10), (7, 8), (7, 10))
+# Four votes in one cell make the highest peak, and are too few: six in and round another cell are not looked for.
+_ROUND = ((6, 8), (8, 8), (6, 10), (8, 10), (7, 9), (7, 9))
 _FEW = pointing((12, 12), {(0, u): (2, 2) for u in range(4)} | {(11, u): place for u, place in enumerate(_ROUND)})
 
 QUESTION = Question(
