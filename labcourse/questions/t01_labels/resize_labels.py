@@ -164,3 +164,9 @@ def divided_before_multiplied(y, height, width):
 @wrong("In floats 24.5 * (8 / 49) is less than 4: in which order does the formula multiply and divide?")
 def multiplied_by_the_quotient(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * (old / n))
+
+
+@wrong("A step of whole pixels is right only where the size is divided by a whole number. Where is each new centre?")
+def every_step_th_pixel(y, height, width):
+    a, b = max(y.shape[0] // height, 1), max(y.shape[1] // width, 1)
+    return y[a // 2 :: a, b // 2 :: b][:height, :width]

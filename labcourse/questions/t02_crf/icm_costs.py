@@ -117,3 +117,10 @@ def clipped_at_the_border(y, psi, weights, v, u):
         ahead, behind = ((int(np.clip(v + s * down, 0, H - 1)), int(np.clip(u + s * right, 0, W - 1))) for s in (1, -1))
         both += [(w[v, u], *ahead), (w[behind], *behind)]
     return charged(both, y, psi, v, u)
+
+
+@wrong("A pixel at the border has fewer neighbours, and pays for those that it has: yours pays for none.")
+def no_pairs_at_the_border(y, psi, weights, v, u):
+    H, W, _ = psi.shape
+    inside = 0 < v < H - 1 and 0 < u < W - 1
+    return icm_costs(y, psi, weights, v, u) if inside else psi[v, u].copy()

@@ -222,3 +222,10 @@ def without_diagonals(image, lam, sigma_I, sigma_p):
 @wrong("Python reads a / 2 * b as (a / 2) * b: on which side of the fraction line is your sigma?")
 def multiplied_by_sigma(image, lam, sigma_I, sigma_p):
     return gaussian(squares(image), lam, 1.0 / sigma_I, 1.0 / sigma_p)
+
+
+@wrong("The last row has pairs to the right, the last column pairs down: one range for all four kinds is too short.")
+def last_row_and_column_left_out(image, lam, sigma_I, sigma_p):
+    weights = pair_weights(image, lam, sigma_I, sigma_p).copy()
+    weights[:, -1], weights[:, :, -1] = 0.0, 0.0
+    return weights

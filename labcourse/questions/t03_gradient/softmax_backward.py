@@ -93,3 +93,8 @@ def without_the_mean(p, g):
 @wrong("p - Y is softmax and cross-entropy in one. Here any loss may follow, and g is its gradient by p.")
 def shortcut_of_the_cross_entropy(p, g):
     return p - g
+
+
+@wrong("How does p[c] change with its own logit? By p[c] (1 - p[c]); you take p[c].")
+def own_logit_without_its_share(p, g):
+    return softmax_backward(p, g) + p * p * g

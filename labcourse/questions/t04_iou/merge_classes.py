@@ -81,3 +81,17 @@ def first_column_of_other_groups(n, group):
     first = [np.flatnonzero(group == g)[0] for g in range(group.max() + 1)]
     own = group[:, None] == group
     return merge_classes(np.where(own | np.isin(np.arange(len(n)), first), n, 0), group)
+
+
+@wrong("The classes of a group need not be neighbours: 0 and 2 may be one, with 1 between them.")
+def runs_of_neighbours(n, group):
+    starts = np.unique(group, return_index=True)[1]
+    return np.add.reduceat(np.add.reduceat(n, starts, axis=0), starts, axis=1)
+
+
+@wrong("Every cell is a sum: what one group is taken for another adds up, too, not only what is on the diagonal.")
+def only_the_diagonal_is_summed(n, group):
+    first = [int(np.argmax(group == g)) for g in range(group.max() + 1)]
+    out = n[np.ix_(first, first)].copy()
+    np.fill_diagonal(out, np.diagonal(merge_classes(n, group)))
+    return out

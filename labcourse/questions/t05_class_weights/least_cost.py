@@ -80,3 +80,8 @@ def rows_and_columns_exchanged(q, cost):
 @wrong("That is what the best decision costs. Which class is it?")
 def the_least_price(q, cost):
     return (q @ cost).min(axis=-1)
+
+
+@wrong("What it costs to say j depends on the true class: weigh row i of `cost` by q[i], and add up the rows.")
+def column_sums(q, cost):
+    return np.argmin(cost.sum(axis=0) * (1 - q), axis=-1)

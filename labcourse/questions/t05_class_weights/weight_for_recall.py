@@ -118,3 +118,16 @@ def as_many_of_all_pixels(q1, y, recall):
 def weight_for_precision(q1, y, recall):
     odds = np.unique((1.0 - q1) / q1)
     return float(next(w for w in odds if np.mean(y[w * q1 >= 1.0 - q1]) >= recall))
+
+
+@wrong("0.4 of three pixels are 1.2 pixels: is the nearest whole number, one, at least a share of 0.4?")
+def rounded_to_the_nearest(q1, y, recall):
+    found = np.sort(q1[y])[::-1]
+    return (1 - found[max(round(recall * len(found)), 1) - 1]) / found[max(round(recall * len(found)), 1) - 1]
+
+
+@wrong("Two pixels with the same probability are two pixels: np.unique counts them once.")
+def equal_ones_counted_once(q1, y, recall):
+    found = np.unique(q1[y])[::-1]
+    q = found[int(np.ceil(recall * len(found))) - 1]
+    return (1 - q) / q

@@ -108,3 +108,9 @@ def exchanged(T_base_grasp, middle):
 def with_signs(T_base_grasp, middle):
     off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
     return off[1], off[0]
+
+
+@wrong("The middle is a point of the base frame: where is it, seen from the grasp's origin?")
+def middle_taken_as_it_is(T_base_grasp, middle):
+    x, y = T_base_grasp[:3, 0], T_base_grasp[:3, 1]
+    return 1000 * abs(middle @ y), 1000 * abs(middle @ x)

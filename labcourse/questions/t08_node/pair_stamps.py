@@ -192,3 +192,13 @@ def next_best(a, b, slop):
 def first_one_taken_for_none(a, b, slop):
     j = pair_stamps(a, b, slop)
     return np.where(j == 0, -1, j)
+
+
+@wrong("The first that asks is not always the nearest: a stamp of b belongs to the stamp of a that is nearest to it.")
+def the_nearest_or_nobody(a, b, slop):
+    partners = np.full(len(a), -1)
+    for i, stamp in enumerate(a):
+        k = int(np.abs(b - stamp).argmin()) if len(b) else 0
+        if len(b) and abs(b[k] - stamp) <= slop and k not in partners:
+            partners[i] = k
+    return partners

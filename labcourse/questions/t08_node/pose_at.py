@@ -259,3 +259,15 @@ def shares_of_the_turn_exchanged(*given, side):
 @wrong("Take the one of b and -b that is nearer to a. Does the sign of b's w tell which one that is?")
 def sign_of_w(*given):
     return with_turn(*given, lambda a, b, share: arc(a, b if b[3] >= 0 else -b, 1 - share, share))
+
+
+@wrong("You take abs of the product, so that the angle is the short way, but q still goes to b, not to -b.")
+def angle_turned_and_b_not(stamps, positions, quaternions, t):
+    if t < stamps[0] or t > stamps[-1]:
+        return np.full(3, np.nan), np.full(4, np.nan)
+    i = max(np.searchsorted(stamps, t), 1)
+    share = (t - stamps[i - 1]) / (stamps[i] - stamps[i - 1])
+    a, b = quaternions[i - 1], quaternions[i]
+    angle = np.arccos(min(1.0, abs(a @ b)))
+    q = a if angle == 0.0 else (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+    return (1 - share) * positions[i - 1] + share * positions[i], q

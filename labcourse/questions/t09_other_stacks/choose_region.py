@@ -168,3 +168,18 @@ def row_in_place_of_the_number(features, mean, covariance, allowed):
 @wrong("How far is a piece from the mean target? You never subtract the mean.")
 def distances_from_zero(features, mean, covariance, allowed):
     return choose_region(features, 0.0 * mean, covariance, allowed)
+
+
+@wrong("You choose first, and ask then whether it is allowed: a worse region that is allowed is never chosen.")
+def chosen_before_it_is_allowed(features, mean, covariance, allowed):
+    off = features - mean
+    k = int(np.argmin((off @ np.linalg.inv(covariance) * off).sum(axis=1)))
+    return k + 1 if allowed[k] else 0
+
+
+@wrong("1 / covariance divides number by number: the inverse matrix is another one.")
+def divided_number_by_number(features, mean, covariance, allowed):
+    off = features - mean
+    with np.errstate(all="ignore"):
+        squared = (off @ (1.0 / covariance) * off).sum(axis=1)
+    return int(np.where(allowed, squared, np.inf).argmin()) + 1 if allowed.any() else 0

@@ -172,3 +172,11 @@ def margin_of_the_other_engine(reference, other, tolerance):
 def pixels_counted(reference, other, tolerance):
     kept, changed, at_risk = engine_contract(reference, other, tolerance)
     return kept, changed * reference[0].size, at_risk * reference[0].size
+
+
+@wrong("Two classes may share the best score: then the second best is equal to it, and the gap is 0.")
+def a_tie_has_no_second(reference, other, tolerance):
+    kept, changed, _ = engine_contract(reference, other, tolerance)
+    best = reference.max(axis=0)
+    second = np.where(reference == best, -np.inf, reference).max(axis=0)
+    return kept, changed, np.mean(best - second <= 2 * tolerance)
