@@ -12,6 +12,7 @@ from labgrader.checker.comparison import Case
 from labgrader.checker.question import Question
 from labgrader.course import course
 
+FEWEST_WRONG = 2  # cases of a kind that have to be wrong: one may be wrong for any reason
 FEWEST_RIGHT = 2  # cases of the other kind that have to be right: fewer show nothing
 
 
@@ -24,7 +25,7 @@ def contrast(question: Question, cases: Sequence[Case], right: Sequence[bool]) -
     told = [set(facts(question, case.args)) for case in cases]
     wrong = [kinds for kinds, passed in zip(told, right, strict=True) if not passed]
     passed = [kinds for kinds, passed in zip(told, right, strict=True) if passed]
-    if not wrong:
+    if len(wrong) < FEWEST_WRONG:
         return ""
     common = [kind for kind in facts(question, cases[right.index(False)].args) if all(kind in other for other in wrong)]
     for kind in common:

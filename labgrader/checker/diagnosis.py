@@ -166,7 +166,7 @@ def found_in_the_program(
             says = f"Change one of the two marked places, not both. {says}"
         if finding.of_two and 0 <= finding.value < len(question.misconceptions):
             one = question.misconceptions[int(finding.value)].hint
-            says = f"Two things are wrong. One is this: {one} The other: {says[0].lower()}{says[1:]}"
+            says = f"Perhaps two things are wrong. One is this: {one} And is the marked part as it should be?"
         yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
 
 

@@ -253,8 +253,8 @@ TABLE = {
         "You put something of shape ({1}) into a place of shape ({2})."
     ),
     r"(?:Value|Index)Error: (?:shape mismatch|could not be broadcast|.*shape mismatch)": (
-        "Index arrays are taken together entry by entry, so that their shapes have to fit. Print both: which one has "
-        "fewer axes than the other, and what should stand there?"
+        "Index arrays are taken together entry by entry, so that their shapes have to fit: print them. Where each row "
+        "is meant with each column, one of them has an axis more, as in rows[:, None]."
     ),
     r"ValueError: need at least one array": "In this case there is nothing to stack or join: is a list empty?",
     r"ValueError: all the input array|ValueError: all input arrays": (

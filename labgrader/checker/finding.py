@@ -30,8 +30,8 @@ IDLE = {
 }
 # What is right in a wrong program, which is told where nothing is known of its mistake (`steps`).
 RIGHT = {
-    "reached": "The marked part is right: a right answer computes the same numbers on its way. What comes after it, or "
-    "is put together with it, is not.",
+    "reached": "The marked part gives numbers that a right answer has on its way, too. Look at what comes after it, "
+    "and at what it is put together with.",
 }
 # Kinds of repairs, and what is said of each: with the marked part written otherwise, every case is right. Of repairs
 # that change equally much, the kind that stands first here is told. A copy comes first, since nothing else explains
