@@ -20,6 +20,7 @@ from labgrader.checker.finding import IDLE, REPAIRS, RIGHT, WATCHES, Finding
 from labgrader.checker.messages import Marked, marked, said
 from labgrader.checker.question import Misconception, Property, Question
 from labgrader.checker.relations import View, related
+from labgrader.checker.repair import Listed, fingerprint
 
 ENDLESS = "A loop does not end, or has far too many turns: what changes in each turn, and when does it stop?"
 
@@ -141,6 +142,17 @@ def output_of(misconception: Misconception, args: tuple) -> object:
         return trusted(misconception.answer, args)
     except Exception as error:
         return Problem("exception", type(error).__name__)
+
+
+def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
+    """What the listed mistakes of a question give in each case; those that raise give nothing."""
+    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
+    for number, mistake in enumerate(question.misconceptions):
+        for found, case in zip(told, cases, strict=True):
+            output = output_of(mistake, case.args)
+            if not isinstance(output, Problem):
+                found.setdefault(fingerprint(output), set()).add(number)
+    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
 
 
 # ----------------------------------------------------------------------------------- the student's own program

@@ -16,12 +16,11 @@ from labgrader.checker.comparison import (
     plain,
     trusted,
 )
-from labgrader.checker.diagnosis import output_of
 from labgrader.checker.finding import write
 from labgrader.checker.idle import idle
 from labgrader.checker.instruments import readings
 from labgrader.checker.question import PUBLIC_SEED, Question
-from labgrader.checker.repair import Listed, fingerprint, repairs
+from labgrader.checker.repair import Listed, repairs
 
 MOST_REPAIRS = 4  # that are told of
 FRESH = 50  # cases of a kind, beside those that a check shows
@@ -83,17 +82,6 @@ def comparing_of(question: Question) -> tuple[dict, str]:
     fields = {name: getattr(question, name) for name in COMPARING}
     named = question.canonical.__name__ != "<lambda>"
     return fields, inspect.getsource(inspect.unwrap(question.canonical)) if named else ""
-
-
-def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
-    """What the listed mistakes of a question give in each case; those that raise give nothing."""
-    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
-    for number, mistake in enumerate(question.misconceptions):
-        for found, case in zip(told, cases, strict=True):
-            output = output_of(mistake, case.args)
-            if not isinstance(output, Problem):
-                found.setdefault(fingerprint(output), set()).add(number)
-    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
 
 
 def fresh_cases(question: Question, seed: int = PUBLIC_SEED) -> list[Case]:

@@ -42,7 +42,7 @@ MODULES += [f"labgrader/worker/{name}.py" for name in ("process", "fork_server")
 CHECKER = (
     "alarm ast_fingerprint cell comparison finding idle instruments live_program mutation program question recipes"
 )
-MODULES += [f"labgrader/checker/{name}.py" for name in (*CHECKER.split(), "repair", "repair_job", "syntax")]
+MODULES += [f"labgrader/checker/{name}.py" for name in (*CHECKER.split(), "repair", "repair_job", "steps", "syntax")]
 counter = itertools.count(os.getpid())
 
 

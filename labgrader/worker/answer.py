@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labgrader.checker.comparison import Case, Problem, alike, expected_cases
+from labgrader.checker.diagnosis import listed_in
 from labgrader.checker.finding import MOST_FINDINGS, Finding, read
 from labgrader.checker.judge import Verdict, verdict
 from labgrader.checker.program import Program
 from labgrader.checker.question import PUBLIC_SEED, Question
 from labgrader.checker.repair import Listed
-from labgrader.checker.repair_job import comparing_of, fresh_cases, listed_in, pairs
+from labgrader.checker.repair_job import comparing_of, fresh_cases, pairs
 from labgrader.checker.steps import MOST_CASES, MOST_NUMBERS, Values, values_of_a_right_answer
 from labgrader.course import course
 from labgrader.worker.channel import MOST_FOUND, Changed, Worker, WorkerLost
