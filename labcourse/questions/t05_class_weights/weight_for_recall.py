@@ -16,13 +16,15 @@ def _pixels(rng):
     """Draw probabilities of two overlapping classes, the second one rare, and a recall between two steps.
 
     The last pixel that must be found is at q with (1 - q) / q * q < 1 - q, in floats. Class 1 is more or less sure: it
-    needs weights below 1, above 1, or of many thousands.
+    needs weights below 1, above 1, or of many thousands. Some of its pixels are equally sure.
     """
     n, sure = int(rng.integers(7, 12)), rng.choice([1.0, -12.0])
     y = rng.permutation(np.arange(int(rng.integers(40, 60))) < n)
     must = int(rng.integers(2, n))
     while True:
         q1 = 1.0 / (1.0 + np.exp(-rng.normal(np.where(y, sure, -2.5), 1.0)))
+        alike = np.flatnonzero(y)[: int(rng.integers(1, 4))]
+        q1[alike] = q1[alike[0]]
         last = np.sort(q1[y])[-must]
         if (1.0 - last) / last * last < 1.0 - last:
             return q1, y, float((must - rng.uniform(0.3, 0.7)) / n)
