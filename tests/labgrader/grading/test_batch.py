@@ -519,4 +519,4 @@ def test_the_command_prints_a_table_and_says_by_its_status_what_to_look_at(cours
     for student in ("ben", "eve"):
         shutil.rmtree(course / "submitted" / student)
     done = runner.invoke(app, arguments)
-    assert done.exit_code == 0 and "1 students, 0 of them graded now" in done.stdout
+    assert done.exit_code == 0 and "1 student, 0 of them graded now" in done.stdout

@@ -12,15 +12,15 @@ import grading_course as kit
 import pytest
 import serving
 
-from labgrader.course import of_topic
+from labgrader.course import asked
 from labgrader.grading.gradebook import opened
 from labgrader.grading.nbgrader_plugins import SAYS
 from labgrader.grading.run import grade_course
 
 ROOT = Path(__file__).parents[3]
 TOPIC = "04_iou"
-TOTAL = float(sum(question.points for question in of_topic(TOPIC).values()))
-POINTS = {"ada": TOTAL, "ben": TOTAL - of_topic(TOPIC)["iou"].points}
+TOTAL = float(sum(question.points for question in asked(TOPIC).values()))
+POINTS = {"ada": TOTAL, "ben": TOTAL - asked(TOPIC)["iou"].points}
 
 
 @pytest.fixture(scope="module")
