@@ -122,7 +122,7 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
             remove_students(course, out, topic, gone)
         close_to_others(course, out)
         kept_out = keep_out_of_git(course)
-    late = {student: str(final.late) for student, final in finals.items() if final.late.days}
+    late = {name: f"{final.late}, so {final.score:g} in all" for name, final in finals.items() if final.late.days}
     known = {record.student for record in records} | roster.keys()
     files = {submission.student: submission.file for submission in read if submission.file}
     odd = strangers(deadline, known)

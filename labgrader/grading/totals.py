@@ -17,6 +17,7 @@ from labgrader.grading.policy import free_days, read_bonus, read_policy
 from labgrader.support import write_atomically
 
 NOT_FINAL = "Not final: a person has still to grade an answer, or to look at one"
+OFF = "That is taken off above."
 BEGIN, END = "<!-- what a person graded, and the total -->", "</body></html>\n"
 
 
@@ -59,7 +60,7 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             waits = bool(notebook.needs_manual_grade)
             begin = "So far" if waits else "All together"
             total = f"<h2>{begin}: {score:g} of {submission.max_score:g} points</h2>"
-            notes = [f"<p>{NOT_FINAL}.</p>" if waits else "", f"<p>Handed in {late}.</p>" if late.days else ""]
+            notes = [f"<p>{NOT_FINAL}.</p>" if waits else "", f"<p>Handed in {late}. {OFF}</p>" if late.days else ""]
             more = [f"<p>{points:g} points more for everybody: {escape(reason)}</p>" for points, reason in bonus]
             section = "\n".join(filter(None, [*sections, *more, total, *notes]))
             found[student] = Final(student, score, submission.max_score, waits, late, section)
