@@ -27,7 +27,7 @@ from labgrader.checker.question import Question
 from labgrader.course import course, find, of_topic
 from labgrader.notebook import LARGEST_NOTEBOOK, Unreadable, refuse_large, refuse_long
 from labgrader.worker import plain
-from labgrader.worker.answer import Answer, Budget, Limits, public_cases
+from labgrader.worker.answer import Answer, Budget, Limits, Start, public_cases
 from labgrader.worker.process import MOST_PRINTED
 
 LIMITS = Limits()  # the grader's, so that a tick here is a tick there
@@ -114,20 +114,22 @@ def judged(
     cut: Program,
     meanwhile: Callable[[Verdict, str], None] = lambda verdict, printed: None,
     budget: Budget | None = None,
+    start: Start = plain.fresh_worker,
 ) -> tuple[Verdict, str]:
     """Run a program on the public cases: the verdict, with what is found in a wrong one, and what it printed.
 
     meanwhile: called with both before the mistake is looked for, which takes a moment. budget: of a whole notebook.
+    start: gives a worker, with a sandbox or without.
     """
     if cut.refused and cut.late is None:
         return Verdict(Problem("refused", cut.refused), None, ""), ""
     if cut.refused:
-        return judged(question, cut.late, meanwhile, budget)
-    with Answer(question, cut, plain.fresh_worker, LIMITS, budget) as answer:
+        return judged(question, cut.late, meanwhile, budget, start)
+    with Answer(question, cut, start, LIMITS, budget) as answer:
         verdict, _ = answer.judged(public_cases(question))
         printed = answer.worker.printed()
         if not verdict.passed and cut.late is not None:
-            with Answer(question, cut.late, plain.fresh_worker, LIMITS, budget) as late:
+            with Answer(question, cut.late, start, LIMITS, budget) as late:
                 second, _ = late.judged(public_cases(question))
                 if second.passed:
                     return second, late.worker.printed()

@@ -1,9 +1,9 @@
 """`check LAB.ipynb`: a lab, as it is saved or on Colab's page, checked as the grader will, but on the public cases.
 
 The answers are cut out of the file (`labgrader.checker.program`), each runs in a worker of its own that has the
-packages of the grader and nothing of the kit, and other answers that one calls are the kit's where they are wrong. No
-sandbox is needed, since it is one's own notebook; a stranger's is for `grade`. What is ticked here is right with the
-grader.
+packages of the grader and nothing of the kit, and other answers that one calls are the kit's where they are wrong. In
+a notebook that is a plain process, since it is one's own; the command `check` has a sandbox where there is one. What is
+ticked here is right with the grader.
 """
 
 import json
@@ -24,15 +24,17 @@ from labgrader.grading.reading import released_by
 from labgrader.notebook import Unreadable, code_of, parse
 from labgrader.running import live_notebook, running_file
 from labgrader.support import counted
-from labgrader.worker.answer import Budget
+from labgrader.worker import plain
+from labgrader.worker.answer import Budget, Start
 
 
-def check_file(path: Path | str | None = None) -> bool:
+def check_file(path: Path | str | None = None, start: Start = plain.fresh_worker) -> bool:
     """Check every answer in a lab, print the results, and tell whether all are right.
 
     Of the texts that a person grades it says which are still empty; a lab of texts alone is right if none is.
     path: of a notebook file; if it is not given, the notebook that runs (`labgrader.running`). On Colab, which keeps
-    the notebook elsewhere, it is the one on the page. Raises ValueError if it is no lab of the course.
+    the notebook elsewhere, it is the one on the page. start: gives a worker, with a sandbox or without. Raises
+    ValueError if it is no lab of the course.
     """
     is_here = path is not None and Path(path).is_file()
     live = None if is_here else live_notebook()
@@ -50,7 +52,7 @@ def check_file(path: Path | str | None = None) -> bool:
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"path: expected a notebook, but {path} cannot be read as one") from error
     topic = topic_of(path, cells)
-    lab = CheckedLab(cells, of_topic(topic))
+    lab = CheckedLab(cells, of_topic(topic), start)
     order = [cell.grade_id for cell in cells if cell.grade_id in lab.questions]
     expected = [name for name in released_by(notebook)[1] or asked(topic) if name in lab.questions]
     names = list(dict.fromkeys([*order, *expected]))
@@ -106,6 +108,7 @@ class CheckedLab:
 
     cells: Sequence[Cell]
     questions: dict[str, Question]
+    start: Start = plain.fresh_worker
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     budget: Budget = field(default_factory=lambda: Budget(LIMITS))
 
@@ -125,7 +128,7 @@ class CheckedLab:
         if wrong:
             given = {other: self.questions[other].source for other in wrong}
             cut = program(self.cells, *asked, given)
-        return judged(question, cut, budget=self.budget)[0]
+        return judged(question, cut, budget=self.budget, start=self.start)[0]
 
 
 def not_saved(names: Sequence[str], cells: Sequence[Cell]) -> list[str]:

@@ -1,16 +1,28 @@
 """`labkit check`: what the grader will say of a saved lab."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 
-def check(lab: Annotated[Path, typer.Argument(help="A saved lab, your own notebook file.")]) -> None:
+def check(lab: Annotated[Path, typer.Argument(help="A saved lab, a notebook file.")]) -> None:
     """Check a saved lab as the grader will, on public cases; exit status 1 if an answer is not right.
 
-    It runs with your rights and without a sandbox: a stranger's notebook is for `labkit grade`.
+    Answers run in the grader's sandbox where there is one (Linux), else with your rights, which is said before: a
+    stranger's notebook is not for such a machine.
     """
-    from labgrader.file_check import check_file
+    from labgrader.file_check import LIMITS, check_file
+    from labgrader.worker import plain
 
-    raise typer.Exit(0 if check_file(lab) else 1)
+    try:
+        from labgrader.grading import sandbox
+
+        sandbox.probe(("numpy",), LIMITS)
+    except (ImportError, OSError, ValueError) as reason:
+        typer.echo(f"Checked WITHOUT a sandbox, with your rights: {reason}", err=True)
+        raise typer.Exit(0 if check_file(lab, plain.fresh_worker) else 1) from None
+    with closing(sandbox.servers):
+        passed = check_file(lab, sandbox.fresh_worker)
+    raise typer.Exit(0 if passed else 1)

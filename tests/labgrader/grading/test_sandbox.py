@@ -1,5 +1,6 @@
 """What a worker sees and may use, measured from inside; that it dies with the grader; that there is no way round it."""
 
+import json
 import os
 import pickle
 import signal
@@ -9,12 +10,13 @@ import textwrap
 import threading
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import grading_course as kit
 import numpy as np
 import pytest
 
-from labgrader.grading import sandbox, seccomp
+from labgrader.grading import bwrap, sandbox, seccomp
 from labgrader.grading.sandbox import Limits
 from labgrader.worker.channel import Worker, WorkerLost
 
@@ -420,3 +422,25 @@ def test_every_jump_of_the_filter_stays_in_it(machine):
 def test_an_unknown_machine_has_no_filter():
     with pytest.raises(ValueError, match="machine: expected x86_64 or aarch64"):
         seccomp.program("vax")
+
+
+LOOKS = """
+def iou(n):
+    import os
+
+    tp, all_of_it = np.diag(n), n.sum(axis=0) + n.sum(axis=1) - np.diag(n)
+    return n if os.path.exists({!r}) else np.where(all_of_it > 0, tp / np.maximum(all_of_it, 1), np.nan)
+"""
+
+
+@pytest.mark.parametrize("there", [True, False], ids=["sandbox", "none"])
+def test_a_saved_lab_is_checked_in_the_sandbox_or_said_to_be_without_one(there, labkit, tmp_path, capsys, monkeypatch):
+    """An answer that is right where it does not see this machine."""
+    if not there:
+        monkeypatch.setattr(bwrap, "executable", Mock(side_effect=ValueError("none is installed")))
+    lab, answers = tmp_path / "04_iou.ipynb", kit.right_answers("04_iou") | {"iou": LOOKS.format(str(tmp_path))}
+    lab.write_text(json.dumps(kit.lab_notebook("04_iou", answers)))
+    assert labkit("check", lab) == int(not there)
+    told = capsys.readouterr()
+    assert ("WITHOUT a sandbox, with your rights: none is installed" in told.err) is not there
+    assert ("\u2714 iou is right" in told.out) is there and "\u2714 confusion_matrix is right" in told.out
