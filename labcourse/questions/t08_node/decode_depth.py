@@ -108,8 +108,6 @@ def largest_for_a_hole(data, height, width, step, is_bigendian):
     return np.where(depth > 65.534, np.nan, depth)
 
 
-@wrong(
-    "Where is_bigendian is set, your numbers are still read as little-endian. (byteswap of single bytes does nothing.)"
-)
+@wrong("Big-endian numbers are read as little-endian here; and byteswap does nothing to single bytes.")
 def bytes_swapped_one_by_one(data, height, width, step, is_bigendian):
     return decode_depth(data, height, width, step, False)
