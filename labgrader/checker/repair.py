@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labgrader.checker.alarm import TimeIsUp, alarm, limited
-from labgrader.checker.comparison import quiet
+from labgrader.checker.comparison import parts, quiet
 from labgrader.checker.finding import REPAIRS, Finding
 from labgrader.checker.live_program import LiveProgram, defines
 from labgrader.checker.mutation import Mutation, mutations
@@ -186,7 +186,7 @@ def listed_mistake(search: Search, cases: Cases) -> int | None:
         numbers = given if numbers is None else numbers & given
         if not numbers:
             return None
-    return min(numbers, default=None) if numbers else None
+    return min(numbers) if numbers else None
 
 
 def rightness(search: Search, cases: Cases) -> float:
@@ -201,9 +201,8 @@ def fingerprint(output: object) -> bytes:
     >>> fingerprint([1, 0.1 + 0.2]) == fingerprint(np.array([1.0, 0.3]))
     True
     """
-    several = output if isinstance(output, tuple) else (output,)
     try:
-        arrays = [np.asarray(part).astype(float) for part in several]
+        arrays = [np.asarray(part).astype(float) for part in parts(output)]
     except (TypeError, ValueError):
         return b""
     return b"".join(bytes(str(a.shape), "ascii") + (np.round(a, 7) + 0.0).tobytes() for a in arrays)

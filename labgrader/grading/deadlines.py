@@ -23,6 +23,7 @@ from pathlib import Path
 
 from labgrader.grading.roster import keys_of
 from labgrader.grading.settings import fault_of_fields, read_blocks
+from labgrader.support import counted
 
 DAY_S = 86400.0
 
@@ -44,7 +45,7 @@ class Lateness:
             return ""
         guessed = ", as its platform marks it late and does not say by how much" if self.guessed else ""
         free = f", {self.free} of the free days" if self.free else ""
-        return f"{self.days} day{'s' * (self.days > 1)} late{free}, {self.percent:g} % less{guessed}"
+        return f"{counted(self.days, 'day')} late{free}, {self.percent:g} % less{guessed}"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from labgrader.grading.roster import FILE as ROSTER
 from labgrader.grading.roster import keys_of, person_of, plain, read_roster
 from labgrader.grading.settings import FILE as SETTINGS
 from labgrader.grading.settings import read_blocks
-from labgrader.support import PRIVATE, write_atomically
+from labgrader.support import PRIVATE, counted, write_atomically
 
 EXTENSION = re.compile(r"(?ms)^[ \t]*\[\[[ \t]*extension[ \t]*\]\].*?(?=^[ \t]*\[|\Z)")
 STEPS = ("submitted", "autograded", "feedback")
@@ -198,7 +198,7 @@ def from_settings(course: Path, keys: set[str]) -> list[str]:
     with suppress(tomllib.TOMLDecodeError):
         if {table: [], **tomllib.loads(edited)} == wanted:
             write_atomically(path, edited.encode())
-            return [f"removed {len(theirs)} extension{'s' * (len(theirs) > 1)} from {path}"]
+            return [f"removed {counted(len(theirs), 'extension')} from {path}"]
     return [f"still in {where}: delete it" for where, _ in theirs]
 
 

@@ -101,7 +101,7 @@ class Answer:
     """An answer to a question as a program, in a worker that has run nothing before; a context manager.
 
     budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took.
-    wrong: numbers of the cases, judged last, that a step is sought in.
+    worded: the outputs that were judged last, none where they could not be.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Answer:
         self.question, self.program, self.limits = question, program, limits
         self.budget = Budget(limits) if budget is None else budget
         self.name, self.seconds, self.used_s = program.name or question.function, self.budget.for_one, 0.0
-        self.starting, self.wrong = start(packages_of(question, program), limits), []
+        self.starting, self.worded = start(packages_of(question, program), limits), []
 
     def __enter__(self) -> "Answer":
         self.worker = self.starting.__enter__()
@@ -171,7 +171,7 @@ class Answer:
             return Verdict(worded[0], None, "", outputs=worded), outputs
         try:
             judged = verdict_on(self.question, cases, worded)
-            self.wrong = wrong_and_small(self.question, cases, worded)
+            self.worded = worded
             return replace(judged, pieces=self.program.pieces), outputs
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
@@ -189,7 +189,8 @@ class Answer:
                     reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S, MOST_FOUND)
                 found += read(reply, pieces) if isinstance(reply, str) else []
             if not found:
-                cases = [(public_cases(question)[k].args, right_steps(question, k)) for k in self.wrong[:MOST_CASES]]
+                wrong = wrong_and_small(question, public_cases(question), self.worded)[:MOST_CASES]
+                cases = [(public_cases(question)[k].args, right_steps(question, k)) for k in wrong]
                 reply = self.worker.ask(("steps", pieces, self.name, cases), LOOK_S, MOST_FOUND)
                 found += read(reply, pieces) if isinstance(reply, str) else []
         return found[:MOST_FINDINGS]
@@ -207,9 +208,8 @@ class Answer:
 
 def wrong_and_small(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[int]:
     """The numbers of wrong cases that are not large, those by hand last."""
-    wrong = [
-        k for k, (case, got) in enumerate(zip(cases, outputs, strict=True)) if not alike(question, case.expected, got)
-    ]
+    told = enumerate(zip(cases, outputs, strict=False))
+    wrong = [k for k, (case, got) in told if not alike(question, case.expected, got)]
     return [k for k in reversed(wrong) if sum(map(np.size, cases[k].args)) <= MOST_NUMBERS]
 
 

@@ -146,7 +146,6 @@ def test_a_command_from_outside_its_folder_takes_its_settings(course, tmp_path_f
     """With the settings of the course that came with the package there would be no topic of that name."""
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    environment.pop("LABGRADER_COURSE", None)
     command = [sys.executable, "-m", "labcli.cli", *words, "--course", str(course)]
     done = subprocess.run(command, cwd=elsewhere, env=environment, capture_output=True, text=True, timeout=300)
     told = done.stdout + done.stderr

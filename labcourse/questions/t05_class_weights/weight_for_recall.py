@@ -125,11 +125,11 @@ def weight_for_precision(q1, y, recall):
 @wrong("0.4 of three pixels are 1.2 pixels: is the nearest whole number, one, at least a share of 0.4?")
 def rounded_to_the_nearest(q1, y, recall):
     found = np.sort(q1[y])[::-1]
-    return (1 - found[max(round(recall * len(found)), 1) - 1]) / found[max(round(recall * len(found)), 1) - 1]
+    last = found[max(round(recall * len(found)), 1) - 1]
+    return (1 - last) / last
 
 
 @wrong("Two pixels with the same probability are two pixels: np.unique counts them once.")
 def equal_ones_counted_once(q1, y, recall):
-    found = np.unique(q1[y])[::-1]
-    q = found[int(np.ceil(recall * len(found))) - 1]
-    return (1 - q) / q
+    once = np.unique(q1[y])
+    return weight_for_recall(once, np.ones(len(once), bool), recall)

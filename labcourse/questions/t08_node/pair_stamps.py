@@ -91,12 +91,15 @@ def one_partner_for_two(a, b, slop):
     return np.concatenate([pair_stamps(alone, b, slop) for alone in a[:, None]])
 
 
-@wrong("The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?")
-def first_come_first_served(a, b, slop):
+@wrong(
+    "The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?",
+    next_best=(True, False),
+)
+def first_come_first_served(a, b, slop, next_best):
     j, free = np.full(len(a), -1), np.ones(len(b), bool)
     for i in range(len(a)):
-        apart = np.where(free, np.abs(b - a[i]), FAR)
-        if free.any() and apart.min() <= slop:
+        apart = np.where(free | (not next_best), np.abs(b - a[i]), FAR)
+        if free.any() and apart.min() <= slop and free[apart.argmin()]:
             j[i] = apart.argmin()
             free[j[i]] = False
     return j
@@ -192,13 +195,3 @@ def next_best(a, b, slop):
 def first_one_taken_for_none(a, b, slop):
     j = pair_stamps(a, b, slop)
     return np.where(j == 0, -1, j)
-
-
-@wrong("The first that asks is not always the nearest: a stamp of b belongs to the stamp of a that is nearest to it.")
-def the_nearest_or_nobody(a, b, slop):
-    partners = np.full(len(a), -1)
-    for i, stamp in enumerate(a):
-        k = int(np.abs(b - stamp).argmin()) if len(b) else 0
-        if len(b) and abs(b[k] - stamp) <= slop and k not in partners:
-            partners[i] = k
-    return partners

@@ -215,10 +215,14 @@ def shares_exchanged(stamps, positions, quaternions, t, side):
     return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
 
 
-@wrong("The angle is that of the shorter way, but the sum still holds the other b: negate b, too.")
-def only_the_angle_made_shorter(*given):
+@wrong(
+    "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.", smallest=(1e-6, 0.0)
+)
+def only_the_angle_made_shorter(*given, smallest):
     def turn(a, b, share):
-        angle = max(np.arccos(min(abs(a @ b), 1.0)), 1e-6)
+        angle = max(np.arccos(min(abs(a @ b), 1.0)), smallest)
+        if angle == 0.0:
+            return a
         return (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
 
     return with_turn(*given, turn)
@@ -259,15 +263,3 @@ def shares_of_the_turn_exchanged(*given, side):
 @wrong("Take the one of b and -b that is nearer to a. Does the sign of b's w tell which one that is?")
 def sign_of_w(*given):
     return with_turn(*given, lambda a, b, share: arc(a, b if b[3] >= 0 else -b, 1 - share, share))
-
-
-@wrong("You take abs of the product, so that the angle is the short way, but q still goes to b, not to -b.")
-def angle_turned_and_b_not(stamps, positions, quaternions, t):
-    if t < stamps[0] or t > stamps[-1]:
-        return np.full(3, np.nan), np.full(4, np.nan)
-    i = max(np.searchsorted(stamps, t), 1)
-    share = (t - stamps[i - 1]) / (stamps[i] - stamps[i - 1])
-    a, b = quaternions[i - 1], quaternions[i]
-    angle = np.arccos(min(1.0, abs(a @ b)))
-    q = a if angle == 0.0 else (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
-    return (1 - share) * positions[i - 1] + share * positions[i], q
