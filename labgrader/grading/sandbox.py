@@ -18,6 +18,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -32,6 +33,7 @@ START_SERVER = START + "from labgrader.worker.fork_server import main; main(opti
 SITE, KIT = "/packages", "/kit"  # where a worker finds packages, and its own files
 ENVIRONMENT = plain.ENVIRONMENT | {"HOME": "/tmp", "TMPDIR": "/tmp"}
 LOADERS = ("/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1")
+PAUSES_S = (0.2, 1.0, 5.0)  # before a worker that did not start is started again
 FIRST_UID, UIDS, UIDS_OF_ONE = 61184, 4000, 50  # of systemd's range for short-lived users: never a person's
 NO_SANDBOX = "graded WITHOUT a sandbox: a submission could read and change anything here, grades and this file included"
 CREDENTIALS = struct.Struct("3i")  # of a process: its number, user and group
@@ -195,17 +197,24 @@ def fresh_worker(packages: Sequence[str], limits: Limits, unsafe: bool = False) 
 
 
 def greeted(packages: Sequence[str], limits: Limits) -> tuple[Server, Worker]:
-    """A server with a child that is ready; a server that ended while it was idle is replaced, which costs nobody."""
+    """A server with a child that is ready. A server that ended while it was idle is replaced, which costs nobody.
+
+    Nor does it cost an answer, of which nothing has run, that the machine can start no child for a moment: it is tried
+    again. Raises ValueError if none starts then.
+    """
+    pauses = iter(PAUSES_S)
     while True:
         server = servers.take(packages, limits)
         is_new, started = not server.forked, server.fork()
         try:
             started.greet(limits.start_s)
             return server, started
-        except WorkerLost:
+        except WorkerLost as lost:
             server.close()
+            if is_new and (pause := next(pauses, None)) is None:
+                raise ValueError(f"sandbox: a worker with {', '.join(packages)} does not start: {lost}") from None
             if is_new:
-                raise
+                time.sleep(pause)
 
 
 def probe(packages: Sequence[str], limits: Limits) -> None:

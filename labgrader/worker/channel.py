@@ -110,8 +110,13 @@ class Worker:
         return programs
 
     def greet(self, limit_s: float) -> None:
-        """Wait until the worker has loaded its packages; no student's code has run by then."""
-        self.exchange(b"", limit_s)
+        """Wait until the worker has loaded its packages; no student's code has run by then.
+
+        Raises WorkerLost if it has ended, and says why where it says so itself.
+        """
+        said = self.exchange(b"", limit_s, MOST_MESSAGE)
+        if isinstance(said, Text):
+            raise WorkerLost(Problem("ended", said))
 
     def exchange(self, data: bytes, limit_s: float, text: int = 0) -> object:
         """Write, then read one reply. The limit holds for both: a pipe that nobody reads gets full."""

@@ -12,7 +12,7 @@ import signal
 import socket
 import struct
 
-from labgrader.worker.process import limit, received, serve, without_standard_streams
+from labgrader.worker.process import limit, received, send, serve, without_standard_streams
 
 
 def main(options: dict) -> None:
@@ -29,10 +29,14 @@ def main(options: dict) -> None:
         if child == 0:
             control.send(b"c")  # comes with this process's number as the grader sees it
             control.close()
-            limit(options)
-            lock_in(options)
-            without_standard_streams()
             with os.fdopen(pipes[0], "rb") as requests, os.fdopen(pipes[1], "wb", buffering=0) as replies:
+                try:
+                    limit(options)
+                    lock_in(options)
+                    without_standard_streams()
+                except Exception as error:
+                    send(replies, b"J" + repr(error).encode())  # nothing of a student has run by now
+                    os._exit(1)
                 serve(received(requests), replies)
             os._exit(0)
         for pipe in pipes:

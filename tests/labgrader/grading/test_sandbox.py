@@ -1,5 +1,7 @@
 """What a worker sees and may use, measured from inside; that it dies with the grader; that there is no way round it."""
 
+import contextlib
+import itertools
 import json
 import os
 import pickle
@@ -333,6 +335,21 @@ def test_a_server_that_ended_costs_nobody_and_one_that_an_answer_ends_costs_that
             started.ask(("run", "f", "import time; time.sleep(20)"), PATIENCE)  # or it may be done before it is ended
     with sandbox.fresh_worker(("numpy",), LIMITS) as started:
         assert told(started, "return 2") == 2
+
+
+@pytest.mark.parametrize("failing", [1, 99])
+def test_a_machine_that_can_start_no_worker_for_a_moment_costs_nobody_and_else_it_is_said(failing, monkeypatch):
+    sandbox.servers.close()
+    whole = sandbox.seccomp.program()
+    programs = itertools.chain(itertools.repeat(b"", failing), itertools.repeat(whole))
+    monkeypatch.setattr(sandbox.seccomp, "program", lambda: next(programs))
+    monkeypatch.setattr(sandbox, "PAUSES_S", (0.0, 0.0))
+    with contextlib.ExitStack() as stack:
+        if failing > 2:
+            stack.enter_context(pytest.raises(ValueError, match="does not start: .*filter of system calls cannot be"))
+        started = stack.enter_context(sandbox.fresh_worker(("numpy",), LIMITS))
+        assert told(started, "return 2") == 2
+    sandbox.servers.close()
 
 
 def test_closing_ends_everything():
