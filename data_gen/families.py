@@ -1,8 +1,8 @@
-"""What can stand on the table: families of targets and obstacles, each a recipe from random numbers to an ObjectSpec.
+"""What can stand on the table: families of targets and obstacles, each a recipe from random numbers to a Body.
 
 A family is recognised by its shape alone: colours are drawn from one distribution for all. No family is both target
 and obstacle. Each recipe takes a generator and `hard`, which asks for proportions, poses or models that training
-never sees.
+never sees; its lengths are metres. Each family has a recipe of its name in `wide`, too.
 """
 
 from collections.abc import Callable, Sequence

@@ -35,13 +35,13 @@ def require(name: str, fits, expected: str, got) -> None:
         raise ValueError(f"{name}: expected {expected}, got {got}")
 
 
-def counted(number: int, thing: str) -> str:
+def counted(number: int | float, thing: str) -> str:
     """A number of things in words.
 
-    >>> counted(1, "student"), counted(0, "text")
-    ('1 student', '0 texts')
+    >>> counted(1, "student"), counted(1.5, "point")
+    ('1 student', '1.5 points')
     """
-    return f"{number} {thing}{'s' * (number != 1)}"
+    return f"{number if number % 1 else int(number)} {thing}{'s' * (number != 1)}"
 
 
 @contextmanager

@@ -66,8 +66,8 @@ FLAT = 0.3  # share of the points near the table's height that lie on it, at lea
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
-    """The table as depth shows it.
+class NearTable:
+    """What depth shows near the table's stated height, and the table in it.
 
     P: the points near its stated height, (N, 3); plane: the likeliest table, or the largest plane among them. table_z:
     the stated height. rise: how far the plane lies over that; away: its median depth; metres. labels: those of the
@@ -118,7 +118,7 @@ def _table(frame: RGBDFrame, perception) -> list[str]:
     rise = float(P[plane.inliers, 2].mean()) - table_z
     away = float(np.median(frame.depth[thinned].reshape(-1)[near][plane.inliers]))
     labels = None if perception is None else perception.labels[thinned].reshape(-1)[near][plane.inliers]
-    table = Table(P, plane, table_z, rise, away, labels)
+    table = NearTable(P, plane, table_z, rise, away, labels)
     wrong = [_off_the_pose(plane.normal, rise, table_z), _too_near_or_far(table)]
     wrong += [_not_the_likeliest(chosen, tables)]
     if any(wrong) or perception is None or perception.probabilities is None:
@@ -176,7 +176,7 @@ def _off_the_pose(normal: Float[np.ndarray, "3"], rise: float, table_z: float) -
 NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see small things
 
 
-def _too_near_or_far(table: Table) -> str:
+def _too_near_or_far(table: NearTable) -> str:
     if NEAREST < table.away < FAR:
         return ""
     return f"the table is {table.away:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
@@ -190,7 +190,7 @@ USUAL = {  # from least to most, of 200 scenes of the kinds train, any, test and
 }
 
 
-def _unlike_training(frame: RGBDFrame, table: Table) -> str:
+def _unlike_training(frame: RGBDFrame, table: NearTable) -> str:
     """Where little of the table is called surface: say which of the picture's facts the training's pictures lack."""
     surface = np.mean(table.labels == SURFACE)
     if surface >= 0.5:

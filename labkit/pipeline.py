@@ -167,7 +167,7 @@ class Pipeline:
         or `find_objects`, says which pixels it has; of a network of classes alone those that hang together. Raises
         ValueError for a pixel outside the picture.
         """
-        frame, seconds = self._on_table(frame), {}
+        frame, seconds = self._with_table_z(frame), {}
         at = None if at is None else _check_pixel("at", at, frame.size)
         seen = self._perceive(frame, seconds, at is not None)
         return self._locate(frame, seen, seconds, at)
@@ -178,7 +178,7 @@ class Pipeline:
         `find_objects` has no probabilities, and its labels are the target's or 0. Raises ValueError without it and a
         model, or for a model that gives no probabilities or has no such class as the target.
         """
-        seen = self._perceive(self._on_table(frame), {})
+        seen = self._perceive(self._with_table_z(frame), {})
         return seen.labels, seen.probabilities
 
     def locate(
@@ -202,9 +202,9 @@ class Pipeline:
         if instances is not None:
             instances = _check_instances_of(frame, instances)
         at = None if at is None else _check_pixel("at", at, frame.size)
-        return self._locate(self._on_table(frame), Labelled(labels, probabilities, instances), {}, at)
+        return self._locate(self._with_table_z(frame), Labelled(labels, probabilities, instances), {}, at)
 
-    def _on_table(self, frame: RGBDFrame) -> RGBDFrame:
+    def _with_table_z(self, frame: RGBDFrame) -> RGBDFrame:
         """The frame with the height of the table that counts: this pipeline's, or else its own, or else 0."""
         known = frame.table_z if self.table_z is None else self.table_z
         return replace(frame, table_z=known or 0.0)
@@ -235,7 +235,7 @@ class Pipeline:
                 probabilities = self._with_target(self.model(frame, self.mirror))
         with timed(seconds, "labels"):
             labels = most_probable(probabilities)
-        if self.crf:
+        if self.crf:  # it takes the probabilities, and its labels stand in the place of those above
             with timed(seconds, "crf"):
                 labels = self.crf(probabilities, frame)
         return Labelled(_check_labels_of(frame, labels), probabilities, instances, certainty)
@@ -249,7 +249,7 @@ class Pipeline:
             pixels, clouds, scene = self.targets(seen.labels, points, frame.table_z, seen.instances)
             tables, left_out = (), ()
             if self.only_on_table and at is None:
-                tables, kept, left_out = _on_the_table(points, pixels, frame)
+                tables, kept, left_out = _those_on_the_table(points, pixels, frame)
                 pixels, clouds = [pixels[i] for i in kept], [clouds[i] for i in kept]
         with timed(seconds, "grasps"):
             plan = self.plan(clouds, scene, frame.table_z, frame.T_base_cam[:3, 3])
@@ -329,7 +329,10 @@ class Pipeline:
         table_z: float,
         instances: Integer[np.ndarray, "H W"] | None = None,
     ) -> tuple[list[Integer[np.ndarray, "_"]], list[Float[np.ndarray, "_ 3"]], Float[np.ndarray, "M 3"]]:
-        """Find each target's pixels (indices v * W + u) and points, and all points of the workspace."""
+        """Find each target's pixels (indices v * W + u) and points, and all points of the workspace.
+
+        points: of the base frame, metres, NaN without depth. instances: as in `locate`.
+        """
         points = points.reshape(-1, 3)
         low, high = (self.workspace.T + np.outer([1.0, 1.0], [0.0, 0.0, table_z])).astype(points.dtype)
         inside = [(x > a) & (x < b) for x, a, b in zip(points.T, low, high, strict=True)]
@@ -375,7 +378,7 @@ def tells_things(model) -> bool:
     return bool(getattr(open_engine(model), "things", False))
 
 
-def _on_the_table(points, pixels, frame: RGBDFrame) -> tuple[tuple[Table, ...], list[int], tuple[str, ...]]:
+def _those_on_the_table(points, pixels, frame: RGBDFrame) -> tuple[tuple[Table, ...], list[int], tuple[str, ...]]:
     """The planes that were found, which things stand on the table, and what is said of the others."""
     tables = find_tables(points, frame.T_base_cam[:3, 3], up=(0.0, 0.0, 1.0))
     table = table_at(tables, frame.table_z)

@@ -17,7 +17,10 @@ def grades(
         "."
     ),
 ) -> None:
-    """Write a table of grades: for Moodle or Canvas as they import it, with a zip of feedback that they hand out."""
+    """Write a table of grades: for Moodle or Canvas as they import it, with a zip of feedback that they hand out.
+
+    Exit status 1 if somebody is still to be graded by hand; it says in what.
+    """
     from labgrader.grading.course_page import FOLDER, write_course
     from labgrader.grading.gradescope import write_autograder
     from labgrader.grading.platforms import write_grades

@@ -61,13 +61,15 @@ class Change:
 def change_of(lab: str, reason: str, **kinds: str | None) -> Change | None:
     """The change that a command asks for, None if for none; kinds: questions, as "iou=3" for points.
 
-    Raises ValueError for several at a time.
+    Raises ValueError for several at a time, and for one without a reason.
     """
     asked = {kind: question for kind, question in kinds.items() if question is not None}
     if not asked:
         return None
-    if len(asked) > 1 or not reason.strip():
-        raise ValueError(f"expected one of --{', --'.join(KINDS)} at a time, and a --reason")
+    if len(asked) > 1:
+        raise ValueError(f"expected one of --{', --'.join(KINDS)} at a time, got --{' and --'.join(asked)}")
+    if not reason.strip():
+        raise ValueError("reason: expected --reason, which students read beside the points, got none")
     ((kind, question),) = asked.items()
     question, _, number = question.partition("=") if kind == "points" else (question, "", "0")
     if not re.fullmatch(r"\d+(\.\d+)?", number):
@@ -117,7 +119,8 @@ def fault_of(data: dict, lab: Lab) -> str:
         return ""
     in_parts = [name for name, question in of_topic(lab.topic).items() if question.outputs]
     if "partial" in data and data["question"] not in in_parts:
-        return f"partial: of {lab.topic} it is possible for {', '.join(in_parts) or 'no question'}"
+        several = ", ".join(in_parts) or f"{lab.topic} has none"
+        return f"partial: expected a question of several outputs ({several}), got {data['question']}"
     if data["question"] in lab.points:
         return ""
     if data["question"] not in lab.written:

@@ -240,7 +240,7 @@ def warning_of(records: Sequence[Record]) -> str:
 def terminal_table(lab: Lab, records: Sequence[Record], late: Mapping[str, str]) -> str:
     """A line per student: points by question, all together, how late, and what an instructor should look at."""
     names = list(lab.points)
-    rows = [["student", *names, "points", ""]]
+    rows = [["student", *names, f"points of {sum(lab.points.values()):g}", ""]]
     for record in records:
         earned = {result.question: f"{result.points:g}" for result in record.results}
         flags = [f"{result.question}: {result.flag}" for result in record.results if result.flag]

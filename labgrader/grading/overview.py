@@ -53,7 +53,7 @@ class Standing:
 
 
 def group_of(result: Result) -> str:
-    """The name of the group that a result belongs to, "" for a right answer and for none: iou-3f09c2."""
+    """The name of the group that a result belongs to, "" for a right answer and for none: iou-2a3091."""
     key = result.behaviour or result.hint or (result.says if result.kind in NOT_RUN else "")
     return f"{result.question}-{hashlib.sha256(key.encode()).hexdigest()[:6]}" if key and not result.right else ""
 

@@ -30,7 +30,7 @@ CANVAS = ("SIS User ID", "SIS Login ID", "Section")  # columns beside name and I
 
 @dataclass(frozen=True)
 class Written:
-    """Files for a platform. waiting: who is still to be graded by hand; without: who has no grade, and why.
+    """Files for a platform. waiting: who is to be graded by hand yet, and in what; without: who has no grade, and why.
 
     maximum: what all is worth; released: what it was worth in the lab that students got.
     """
@@ -83,7 +83,7 @@ def write_grades(course: Path, topic: str, platform: str) -> Written:
     here = {key for student in pages for key in keys_of(student)}
     without = dict.fromkeys(pages.keys() - finals.keys(), "not graded")
     without |= {person.name or person.id: "handed in nothing" for person in roster.values() if person.id not in here}
-    waiting = [student for student, final in finals.items() if final.waits]
+    waiting = [f"{student} ({', '.join(final.waits)})" for student, final in finals.items() if final.waits]
     return Written(list(files), waiting, without, maximum_of(now), maximum_of(lab))
 
 

@@ -14,7 +14,7 @@ from labgrader.grading.collect import marked_late
 from labgrader.grading.deadlines import Deadline, Lateness
 from labgrader.grading.gradebook import opened
 from labgrader.grading.policy import free_days, read_bonus, read_policy
-from labgrader.support import write_atomically
+from labgrader.support import counted, write_atomically
 
 NOT_FINAL = "Not final: a person has still to grade an answer, or to look at one"
 OFF = "That is taken off above."
@@ -23,12 +23,12 @@ BEGIN, END = "<!-- what a person graded, and the total -->", "</body></html>\n"
 
 @dataclass(frozen=True)
 class Final:
-    """A student's grade. waits: whether something is still to be graded by hand; section: the page's end, HTML."""
+    """A student's grade. waits: the questions that a person has still to grade; section: the page's end, HTML."""
 
     student: str
     score: float
     max_score: float
-    waits: bool
+    waits: tuple[str, ...]
     late: Lateness
     section: str
 
@@ -57,11 +57,11 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             score = submission.score - notebook.late_submission_penalty + sum(points for points, _ in bonus)
             grades = sorted(notebook.grades, key=lambda grade: grade.name)
             sections = [section_by_hand(grade, said[grade.name.removeprefix("check_")]) for grade in grades]
-            waits = bool(notebook.needs_manual_grade)
+            waits = tuple(grade.name.removeprefix("check_") for grade in grades if grade.needs_manual_grade)
             begin = "So far" if waits else "All together"
             total = f"<h2>{begin}: {score:g} of {submission.max_score:g} points</h2>"
             notes = [f"<p>{NOT_FINAL}.</p>" if waits else "", f"<p>Handed in {late}. {OFF}</p>" if late.days else ""]
-            more = [f"<p>{points:g} points more for everybody: {escape(reason)}</p>" for points, reason in bonus]
+            more = [f"<p>{counted(extra, 'point')} more for everybody: {escape(reason)}</p>" for extra, reason in bonus]
             section = "\n".join(filter(None, [*sections, *more, total, *notes]))
             found[student] = Final(student, score, submission.max_score, waits, late, section)
         gradebook.db.commit()

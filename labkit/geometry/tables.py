@@ -75,8 +75,9 @@ def find_tables(
 ) -> list[Table]:
     """Find the planes that could be the table, the likeliest first; none if there is no plane.
 
-    points: of a picture's pixels, NaN without depth. viewer: where the camera stands. up: what is up, if it is known;
-    planes that lean against it by more than 26 degrees are left out then. The planes come from RANSAC, one after the
+    points: of a picture's pixels, metres, NaN without depth, in the camera's frame or the base frame. viewer: where the
+    camera stands in that frame. up: what is up in it, if it is known; planes that lean against it by more than 26
+    degrees are left out then. The planes come from RANSAC, one after the
     other. First come those within reach of the camera, and of these the one of most `worth`: what stands on it lies
     over its outline by 12 mm to 35 cm, and over no other such plane in between. So a floor that fills most of the
     picture comes after the low table with the things on it. Topic 06.

@@ -99,7 +99,8 @@ class Grasp:
 
     def __repr__(self) -> str:
         x, y, z = self.T_base_grasp[:3, 3]
-        yaw = np.degrees(np.arctan2(*self.T_base_grasp[1::-1, 1])) % 180.0
+        closing = self.T_base_grasp[:3, 1]
+        yaw = np.degrees(np.arctan2(closing[1], closing[0])) % 180.0
         return (
             f"Grasp(at ({x:.3f}, {y:.3f}, {z:.3f}), closing at {yaw:.0f} degrees, {1000.0 * self.width:.0f} mm open, "
             f"score {self.score:.2f})"
@@ -180,8 +181,9 @@ def top_down_grasp(
 ) -> Grasp:
     """Give the best grasp of one cloud; where the planner finds none, the one of its principal axis, with score 0.
 
-    scene: what else is there, default nothing. table_z: default the cloud's lowest point. The other arguments are those
-    of `plan_grasps`. Raises ValueError for an empty cloud, which has no centroid. Topic 07.
+    cloud, scene: points of the base frame, metres; scene: what else is there, default nothing. table_z: default the
+    cloud's lowest point. The other arguments are those of `plan_grasps`. Raises ValueError for an empty cloud, which
+    has no centroid. Topic 07.
 
     >>> stick = np.array([[0.5, 0.001 * i, 0.05] for i in range(100)])
     >>> T = top_down_grasp(stick, table_z=0.03).T_base_grasp
@@ -200,8 +202,9 @@ def principal_axis_grasp(
 ) -> Grasp:
     """Grasp a cloud at its centroid, closing across the longer of its principal directions seen from above.
 
-    The jaws start fully open; the tips end as low as palm and table (if its height is given) let them. This grasp takes
-    no account of what stands in the way, so its score is 0. Raises ValueError for an empty cloud. Topic 07.
+    Metres, base frame. The jaws start fully open; the tips end as low as palm and table (if its height is given) let
+    them. This grasp takes no account of what stands in the way, so its score is 0. Raises ValueError for an empty
+    cloud. Topic 07.
     """
     cloud = _cloud("cloud", cloud)
     mu, _ = centroid_and_covariance(cloud)

@@ -164,7 +164,7 @@ class Engine(ABC):
         return view, self.takes.build(picture if view is None else view.frame)
 
     def _probabilities(self, view, runs: Sequence[Float32[np.ndarray, "C h w"]]) -> Float32[np.ndarray, "H W C"]:
-        """The mean of the class probabilities of several runs, at the picture's own pixels."""
+        """The class probabilities of one run, or the mean of two runs', at the picture's own pixels."""
         p = _softmax(self._back(view, runs[0]))
         for z in runs[1:]:
             p = 0.5 * (p + _softmax(self._back(view, z)))
@@ -184,7 +184,7 @@ class Engine(ABC):
     ) -> Float32[np.ndarray, "N C H W"]:
         """Run the network on arrays of any height and width: pad them by repeating their border, crop the logits.
 
-        run: `forward` for all that it gives, if it is not `classes`, for logits alone.
+        run: `classes`, the default, gives logits alone; `forward` also what the network says of things.
         """
         height, width = arrays[0].shape[1:3]
         down, right = (self.padded_side(side) - side for side in (height, width))

@@ -137,7 +137,8 @@ def plan_transit(
 ) -> tuple[np.ndarray, ...] | str:
     """Joint paths from q_from to q_to that touch nothing: straight, or around by one or two raised waypoints.
 
-    Gives the legs, at whose ends the arm stands still, or what is in the way in words.
+    finger: how far each finger is from the middle, metres; points: of the base frame. Gives the legs, at whose ends the
+    arm stands still, or what is in the way in words.
     """
     blocked = None
     for waypoints in _detours(q_from, q_to):

@@ -203,7 +203,10 @@ GOOD = '[[change]]\nlab = "04_iou"\nquestion = "iou"\ndrop = true\ndate = 2026-1
             "course.toml, [[change]] number 1: expected lab, question, date, reason, everybody",
         ),
         (GOOD.replace("drop", "everybody = true\ndrop"), "number 1: expected one of everybody = true, drop = true"),
-        (GOOD.replace("drop", "partial"), "number 1: partial: of 04_iou it is possible for no question"),
+        (
+            GOOD.replace("drop", "partial"),
+            "number 1: partial: expected a question of several outputs (04_iou has none), got iou",
+        ),
         (GOOD.replace("drop = true", "points = -1"), "number 1: expected points, a number that is not negative"),
     ],
 )
@@ -218,7 +221,8 @@ def test_a_file_that_a_person_broke_stops_grading_with_its_place(course, text, s
     "options, says",
     [
         (("--drop", "oiu", "--reason", "unfair"), f"question: expected one of {', '.join(POINTS)}"),
-        (("--drop", "iou"), "and a --reason"),
+        (("--drop", "iou"), "reason: expected --reason"),
+        (("--drop", "iou", "--everybody", "iou", "--reason", "x"), "at a time, got --everybody and --drop"),
         (("--points", "iou", "--reason", "unfair"), "points: expected QUESTION=NUMBER"),
         (("--points", "explain=1", "--reason", "short"), "points: a person gives those of an answer in words"),
         (("--undo", "iou"), "undo: iou of 04_iou: there is no change to it"),

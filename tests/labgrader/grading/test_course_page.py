@@ -164,7 +164,7 @@ def test_a_policy_that_cannot_be_used_is_refused_with_its_place(tmp_path, text, 
 def test_two_folders_of_one_person_in_a_lab_are_refused():
     """The letters of one name are composed in the roster's way, of the other they are not."""
     roster = {"Zo\u00eb": Person("Zo\u00eb")}
-    final = Final("", 1.0, 1.0, False, Lateness(), "")
+    final = Final("", 1.0, 1.0, (), Lateness(), "")
     assert len(rows_of({FIRST: {"Zo\u00eb": final}, SECOND: {"Zoe\u0308": final}}, roster)) == 1
     with pytest.raises(ValueError, match=r"04_iou: .* are both Zo\u00eb; rename the folder of one"):
         rows_of({FIRST: {"Zo\u00eb": final, "Zoe\u0308": final}}, roster)
