@@ -346,7 +346,7 @@ def test_a_machine_that_can_start_no_worker_for_a_moment_costs_nobody_and_else_i
     monkeypatch.setattr(sandbox, "PAUSES_S", (0.0, 0.0))
     with contextlib.ExitStack() as stack:
         if failing > 2:
-            stack.enter_context(pytest.raises(ValueError, match="does not start: .*filter of system calls cannot be"))
+            stack.enter_context(pytest.raises(ValueError, match=r"does not start: .*filter of system calls cannot be"))
         started = stack.enter_context(sandbox.fresh_worker(("numpy",), LIMITS))
         assert told(started, "return 2") == 2
     sandbox.servers.close()
