@@ -26,9 +26,10 @@ PACKAGES = ("labkit", "labgrader", "labcourse", "labcli", "data_gen")
 
 
 def annotated_modules() -> list[str]:
-    """Dotted names of the packages' modules that hold no numba kernels."""
+    """Dotted names of the packages' modules that have shapes in their annotations and hold no numba kernels."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
-    pure = [path for path in files if path.stem != "__init__" and not path.stem.endswith("_kernels")]
+    shaped = [path for path in files if "jaxtyping" in path.read_text(encoding="utf-8")]
+    pure = [path for path in shaped if path.stem != "__init__" and not path.stem.endswith("_kernels")]
     return [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in pure]
 
 

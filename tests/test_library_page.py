@@ -31,6 +31,9 @@ def own_files(tmp_path_factory):
     return folder
 
 
+NIGHTLY = pytest.mark.nightly  # they train, as test_training does
+
+
 @pytest.mark.parametrize(
     ("section", "prints"),
     [
@@ -46,8 +49,8 @@ def own_files(tmp_path_factory):
             r"Perception\(.* grasps\)\n(\d+) objects in truth, \d+ found\n(Perception\(.* grasps\)\n){2}",
         ),
         ("A gripper of your own", r"GraspPlan\(no grasp: too wide .*\nGraspPlan\(10 grasps, the best Grasp\("),
-        ("A loss of your own", r"\{'epoch': 2, 'steps': 4, 'loss': 0\.\d+, 'mean_iou': 0\.\d+, .*\}"),
-        ("Data of your own", r"\{.*'loss': .*\}\n\[.*\]\nPerception\("),
+        pytest.param("A loss of your own", r"\{'epoch': 2, 'steps': 4, 'loss': 0\.\d+, 'mean_iou': 0\.\d+, .*\}", marks=NIGHTLY),
+        pytest.param("Data of your own", r"\{.*'loss': .*\}\n\[.*\]\nPerception\(", marks=NIGHTLY),
     ],
 )
 def test_each_block_runs_and_prints_what_it_says(section, prints, own_files, monkeypatch, capsys):

@@ -21,6 +21,7 @@ from labgrader.checker.question import Question
 
 LONGEST_TUPLE = 16
 MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
+DEEPEST = 64  # lists in lists: NumPy has no array of so many axes
 FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, np.ufunc)
 
 
@@ -120,20 +121,23 @@ def array_of_list(got: list) -> np.ndarray | Problem | None:
     """The array that a list of numbers stands for; None if its rows differ in length, or hold anything else.
 
     Truth values beside numbers are outputs of several kinds, and no array. What holds more values than an output has
-    bytes is a Problem: a list that holds itself has no end.
+    bytes, or more lists in lists than an array has axes, is a Problem: a list that holds itself has no end.
     """
-    waiting, truths, count = [got], set(), 0
+    waiting, truths, count = [(got, 1)], set(), 0
     while waiting:
-        for part in waiting.pop():
+        rows, depth = waiting.pop()
+        for part in rows:
             count += 1
-            if count > MOST_BYTES:
+            if count > MOST_BYTES or depth > DEEPEST:
                 return Problem("size", f"it returns more than {MOST_BYTES >> 20} MB")
             if issubclass(type(part), list | tuple):
-                waiting.append(part)
-            elif not issubclass(type(part), bool | int | float | np.generic | np.ndarray):
-                return None
+                waiting.append((part, depth + 1))
+            elif issubclass(type(part), np.generic | np.ndarray):
+                truths.add(part.dtype.kind == "b")
+            elif issubclass(type(part), bool | int | float):
+                truths.add(issubclass(type(part), bool))
             else:
-                truths.add(np.asarray(part).dtype.kind == "b")
+                return None
     if len(truths) > 1:
         return None
     try:

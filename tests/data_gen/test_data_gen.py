@@ -91,7 +91,7 @@ def test_training_shows_nothing_that_hard_asks_about(config):
         assert all(height < high_from and not low_from < height < low_to for height in ours)
 
 
-@pytest.mark.parametrize("ours_is", ["wide", "any"])
+@pytest.mark.parametrize("ours_is", ["wide", pytest.param("any", marks=pytest.mark.nightly)])
 def test_wide_has_none_of_hards_shapes(ours_is):
     """Shapes are told apart by the edges of their boxes, or by their parts."""
     things = {"wide": ours_is, "hard": "hard"}
@@ -150,7 +150,7 @@ def test_statistics_of_test_are_as_promised():
     assert s.target_pixels <= 0.02
 
 
-@pytest.mark.parametrize("config", ["clutter", "bin"])
+@pytest.mark.parametrize("config", ["clutter", pytest.param("bin", marks=pytest.mark.nightly)])
 def test_crowds_are_repeatable_and_what_holds_them_is_no_thing(config):
     """1 to 20 things of many sizes; walls, floors of bins and shelves have no instance, and only floors are surface."""
     specs = [data_gen.sample_scene(seed, config) for seed in range(12)]

@@ -316,6 +316,7 @@ def test_killed_in_the_middle_and_run_again(course):
 # --------------------------------------------------------------------------------------- without a sandbox
 
 
+@pytest.mark.nightly
 def test_without_a_sandbox_every_file_says_so(course):
     graded = grade(course, unsafe=True)
     assert [record.points for record in graded.records] == [TOTAL, 0.0, BUT_IOU]

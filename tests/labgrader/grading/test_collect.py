@@ -60,7 +60,11 @@ def collect(course: Path, files: dict[str, str | bytes], when: tuple[int, ...] =
 @pytest.mark.parametrize(
     "files, students",
     [
-        (MOODLE, ("Ada Lovelace_1234567", "Ada Lovelace_7654321", "Zoë Müller_1234568")),
+        pytest.param(
+            MOODLE,
+            ("Ada Lovelace_1234567", "Ada Lovelace_7654321", "Zoë Müller_1234568"),
+            marks=pytest.mark.nightly,
+        ),
         (CANVAS, ("lovelaceada_1234", "lovelaceada_4321", "mullerzoe_1235")),
         pytest.param(
             MOODLE_FLAT,
@@ -144,6 +148,7 @@ def test_what_a_student_zips_is_the_students_and_what_cannot_be_opened_stops_nob
     assert not list(tmp_path.glob("*.ipynb"))
 
 
+@pytest.mark.nightly
 def test_a_zip_in_canvass_zip_is_its_students(tmp_path):
     kit.write_lab(tmp_path, TOPIC)
     right, wrong = (json.dumps(kit.lab_notebook(TOPIC, answers)) for answers in (kit.right_answers(TOPIC), {}))

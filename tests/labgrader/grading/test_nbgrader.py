@@ -73,6 +73,7 @@ def test_autograde_refuses_in_one_sentence_and_touches_nothing(course):
     assert scores(course) == POINTS and copies(course) == before
 
 
+@pytest.mark.nightly
 def test_without_the_kits_configuration_no_score_changes_and_the_next_run_puts_the_copies_back(course):
     before = copies(course)
     (course / "nbgrader_config.py").unlink()
@@ -99,6 +100,7 @@ def test_formgraders_button_refuses_too(course, tmp_path_factory):
     assert scores(course) == POINTS
 
 
+@pytest.mark.nightly
 def test_a_lab_of_texts_alone_waits_for_a_person_where_something_is_written(tmp_path):
     """Its points are those of its rubrics, and a text that was left empty has nothing to read."""
     lab = "10_capstone"

@@ -49,6 +49,7 @@ def test_there_is_such_a_page():
     assert PAGES
 
 
+@pytest.mark.nightly  # each command has tests of its own
 def test_the_commands_grade_and_formgrader_shows_it(clone, tmp_path):
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     given = commands(PAGES[0])

@@ -43,7 +43,8 @@ def by_two(*words: str, check: bool = True) -> subprocess.CompletedProcess:
     return subprocess.run(command, env=environment(), cwd=ROOT, capture_output=True, text=True, check=check)
 
 
-@pytest.mark.parametrize("model", ["unet", *(pytest.param(m, marks=NIGHTLY) for m in ("smallsegnet", "unet_rgbd"))])
+@NIGHTLY
+@pytest.mark.parametrize("model", ["unet", "smallsegnet", "unet_rgbd"])
 def test_two_ranks_go_through_the_losses_of_one_process(model, tmp_path, monkeypatch):
     """Also with batch normalisation, a rank without an image, class weights, another loss."""
     monkeypatch.setattr(training, "bf16_is_native", None)

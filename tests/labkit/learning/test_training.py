@@ -254,6 +254,7 @@ def test_a_run_learns_and_writes_what_it_says(name, own, tmp_path):
             train(data, None, config, tmp_path / "b", progress=False)
 
 
+@pytest.mark.nightly  # the shipped weights show it, too
 def test_a_network_that_sees_depth_learns_what_colour_does_not_tell(tmp_path):
     """Colours are noise here; heights over the table are the classes."""
     data, val = frames(8), frames(10)[8:]
