@@ -127,6 +127,7 @@ def test_a_kind_of_which_some_are_right_is_told_if_most_others_are():
     assert "wrong only when y holds 255: in the 4 cases" in contrasted(
         [True] * 5 + [False] * 2, *[SOME] * 4, *[IGNORED] * 3
     )
+    assert contrasted([True] * 7 + [False] * 2, *[SOME] * 4, *[IGNORED] * 5) == ""  # more of the kind are right
 
 
 def test_nothing_is_told_where_no_kind_tells_them_apart():
