@@ -20,7 +20,7 @@ def contrast(question: Question, cases: Sequence[Case], right: Sequence[bool]) -
     """A sentence about the kind of the wrong cases, "" if none tells them apart.
 
     right: of each case. A kind that all wrong cases are of, and no right one, is told before one of which some cases
-    are right, but no more than are wrong.
+    are right.
     """
     told = [set(facts(question, case.args)) for case in cases]
     wrong = [kinds for kinds, passed in zip(told, right, strict=True) if not passed]
@@ -34,8 +34,7 @@ def contrast(question: Question, cases: Sequence[Case], right: Sequence[bool]) -
             return f"It is wrong whenever {kind}, and right in the {others} other cases. What do your lines do then?"
     for kind in common:
         others = sum(kind not in kinds for kinds in passed)
-        of_the_kind = len(passed) - others  # that are right all the same
-        if others >= 2 * FEWEST_RIGHT and others > of_the_kind <= len(wrong):
+        if others >= 2 * FEWEST_RIGHT and 2 * others > len(passed):
             return f"It is wrong only when {kind}: in the {others} cases without that it is right. What differs then?"
     return ""
 
