@@ -168,7 +168,10 @@ def outside(found: re.Match, args: dict) -> str:
         of = " and ".join(name for name, a in arrays(args).items() if a.ndim > axis and a.shape[axis] == size)
         along = f"axis {axis}{' (as long as that of ' + of + ')' if of else ''}"
         return f"The index {index} is one past the end: the last one along {along} is {size - 1}."
-    lengths = [f"axis {k} of {name}" for name, a in arrays(args).items() for k, n in enumerate(a.shape) if index < n]
+    others = [
+        (f"axis {k} of {name}", n) for name, a in arrays(args).items() for k, n in enumerate(a.shape) if k != axis
+    ]
+    lengths = [which for which, n in others if index < n]
     if lengths:
         return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes exchanged?"
     return f"An index of {index} into an axis of {size}: what does the index count, and what does this array hold?"

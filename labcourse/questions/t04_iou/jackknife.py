@@ -116,7 +116,13 @@ def squared(n_frames):
     return score, error**2
 
 
-@wrong("Deviations from a mean add up to 0. Square each one before you add.")
+@wrong("The root is one of the factor and the sum together. Yours is one of the factor alone.")
+def sum_outside_the_root(n_frames):
+    score, error = jackknife(n_frames)
+    return score, error**2 / np.sqrt(1 - 1 / len(n_frames))
+
+
+@wrong("Your error is always 0. Deviations from a mean add up to 0: is each of them squared before you add?")
 def squared_after_the_sum(n_frames):
     return pooled(n_frames), 0.0
 

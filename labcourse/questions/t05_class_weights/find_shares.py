@@ -178,13 +178,26 @@ def mean_of_logits(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, one)
 
 
-@wrong("Each pixel's probabilities must sum to 1 before you take their mean; yours only do on the average.")
-def normalised_after_the_mean(z, w, shares, rounds):
-    q, guess = softmax(z.reshape(-1, z.shape[-1])), shares
+@wrong(
+    "Each pixel's probabilities must sum to 1 before you take their mean; yours only do on the average.",
+    of=("probabilities", "likelihoods"),
+)
+def normalised_after_the_mean(z, w, shares, rounds, of):
+    z, guess = z.reshape(-1, z.shape[-1]), shares
+    likely = softmax(z) / (w * shares) if of == "probabilities" else softmax(z - np.log(w * shares))
     for _ in range(rounds):
-        guess = (q * guess / (w * shares)).mean(axis=0)
+        guess = (likely * guess).mean(axis=0)
         guess = guess / guess.sum()
     return guess
+
+
+@wrong("You ask each class on its own, yes or no. A pixel is of one class: its probabilities sum to 1.", summed=(0, 1))
+def sigmoids(z, w, shares, rounds, summed):
+    def believed(z, guess):
+        p = 1.0 / (1.0 + np.exp(-(z + np.log(guess / shares / w))))
+        return p / p.mean(axis=0).sum() if summed else p
+
+    return of_rounds(z, shares, rounds, believed)
 
 
 @wrong("That is the guess after the first round, whatever `rounds` says.")
