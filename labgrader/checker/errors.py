@@ -210,9 +210,9 @@ def another_size(found: re.Match, args: dict) -> str:
     if -1 in lengths:
         asks = f"a multiple of {fits}: which length is wrong, or is padding left in?"
     elif size and fits % size == 0:
-        asks = f"{fits}: which length is {fits // size} times too large?"
+        asks = f"{fits}: is a length {fits // size} times too large, or are numbers missing?"
     elif fits and size % fits == 0:
-        asks = f"{fits}: which length is {size // fits} times too small, or is padding left in?"
+        asks = f"{fits}: is a length {size // fits} times too small, or is padding left in?"
     else:
         asks = f"{fits}: are there too many (padding, perhaps), or are some missing?"
     return f"{size} numbers do not fill the shape ({shape}), which takes {asks}"
