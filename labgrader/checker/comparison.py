@@ -261,7 +261,8 @@ def wrong_dtype(expected, got) -> Problem | None:
     if wanted in "iu" and came == "f" and not (np.mod(got, 1.0) == 0.0).all():
         return Problem("dtype", f"expected whole numbers, got fractions or NaN in an array of {got.dtype}")
     if wanted in "iu" and came == "f" and got.size and got.shape:
-        return Problem("dtype", f"expected integers, got dtype {got.dtype}: they count or index, so write .astype(int)")
+        cast = ", so write .astype(int)" if np.array_equal(expected, got) else ""
+        return Problem("dtype", f"expected integers, got dtype {got.dtype}: they count or index{cast}")
     return None
 
 

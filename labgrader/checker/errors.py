@@ -26,7 +26,7 @@ def explain(text: str, args: dict, line: str = "", program: str = "") -> str:
     for look in OF_THE_LINE:
         if says := look(text, line):
             return says
-    if says := divided_first(text, program):
+    if says := divided_first(text, program) or flattened(text, program):
         return says
     for pattern, function in EXPLAINED:
         if (found := pattern.match(text)) and (said := function(found, args)):
@@ -92,11 +92,31 @@ def transformed(text: str, line: str) -> str:
 
 
 def divided_first(text: str, program: str) -> str:
-    """An index made of `a // b * c`, too large since the product comes after the division."""
-    found = re.search(r"//\s*\w+\s*\*\s*\w+", program)
-    if not found or not text.startswith("IndexError"):
+    """An index made of `a // 2 * b`, too large since the product comes after the division."""
+    found = re.search(r"//\s*\d+\s*\*\s*\w+", program)
+    if not found or not re.match(r"IndexError: index \d.* with size [1-9]", text):
         return ""
     return f"a {found[0]} is (a {found[0].replace(' *', ') *', 1)}: what should be below the line needs brackets."
+
+
+def flattened(text: str, program: str) -> str:
+    """np.delete without its axis, and an array that has lost its axes."""
+    if not re.search(r"diag requires|too many indices|axis \d+ is out of bounds", text):
+        return ""
+    calls = [node for node in expressions_of(program) if isinstance(node, ast.Call)]
+    if any(ast.unparse(node.func) == "np.delete" and len(node.args + node.keywords) == 2 for node in calls):
+        return "np.delete without an axis makes one long row of the array first: along which axis do you delete?"
+    return ""
+
+
+def joined(text: str, line: str) -> str:
+    """Slices of an array with + between them, as lists are joined."""
+    pairs = [node for node in expressions_of(line) if isinstance(getattr(node, "op", None), ast.Add)]
+    for node in pairs if "broadcast" in text else ():
+        sides = [getattr(node, "left", None), getattr(node, "right", None)]
+        if all(isinstance(getattr(side, "slice", None), ast.Slice) for side in sides):
+            return "+ joins lists. Of arrays it adds the numbers, entry by entry: np.concatenate joins those."
+    return ""
 
 
 def nothing_to_average(text: str, line: str) -> str:
@@ -113,7 +133,7 @@ def counted(text: str, line: str) -> str:
     return "np.bincount is as long as its largest number, so with 255 in it 256: leave those out before you count."
 
 
-OF_THE_LINE = (compared, called, of_one_vector, transformed, nothing_to_average, counted)
+OF_THE_LINE = (compared, called, of_one_vector, transformed, joined, nothing_to_average, counted)
 
 # ---------------------------------------------------------------------------------------- by the exception's text
 
@@ -137,6 +157,8 @@ def arrays(args: dict) -> dict[str, np.ndarray]:
 def outside(found: re.Match, args: dict) -> str:
     """An index beyond the end: an ignored label, one too many, or an argument's value."""
     index, axis, size = map(int, found.groups())
+    if size == 0:
+        return f"You take entry {index} of an array that has none: which slice, or which mask, selects nothing here?"
     holding = [name for name, a in arrays(args).items() if a.dtype.kind in "iu" and (a == index).any()]
     if index == course().ignored and holding:
         return f"The ignored pixels of {holding[0]}, labelled {index}, are used as an index: leave them out before."
@@ -146,7 +168,10 @@ def outside(found: re.Match, args: dict) -> str:
         of = " and ".join(name for name, a in arrays(args).items() if a.ndim > axis and a.shape[axis] == size)
         along = f"axis {axis}{' (as long as that of ' + of + ')' if of else ''}"
         return f"The index {index} is one past the end: the last one along {along} is {size - 1}."
-    lengths = [f"axis {k} of {name}" for name, a in arrays(args).items() for k, n in enumerate(a.shape) if index < n]
+    others = [
+        (f"axis {k} of {name}", n) for name, a in arrays(args).items() for k, n in enumerate(a.shape) if k != axis
+    ]
+    lengths = [which for which, n in others if index < n]
     if lengths:
         return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes exchanged?"
     return f"An index of {index} into an axis of {size}: what does the index count, and what does this array hold?"
@@ -159,7 +184,7 @@ def shapes_do_not_fit(found: re.Match, args: dict) -> str:
     a, b = (tuple(int(n) for n in text.split(",") if n) for text in found.groups())
     said = " and ".join(f"{shape}{whose(shape, args)}" for shape in (a, b))
     masked = [(one, other) for one, other in ((a, b), (b, a)) if len(one) == 1 < len(other) and whose(other, args)]
-    if masked and masked[0][0][0] < np.prod(masked[0][1]):
+    if masked and masked[0][0][0] not in masked[0][1] and masked[0][0][0] < np.prod(masked[0][1]):
         one, other = masked[0]
         return f"{one[0]} numbers, perhaps what a mask left, meet shape {other}{whose(other, args)}: mask both alike."
     if len(a) != len(b):
@@ -175,6 +200,22 @@ def whose(shape: tuple[int, ...], args: dict) -> str:
     """Whose shape it is, in brackets."""
     names = [name for name, a in arrays(args).items() if a.shape == shape]
     return f" (the shape of {' and '.join(names)})" if names else ""
+
+
+@when(r"ValueError: cannot reshape array of size (\d+) into shape \(([\w,-]*)\)")
+def another_size(found: re.Match, args: dict) -> str:
+    """A reshape to a shape of another size, perhaps of twice as many numbers."""
+    size, lengths = int(found[1]), [-1 if n in ("newaxis", "-1") else int(n) for n in found[2].split(",") if n]
+    fits, shape = abs(int(np.prod(lengths))), ",".join(map(str, lengths))
+    if -1 in lengths:
+        asks = f"a multiple of {fits}: which length is wrong, or is padding left in?"
+    elif size and fits % size == 0:
+        asks = f"{fits}: is a length {fits // size} times too large, or are numbers missing?"
+    elif fits and size % fits == 0:
+        asks = f"{fits}: is a length {size // fits} times too small, or is padding left in?"
+    else:
+        asks = f"{fits}: are there too many (padding, perhaps), or are some missing?"
+    return f"{size} numbers do not fill the shape ({shape}), which takes {asks}"
 
 
 @when(r"(?:(?:numpy\.exceptions\.)?AxisError|an exception): axis (-?\d+) is out of bounds for array of dimension (\d+)")
@@ -259,9 +300,6 @@ TABLE = {
     r"ValueError: need at least one array": "In this case there is nothing to stack or join: is a list empty?",
     r"ValueError: all the input array|ValueError: all input arrays": (
         "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
-    ),
-    r"ValueError: cannot reshape array of size (\d+) into shape \(([\d,-]*)": (
-        "{1} numbers do not fill the shape ({2}): are there too many (padding, perhaps), or are some missing?"
     ),
     r"ValueError: The truth value of an array|ValueError: The truth value of a": (
         "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: is a sum missing? For arrays there are "
@@ -362,7 +400,7 @@ TABLE = {
         "{1} is read before it gets a value: in this case no branch, or no turn of the loop, sets it."
     ),
     r"KeyError": "The dictionary has no such key in this case: which values can occur?",
-    r"RecursionError": "It calls itself without end: in which case does it stop?",
+    r"RecursionError": "It calls itself some thousand times: does it stop in this case, and after how many calls?",
     r"MemoryError|numpy\._core\._exceptions\._ArrayMemoryError|_ArrayMemoryError": (
         "An array of that size does not fit into memory: which length is wrong?"
     ),

@@ -36,6 +36,7 @@ MOST_SECONDS = 1000  # others that are tried together with the best first one; h
 MOST_GAINERS = 60  # second ones that are tried because they make something right themselves
 DEAREST_OF_TWO = 2.0  # nodes that each of two changes at most
 MOST_S = 4.0  # CPU seconds of the whole search: then what has been found is told, if there is something
+MOST_S_OF_ALL = 2.0  # for all cases once: of a program that takes longer, too few mutations could be tried
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
 MORE_COST = 0.5  # repairs that change so much more than the smallest are looked for, too
 LEFT_OUT = (
@@ -118,6 +119,8 @@ def repairs(
             of_cases = {id(case): told for case, told in zip(cases, listed, strict=False)}
             search = Search(program, right, entries, time.process_time() + MOST_S, of_cases)
             by_use = sorted_by_use(search, cases)
+            if time.process_time() > search.end - MOST_S + MOST_S_OF_ALL:
+                return []
             trials = [Trial(k, statement, m) for k, statement in program.functions() for m in mutations(statement)]
             trials.sort(key=lambda trial: trial.rank[:2])
             firsts = Firsts(search, by_use)
@@ -172,10 +175,15 @@ def one_repair(
                     found[trial.finding] = trial.rank
                 elif runs and not found and trial.mutation.cost <= DEAREST_OF_TWO:
                     firsts.look(trial)
-                    number = listed_mistake(search, cases) if trial.mutation.kind not in LEFT_OUT else None
+                    number = listed_mistake(search, cases) if not leaves_out(trial.mutation) else None
                     if number is not None and rightness(search, cases) > before:  # one mistake is less than two
                         beside[replace(trial.finding, value=float(number), of_two=True)] = trial.rank
     return sorted(found, key=found.get), sorted(beside, key=beside.get)[:1]
+
+
+def leaves_out(mutation: Mutation) -> bool:
+    """Whether a mutation takes something out, or puts a name into the place of a longer expression."""
+    return mutation.kind in LEFT_OUT or (mutation.kind == "name" and mutation.cost >= 2)
 
 
 def listed_mistake(search: Search, cases: Cases) -> int | None:

@@ -37,6 +37,9 @@ class Watched(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> ast.AST:
         if isinstance(node, ast.arguments | ast.JoinedStr | ast.AnnAssign | ast.Raise | ast.Assert):
             return node
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
+            self.generic_visit(node.value)  # the value is right only if each name gets the part that is meant
+            return node
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             node.func.value = self.visit(node.func.value)  # the method itself is no value
             node.args, node.keywords = ([self.visit(part) for part in parts] for parts in (node.args, node.keywords))

@@ -15,6 +15,7 @@ import numpy as np
 from labgrader.checker.comparison import Case, Problem, alike, expected_cases
 from labgrader.checker.diagnosis import listed_in
 from labgrader.checker.finding import MOST_FINDINGS, Finding, read
+from labgrader.checker.instruments import MOST_S as WATCH_S
 from labgrader.checker.judge import Verdict, verdict
 from labgrader.checker.program import Program
 from labgrader.checker.question import PUBLIC_SEED, Question
@@ -26,7 +27,7 @@ from labgrader.worker.channel import MOST_FOUND, Changed, Worker, WorkerLost
 from labgrader.worker.process import MORE
 from labgrader.worker.stopwatch import Stopwatch
 
-LOOK_S = 6.0  # for a look: its own limits come before, but where a compiled function does not come back
+LOOK_S = 5.0  # for a look: its own limits come before, but where a compiled function does not come back
 drawing = threading.Lock()  # references are called with Python's warnings off, which no thread has for itself
 
 
@@ -100,7 +101,8 @@ class Budget:
 class Answer:
     """An answer to a question as a program, in a worker that has run nothing before; a context manager.
 
-    budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took.
+    budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took,
+    called_s: the last cases alone.
     worded: the outputs that were judged last, none where they could not be.
     """
 
@@ -109,7 +111,8 @@ class Answer:
     ):
         self.question, self.program, self.limits = question, program, limits
         self.budget = Budget(limits) if budget is None else budget
-        self.name, self.seconds, self.used_s = program.name or question.function, self.budget.for_one, 0.0
+        self.name, self.seconds = program.name or question.function, self.budget.for_one
+        self.used_s = self.called_s = 0.0
         self.starting, self.worded = start(packages_of(question, program), limits), []
 
     def __enter__(self) -> "Answer":
@@ -152,6 +155,7 @@ class Answer:
         After a case that cost the worker, the answer is not called again.
         """
         outputs: list[object] = []
+        before = self.used_s
         for case in cases:
             if self.worker.closed:
                 outputs.append(outputs[-1] if outputs else self.not_run)
@@ -159,6 +163,7 @@ class Answer:
             output = self.ask("call", self.name, pickle.dumps(case.args))
             missing = isinstance(output, Problem) and output.kind == "missing"
             outputs.append(self.not_run if missing and self.not_run is not None else output)
+        self.called_s = self.used_s - before
         return outputs
 
     def judged(self, cases: Sequence[Case]) -> tuple[Verdict, list[object]]:
@@ -183,10 +188,11 @@ class Answer:
         job = (*comparing_of(question), self.name, pieces, pairs(public_cases(question)), listed_mistakes(question))
         found: list[Finding] = []
         with suppress(WorkerLost):
-            for look in ("watch", "repair"):
+            for look in ("watch", "repair")[self.called_s > WATCH_S :]:  # a watch calls it on all cases, too
+                watch = Stopwatch(self.worker.pid)
                 reply = self.worker.ask((look, *job), LOOK_S, MOST_FOUND)
                 if reply == MORE[1:].decode():
-                    reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S, MOST_FOUND)
+                    reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S - watch.used(), MOST_FOUND)
                 found += read(reply, pieces) if isinstance(reply, str) else []
             if not found:
                 wrong = wrong_and_small(question, public_cases(question), self.worded)[:MOST_CASES]

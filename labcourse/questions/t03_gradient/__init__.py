@@ -159,7 +159,8 @@ def grouped(foreground, votes, cell, least, **own):
     beyond the cells, else it is dropped. sizes: rows and columns of cells, of the picture's shape. count: changes the
     counts. kernel: the three weights of the smoothing. border: how it goes on beyond the cells ("constant" is with 0).
     reach: cells around a peak. enough: what `least` is compared with, "near", "smoothed" or "cell". again: smooth again
-    without the votes of what was found. last: the last of equal peaks.
+    without the votes of what was found; cleared: cells around a peak that are set to 0 if not. last: the last of equal
+    peaks.
     """
     v, u = np.nonzero(foreground > 0.5)
     places = own.get("place", lambda u, v, d: np.stack([u, v], axis=1) + d)(u, v, votes[v, u])
@@ -182,7 +183,8 @@ def grouped(foreground, votes, cell, least, **own):
             break
         numbers[v[near], u[near]] = number
         left &= ~near
-        smooth[r, c] = 0
+        cleared = own.get("cleared", 0)
+        smooth[max(r - cleared, 0) : r + cleared + 1, max(c - cleared, 0) : c + cleared + 1] = 0
     return numbers
 
 

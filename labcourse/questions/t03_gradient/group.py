@@ -172,9 +172,12 @@ def one_thing_alone(foreground, votes, cell, least):
     return np.minimum(grouped(foreground, votes, cell, least), 2) % 2
 
 
-@wrong("Take a thing's votes out before you look for the next peak: what is left there, and is it high enough?")
-def from_one_smoothing(foreground, votes, cell, least):
-    return grouped(foreground, votes, cell, least, again=False)
+@wrong(
+    "Take a thing's votes out before you look for the next peak: what is left there, and is it high enough?",
+    cleared=(0, 1),
+)
+def from_one_smoothing(foreground, votes, cell, least, cleared):
+    return grouped(foreground, votes, cell, least, again=False, cleared=cleared)
 
 
 @wrong("Things are numbered as they are found. Yours are numbered by their size.")

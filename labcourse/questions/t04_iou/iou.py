@@ -53,6 +53,11 @@ def absent_classes_left_out(n):
     return scores[~np.isnan(scores)]
 
 
+@wrong("A class that is neither true nor predicted has no score: is 0 not that of a class that is never found?")
+def absent_classes_score_0(n):
+    return iou_of(n, empty=0.0)
+
+
 @wrong("That is recall, the share of a class's true pixels that are found: where are the false positives?")
 def recall(n):
     correct, _, true = parts(n)

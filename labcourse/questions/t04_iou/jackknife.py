@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcourse.questions.t04_iou import counts_of_frames, iou_of, parts
+from labcourse.questions.t04_iou import counts_of_frames, divide, iou_of, parts
 from labgrader.checker.question import Question, holds, wrong
 
 
@@ -97,10 +97,12 @@ def no_factor(n_frames):
 
 
 @wrong(
-    "Your factor is too large. What is it for the mean of 1 and 3, whose standard error is 1?", of=("F - 1", "F", "up")
+    "Your factor is too large. What is it for the mean of 1 and 3, whose standard error is 1?",
+    of=("F - 1", "F", "up", "squared"),
 )
 def factor_too_large(n_frames, of):
-    return with_factor(n_frames, {"F - 1": lambda F: F - 1, "F": lambda F: F, "up": lambda F: F / (F - 1)}[of])
+    factors = {"F - 1": lambda F: F - 1, "F": lambda F: F, "up": lambda F: F / (F - 1)}
+    return with_factor(n_frames, factors.get(of, lambda F: (F - 1) ** 2 / F))
 
 
 @wrong("The factor belongs to the squares: it stands under the root, too.")
@@ -112,6 +114,17 @@ def factor_outside_the_root(n_frames):
 def squared(n_frames):
     score, error = jackknife(n_frames)
     return score, error**2
+
+
+@wrong("The root is one of the factor and the sum together. Yours is one of the factor alone.")
+def sum_outside_the_root(n_frames):
+    score, error = jackknife(n_frames)
+    return score, error**2 / np.sqrt(1 - 1 / len(n_frames))
+
+
+@wrong("Your error is always 0. Deviations from a mean add up to 0: is each of them squared before you add?")
+def squared_after_the_sum(n_frames):
+    return pooled(n_frames), 0.0
 
 
 @wrong("Deviations are squared one by one, and then added up: yours are not squared.")
@@ -126,6 +139,27 @@ def absolute_deviations(n_frames):
 def deviations_from_the_score_of_all(n_frames):
     left = without_each(n_frames, pooled)
     return pooled(n_frames), np.sqrt((len(left) - 1) / len(left) * np.square(left - pooled(n_frames)).sum())
+
+
+@wrong("You correct the score's bias. Asked for is the mean IoU of all frames as it is.")
+def bias_corrected(n_frames):
+    F, (score, error) = len(n_frames), jackknife(n_frames)
+    return F * score - (F - 1) * without_each(n_frames, pooled).mean(), error
+
+
+@wrong("Without frame k all others are counted, those before it, too. Yours never come back once they are left out.")
+def left_out_for_good(n_frames):
+    left = np.array([pooled(n_frames[k + 1 :]) for k in range(len(n_frames) - 1)])
+    return pooled(n_frames), spread(left, lambda _: (len(n_frames) - 1) / len(n_frames))
+
+
+@wrong("The overlap stands in the row sum and in the column sum: how often is it in your union?")
+def overlap_twice_in_the_union(n_frames):
+    def score(some):
+        correct, predicted, true = parts(some.sum(axis=0))
+        return np.nanmean(divide(correct, predicted + true))
+
+    return by(n_frames, score)
 
 
 def alone(n_frames):
@@ -150,6 +184,20 @@ def mean_of_what_is_left(n_frames):
 @wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
 def mean_of_frames_means(n_frames):
     return by(n_frames, lambda some: alone(some).mean())
+
+
+@wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
+def mean_of_frames_means_by_size(n_frames):
+    return by(n_frames, lambda some: np.average(alone(some), weights=some.sum(axis=(1, 2))))
+
+
+@wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
+def mean_of_classes_means(n_frames):
+    def score(some):
+        scores = np.array([iou_of(n) for n in some])
+        return np.mean([np.nanmean(of_a_class) for of_a_class in scores.T if not np.isnan(of_a_class).all()])
+
+    return by(n_frames, score)
 
 
 @wrong("1/1 in one frame and 0/99 in another: is that one half, or one hundredth? Add counts, divide once.")
@@ -210,6 +258,17 @@ def sum_over_sum(n_frames):
     def score(some):
         correct, predicted, true = parts(some.sum(axis=0))
         return correct.sum() / (predicted + true - correct).sum()
+
+    return by(n_frames, score)
+
+
+@wrong(
+    "Your scores are recall or precision: a union holds the row of a class and its column.", whole=("true", "predicted")
+)
+def half_of_the_union(n_frames, whole):
+    def score(some):
+        correct, predicted, true = parts(some.sum(axis=0))
+        return np.nanmean(divide(correct, true if whole == "true" else predicted))
 
     return by(n_frames, score)
 

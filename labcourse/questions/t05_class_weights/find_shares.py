@@ -118,6 +118,49 @@ def summed_over_pixels(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax((z + np.log(guess / shares / w)).T).T)
 
 
+@wrong("A pixel's probabilities sum to 1 over its classes, the last axis. Over which axis do yours?")
+def summed_over_the_first_axis(z, w, shares, rounds):
+    guess = shares
+    for _ in range(rounds):
+        p = np.moveaxis(softmax(np.moveaxis(z + np.log(guess / shares / w), 0, -1)), -1, 0)
+        guess = p.reshape(-1, len(shares)).mean(axis=0)
+    return guess
+
+
+@wrong("Each pixel's probabilities sum to 1. Yours sum to 1 over all pixels together.")
+def summed_over_everything(z, w, shares, rounds):
+    guess = shares
+    for _ in range(rounds):
+        guess = softmax((z + np.log(guess / shares / w)).ravel()).reshape(-1, len(shares)).sum(axis=0)
+    return guess
+
+
+@wrong("The mean is one over all pixels. In an image they lie along two axes: over how many does yours go?")
+def mean_over_the_first_axis(z, w, shares, rounds):
+    guess = shares
+    for _ in range(rounds):
+        guess = softmax(z + np.log(guess / shares / w)).mean(axis=0)
+    return guess
+
+
+@wrong(
+    "The weights are in each pixel's probabilities. From their mean nothing can take them out: when can you?",
+    how=("each time", "at last"),
+)
+def weights_taken_out_of_the_mean(z, w, shares, rounds, how):
+    z, guess = z.reshape(-1, z.shape[-1]), shares
+    for number in range(rounds):
+        guess = softmax(z + np.log(guess / shares)).mean(axis=0)
+        if how == "each time" or number == rounds - 1:
+            guess = guess / w / np.sum(guess / w)
+    return guess
+
+
+@wrong("The guess after the last round is asked for, alone.", first=(0, 1))
+def all_guesses(z, w, shares, rounds, first):
+    return np.array([shares, *(find_shares(z, w, shares, k + 1) for k in range(rounds))][first:])
+
+
 @wrong("You count each pixel for its likeliest class. A pixel of 60 and 40 % is 0.6 and 0.4 of a pixel.")
 def pixels_counted(z, w, shares, rounds):
     def one_hot(z, guess):
@@ -135,13 +178,26 @@ def mean_of_logits(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, one)
 
 
-@wrong("Each pixel's probabilities must sum to 1 before you take their mean; yours only do on the average.")
-def normalised_after_the_mean(z, w, shares, rounds):
-    q, guess = softmax(z.reshape(-1, z.shape[-1])), shares
+@wrong(
+    "Each pixel's probabilities must sum to 1 before you take their mean; yours only do on the average.",
+    of=("probabilities", "likelihoods"),
+)
+def normalised_after_the_mean(z, w, shares, rounds, of):
+    z, guess = z.reshape(-1, z.shape[-1]), shares
+    likely = softmax(z) / (w * shares) if of == "probabilities" else softmax(z - np.log(w * shares))
     for _ in range(rounds):
-        guess = (q * guess / (w * shares)).mean(axis=0)
+        guess = (likely * guess).mean(axis=0)
         guess = guess / guess.sum()
     return guess
+
+
+@wrong("You ask each class on its own, yes or no. A pixel is of one class: its probabilities sum to 1.", summed=(0, 1))
+def sigmoids(z, w, shares, rounds, summed):
+    def believed(z, guess):
+        p = 1.0 / (1.0 + np.exp(-(z + np.log(guess / shares / w))))
+        return p / p.mean(axis=0).sum() if summed else p
+
+    return of_rounds(z, shares, rounds, believed)
 
 
 @wrong("That is the guess after the first round, whatever `rounds` says.")
@@ -160,14 +216,26 @@ def from_equal_shares(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / shares / w)), first)
 
 
-@wrong("If a probability is multiplied by a factor, what is added to its logit?")
-def ratios_added(z, w, shares, rounds):
-    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + guess / (w * shares)))
+@wrong(
+    "If a probability is multiplied by a factor, what is added to its logit?",
+    added=("all", "the ratio", "the difference"),
+)
+def ratios_added(z, w, shares, rounds, added):
+    def believed(z, guess):
+        ratio = guess / shares if added == "the ratio" else guess - shares
+        return softmax(z + guess / (w * shares) if added == "all" else z - np.log(w) + ratio)
+
+    return of_rounds(z, shares, rounds, believed)
 
 
 @wrong("Probabilities are multiplied by a ratio; what does that do to logits?")
 def ratios_multiplied(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z * guess / (w * shares)))
+
+
+@wrong("Probabilities are multiplied by a ratio; what does that do to logits?")
+def new_ratio_multiplied(z, w, shares, rounds):
+    return of_rounds(z, shares, rounds, lambda z, guess: softmax((z - np.log(w)) * guess / shares))
 
 
 @wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")

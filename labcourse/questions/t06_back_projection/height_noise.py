@@ -125,6 +125,11 @@ def turned_point_itself(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_
     return np.hypot(np.linalg.norm(noise[:3]), T_base_cam[2, :3] @ turned)
 
 
+@wrong("The noise is that of small turns. One radian is no small step for a difference.")
+def differences_over_a_radian(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
+    return height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, np.sin(1.0) * sigma_tilt)
+
+
 @wrong("sigma_tilt is in radians already.")
 def tilt_in_degrees(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
     return height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, np.radians(sigma_tilt))

@@ -78,6 +78,14 @@ def nearest_by_whole_turns(Sigma, now):
     return yaw + 2 * np.pi * np.round((now - yaw) / (2 * np.pi))
 
 
+@wrong("Within half a turn of `now` there are two angles of an axis: is yours the nearer one?")
+def less_than_half_a_turn_away(Sigma, now):
+    yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
+    while abs(yaw - now) >= np.pi:
+        yaw += np.copysign(np.pi, now - yaw)
+    return yaw
+
+
 @wrong("You return how far the hand has to turn. The angle from the base's x axis is asked for.")
 def turn_of_the_hand(Sigma, now):
     return closing_yaw(Sigma, now) - now

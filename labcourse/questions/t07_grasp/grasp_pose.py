@@ -44,7 +44,7 @@ QUESTION = Question(
 )
 
 
-@holds("z is the direction of the approach")
+@holds("the third column, z, is the direction of the approach")
 def z_is_the_approach(position, approach, closing, T):
     return np.allclose(T[:3, 2], approach / np.linalg.norm(approach), atol=1e-4)
 

@@ -108,6 +108,9 @@ def largest_for_a_hole(data, height, width, step, is_bigendian):
     return np.where(depth > 65.534, np.nan, depth)
 
 
-@wrong("Big-endian numbers are read as little-endian here; and byteswap does nothing to single bytes.")
+@wrong(
+    "Big-endian numbers are read as little-endian here, whatever the flag says. "
+    "If you call byteswap: single bytes have nothing to swap."
+)
 def bytes_swapped_one_by_one(data, height, width, step, is_bigendian):
     return decode_depth(data, height, width, step, False)

@@ -47,7 +47,7 @@ QUESTION = Question(
         _by_hand([[3, 2], [1, 5]], C=2, W=2, block=1),  # plane after plane
         _by_hand([[3, 1, 2, 5, 9, 9], [1, 7, 6, 4, 9, 9]], C=2, W=2, block=2),  # rows are filled up
         _by_hand([[3, 1, 2, 5], [4, 9, 0, 9]], C=3, W=2, block=2),  # the last block is filled up
-        _by_hand([[-3, -1, -2, -0.5, 0, 0]], C=2, W=2, block=2),
+        _by_hand([[-3, -1, -2, -0.5, 2047, 2048, 0, 0]], C=2, W=3, block=2),  # 2047 and 2048 are neighbours in 16 bits
     ),
     random_cases=12,
     points=3,
@@ -102,6 +102,24 @@ def filling_in_front(buffer, C, H, W, block, step):
     return read(buffer, right_places(C, H, W, block, step) + spare).argmax(axis=0)
 
 
+@wrong("A block has H rows of `step` bytes. Where does yours begin the next one?")
+def blocks_without_the_rows_filling(buffer, C, H, W, block, step):
+    def at(c, v, u):
+        return 2 * (c // block * H * W * block + u * block + c % block) + v * step
+
+    return best(buffer, C, H, W, block, step, at)
+
+
+@wrong("Inside a block the scores of one pixel lie side by side. In yours a row of one class follows that of another.")
+def rows_of_classes_in_a_block(buffer, C, H, W, block, step):
+    return best(buffer, C, H, W, block, step, lambda c, v, u: (c // block * H + v) * step + 2 * (c % block * W + u))
+
+
+@wrong("A block is rows of pixels. Yours goes down the columns: which of v and u takes you `step` bytes on?")
+def columns_first(buffer, C, H, W, block, step):
+    return best(buffer, C, H, W, block, step, lambda c, v, u: (c // block * W + u) * step + 2 * (v * block + c % block))
+
+
 @wrong("`step` counts bytes. A score has two of them: how many bytes lie between two pixels of a row?")
 def places_in_a_row_as_bytes(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, lambda c, v, u: (c // block * H + v) * step + u * block + c % block)
@@ -128,6 +146,12 @@ def as_pixels(buffer, C, H, W, block, step):
 @wrong("A label is above C - 1: the last block holds more scores than there are classes. What are they?")
 def filled_up_classes_too(buffer, C, H, W, block, step):
     return read(buffer, right_places(-(-C // block) * block, H, W, block, step)).argmax(axis=0)
+
+
+@wrong("You keep the first C places of each block. Which classes are they, once the blocks are side by side?")
+def cut_within_the_blocks(buffer, C, H, W, block, step):
+    scores = read(buffer, right_places(-(-C // block) * block, H, W, block, step)).reshape(-1, block, H, W)
+    return scores[:, :C].reshape(-1, H, W).argmax(axis=0)
 
 
 @wrong("The numbers that fill up the last block may be large: leave them out by their place, not because they are NaN.")
@@ -191,6 +215,23 @@ def single_bytes(buffer, C, H, W, block, step, byte):
 def bytes_as_numbers(buffer, C, H, W, block, step):
     rows = buffer.astype(float).reshape(-1, H, step)[:, :, : 2 * block * W].reshape(-1, H, W, 2 * block)
     return rows.transpose(0, 3, 1, 2).reshape(-1, H, W)[:C].argmax(axis=0)
+
+
+@wrong("astype makes a number of each byte. Which function of NumPy takes two bytes together as one number?")
+def bytes_as_scores(buffer, C, H, W, block, step):
+    rows = buffer.reshape(-1, H, step)[:, :, : block * W].reshape(-1, H, W, block)
+    return rows.transpose(0, 3, 1, 2).reshape(-1, H, W)[:C].argmax(axis=0)
+
+
+@wrong("At a pixel whose scores are all negative, none is above 0: with what do you begin?")
+def the_best_begins_at_0(buffer, C, H, W, block, step):
+    scores = read(buffer, right_places(C, H, W, block, step))
+    return np.where((scores > 0).any(axis=0), scores.argmax(axis=0), 0)
+
+
+@wrong("Those are the highest scores. Which class has each of them?")
+def scores_of_the_best(buffer, C, H, W, block, step):
+    return read(buffer, right_places(C, H, W, block, step)).max(axis=0)
 
 
 @wrong("Two bytes, but of which type? Yours is a whole number: where do the negative scores go?", kind=("<i2", "<u2"))

@@ -18,13 +18,19 @@ ARGS = {"y": np.array([[0, 255]]), "P": np.zeros((5, 3)), "R": np.eye(3)}
 EXCEPTIONS = [
     (lambda: np.zeros(3)[np.array([[0, 255]])], "ignored pixels of y, labelled 255"),
     (lambda: np.zeros(3)[3], "one past the end: the last one along axis 0 (as long as that of R) is 2"),
+    (lambda: np.zeros((3, 2))[0, 4], "an index up to 4 fits axis 0 of P: are two axes exchanged?"),
+    (lambda: np.zeros(2)[4], "An index of 4 into an axis of 2"),  # P's first axis is no other one
     (lambda: np.zeros(3)[1.5], "whole numbers or truth values"),
     (lambda: np.zeros(3)[np.ones(4, bool)], "A mask of 4 entries"),
     (lambda: np.zeros(3)[0, 1], "2 indices for an array of 1 axes"),
     (lambda: np.float64(3)[0], "single number"),
     (lambda: np.zeros((5, 3)) + np.zeros((3, 5)), "(the shape of P)"),
     (lambda: np.eye(3) @ np.zeros((5, 3)), "other axes than you meant"),
-    (lambda: np.zeros(3).reshape(2, 2), "3 numbers do not fill the shape (2,2)"),
+    (lambda: np.zeros(0)[0], "entry 0 of an array that has none"),
+    (lambda: np.zeros(3).reshape(2, 2), "3 numbers do not fill the shape (2,2), which takes 4: are there too many"),
+    (lambda: np.zeros(4).reshape(1, 1, 8), "which takes 8: is a length 2 times too large"),
+    (lambda: np.zeros(9).reshape(3, 1), "which takes 3: is a length 3 times too small"),
+    (lambda: np.zeros(9).reshape(2, -1, 2), "the shape (2,-1,2), which takes a multiple of 4"),
     (lambda: 1 if np.zeros(3) > 0 else 2, "np.where"),
     (lambda: np.zeros(3).sum(axis=1), "no axis 1 here"),
     (lambda: np.zeros(0).max(), "empty array"),
@@ -79,6 +85,7 @@ OF_A_LINE = [
     (lambda: int(np.float64(np.nan)), "int(u.mean())", "The mean of nothing is NaN"),
     (lambda: np.stack([np.zeros(256), np.zeros(4)]), "n = np.stack([np.bincount(i) for i in y])", "with 255 in it 256"),
     (lambda: np.zeros(7) == np.zeros((5, 3)) + np.zeros(7)[:7], "a == b", "mask both alike"),
+    (lambda: np.ones((1, 3)) + np.ones(4), "n = n[:k] + n[k + 1 :]", "+ joins lists. Of arrays it adds the numbers"),
     (lambda: np.zeros((5, 3)) + np.zeros((4, 3)), "a + b", "one has 5 entries where the other has 4"),
 ]
 
@@ -92,6 +99,13 @@ def test_a_product_after_a_division_is_seen_in_the_program():
     text = raised(lambda: np.zeros(2)[7])
     assert "a // 2 * H is (a // 2) * H" in explain(text, {}, "y[rows]", "rows = (2 * v + 1) * h // 2 * H\ny[rows]")
     assert "brackets" not in explain(text, {}, "y[rows]", "rows = (2 * v + 1) * h // (2 * H)\ny[rows]")
+    assert "brackets" not in explain(text, {}, "y[rows]", "rows = c // block * H\ny[rows]")  # as it is meant
+
+
+def test_an_axis_that_is_missing_is_seen_in_the_program():
+    text, program = raised(lambda: np.diagonal(np.delete(np.eye(3), 0))), "a = np.delete(n, {})\nreturn np.diagonal(a)"
+    assert "np.delete without an axis" in explain(text, {}, "return np.diagonal(a)", program.format("k"))
+    assert "np.delete" not in explain(text, {}, "return np.diagonal(a)", program.format("k, axis=0"))
 
 
 def test_what_is_not_known_is_not_explained():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from labgrader.checker import repair
 from labgrader.checker.comparison import Case
 from labgrader.checker.contrast import contrast
 from labgrader.checker.diagnosis import found_in_the_program
@@ -50,6 +51,13 @@ def test_a_repair_counts_if_it_mends_cases_that_are_not_shown():
 def test_of_two_mistakes_the_one_that_makes_more_right_is_told():
     source = "def f(a, b):\n    low = np.maximum(a, b)\n    return np.append(low - a, -b.sum())"
     assert found(lambda a, b: np.append(np.minimum(a, b) - a, b.sum()), source) == [("function", True, ["np.maximum"])]
+
+
+def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
+    source = "def f(a, b):\n    return a + b"
+    assert found(np.multiply, source)
+    monkeypatch.setattr(repair, "MOST_S_OF_ALL", 0.0)
+    assert found(np.multiply, source) == []
 
 
 def test_three_mistakes_are_not_found():

@@ -38,6 +38,8 @@ CASES = [(N,), (N @ N,)]
         ("t = n.sum(0) + n.sum(1); return n.diagonal() / t", "n.sum(0) + n.sum(1)"),
         ("a = n.sum(0); b = n.sum(1); return n.diagonal() / (a * b)", "n.sum(1)"),
         ("t = n.sum(0) + n.sum(1); t -= np.diag(n); t[0] = 0; return t * np.abs(t)", "n.sum(0) + n.sum(1)"),
+        ("b, a = n.sum(0) + n.sum(1), 1; return a / b", "n.sum(0) + n.sum(1)"),
+        ("a, b, c = n.sum(0) + n.sum(1); return a / b", "n.sum(1)"),  # a name may have got another's part
         ("return n[0] * n[1]", ""),  # parts of an argument say nothing
         ("return np.zeros(3) + 1", ""),  # nor do equal numbers
         ("while True: n = n + 0", ""),
@@ -79,6 +81,13 @@ def test_two_slips_of_which_one_is_listed_are_both_named():
         "    return y.mean(), np.ptp(y)\n",
     )
     assert "One is this: A mean leans" in said and "<" in said
+
+
+def test_a_slip_that_a_name_in_its_place_would_hide_is_not_called_a_listed_one():
+    said = reply(
+        "05_class_weights.least_cost", "def least_cost(q, cost):\n    return (cost @ q[..., None])[..., 0].argmax(-1)\n"
+    )
+    assert "most likely class" not in said  # which is that of argmax(q), and this is none
 
 
 def test_where_nothing_is_known_the_last_right_step_is_told():

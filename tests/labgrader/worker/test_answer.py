@@ -41,6 +41,16 @@ def test_a_right_answer_passes_and_a_wrong_one_gets_its_place():
     assert (found[0].kind, found[0].piece, found[0].spans) == ("operator", 1, (Span(4, 39, 4, 42),))
 
 
+@pytest.mark.parametrize("seconds, looks", [(0.1, ["watch", "repair"]), (3.0, ["repair"])])
+def test_no_watch_looks_at_an_answer_that_takes_longer_than_it_may(seconds, looks):
+    program, asked = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + WRONG))), []
+    with Answer(IOU, program, plain.fresh_worker, PATIENT) as answer:
+        answer.judged(public_cases(IOU))
+        answer.called_s, answer.worker.ask = seconds, lambda request, *limits: asked.append(request[0])
+        answer.findings()
+    assert [look for look in asked if look != "steps"] == looks
+
+
 def test_every_answer_has_a_process_that_has_run_nothing():
     leave = "import builtins, sys\nbuiltins.left = sys.left = np.left = 1\n"
     look = "import builtins, sys\nleft = [hasattr(where, 'left') for where in (builtins, sys, np)]\n"
