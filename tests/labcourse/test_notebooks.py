@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from notebooks import FEWER, LABS, LESSONS, ROOT, SOLUTIONS, code, is_compared, notebook, prose
+from notebooks import FEWER, FEWER_IN_LABS, LABS, LESSONS, ROOT, SOLUTIONS, code, is_compared, notebook, prose
 
 from labgrader.check import describe
 from labgrader.checker.judge import judge
@@ -48,9 +48,12 @@ def test_lessons_are_listed_as_they_are_read():
 
 
 def test_what_labs_do_less_of_in_the_suite_stands_in_them():
-    for topic, replaced in FEWER.items():
+    for topic, replaced in [*FEWER.items(), *FEWER_IN_LABS.items()]:
         source = "\n".join(cell.source for path in LABS if path.stem == topic for cell in code(path))
         assert not [many for many in replaced if many not in source], topic
+    for topic, replaced in FEWER.items():
+        compared = [cell.source for path in SOLUTIONS if path.stem == topic for cell in code(path) if is_compared(cell)]
+        assert not [source for source in compared if any(many in source for many in replaced)], topic
 
 
 @each([*LESSONS, *SOLUTIONS])

@@ -45,7 +45,9 @@ def whole_lab(topic: str) -> Honest:
     return Honest(topic, (*OWN["setup"], *((answer, name) for name, answer in kit.right_answers(topic).items())))
 
 
-@pytest.mark.parametrize("topic", [TOPICS[0], *(pytest.param(topic, marks=pytest.mark.nightly) for topic in TOPICS[1:])])
+@pytest.mark.parametrize(
+    "topic", [TOPICS[0], *(pytest.param(topic, marks=pytest.mark.nightly) for topic in TOPICS[1:])]
+)
 def test_whole_labs_are_right_however_an_editor_saves_them_and_wherever_the_cells_went(topic, tmp_path):
     """Each lab takes every fifth of the ways."""
     right = whole_lab(topic)
