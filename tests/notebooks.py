@@ -1,8 +1,8 @@
 """The course's notebooks, for the tests that look into them; as a plugin of pytest, what nbval compares.
 
 Outputs of lessons and solutions are compared with the committed ones. Labs have none: they run as students get them,
-but on fewer scenes and for fewer steps of training; their solutions do so where no compared output shows it. Each notebook has a kernel of its own,
-which is forked from one that has imported what they import.
+but on fewer scenes and for fewer steps of training; their solutions do so where no compared output shows it. Each
+notebook has a kernel of its own, which is forked from one that has imported what they import.
 """
 
 import re
