@@ -94,9 +94,9 @@ class Table:
 class Furniture:
     """A fixed box that is no thing to grasp: a bin's wall or floor, a shelf, a second table.
 
-    size: lengths in x, y and z before it is turned about `centre`, by `pitch` about y (the side at +x sinks) and then by
-    `yaw` about the vertical, radians. surface: whether its pixels are labelled surface, as the table's are, and not
-    background.
+    size: lengths in x, y and z before it is turned about `centre`, by `pitch` about y (its side at +x sinks) and
+    then by `yaw` about the vertical, radians. surface: whether its pixels are labelled surface, as the table's are, and
+    not background.
     """
 
     size: Vector
