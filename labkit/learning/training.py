@@ -15,7 +15,6 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
-from itertools import repeat
 from pathlib import Path
 
 import cv2
@@ -424,9 +423,9 @@ def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, pro
     config, out = trainer.config, checkpoint.parent
     bar = tqdm(total=trainer.total, initial=trainer.done, desc=config.model, unit="step", disable=not progress)
     with bar, DeferredInterrupt() as interrupt:
-        batches = trainer.ahead(workers) if workers else repeat(None)
+        batches = trainer.ahead(workers) if workers else None
         while trainer.done < trainer.total:
-            loss = trainer.step(next(batches))
+            loss = trainer.step() if batches is None else trainer.step(next(batches))
             bar.update()
             bar.set_postfix_str(progress_line(loss, trainer.history), refresh=False)
             if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:
