@@ -129,6 +129,7 @@ WIDE_SCENES ?= 1500
 ANY_SCENES ?= 1000
 CLUTTER_SCENES ?= 700
 BIN_SCENES ?= 300
+MESSY_SCENES ?= 700
 VAL_SCENES ?= 120
 SIZE ?= 320x240
 WORKERS ?= 2
@@ -143,6 +144,7 @@ train: .venv/installed
 	$(BIN)/python -m data_gen data/any --scenes $(ANY_SCENES) --first-seed 0 --config any --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/clutter --scenes $(CLUTTER_SCENES) --first-seed 0 --config clutter --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/bin --scenes $(BIN_SCENES) --first-seed 0 --config bin --size $(SIZE) --workers $(WORKERS)
+	$(BIN)/python -m data_gen data/messy --scenes $(MESSY_SCENES) --first-seed 0 --config messy --size $(SIZE) --workers $(WORKERS)
 	for model in smallsegnet unet; do
 	    $(BIN)/labkit train data/train --val data/val --model $$model $(if $(EPOCHS),--epochs $(EPOCHS)) --device $(DEVICE)
 	done
@@ -151,8 +153,9 @@ train: .venv/installed
 	$$rgbd data/wide --init data/runs/unet_rgbd.pt --epochs $(or $(EPOCHS),24) --lr 2e-3 --seed 1 --out data/runs/again
 	$(BIN)/labkit train data/any data/train --scenes $(ANY_SCENES) --init data/runs/again/unet_rgbd.pt --epochs $(or $(EPOCHS),40) \
 	    --lr 1.5e-3 --seed 2 --device $(DEVICE) --out data/runs/any
-	$(BIN)/labkit train data/any data/clutter data/bin --scenes $(CLUTTER_SCENES) --things \
-	    --init data/runs/any/unet_rgbd.pt --epochs $(or $(EPOCHS),10) --seed 3 --device $(DEVICE) --out data/runs/things
+	$(BIN)/labkit train data/messy data/any data/clutter data/bin --scenes $(CLUTTER_SCENES) --things --batch 16 \
+	    --init data/runs/any/unet_rgbd.pt --epochs $(or $(EPOCHS),55) --seed 3 --device $(DEVICE) \
+	    --workers $(if $(filter cuda,$(DEVICE)),$(WORKERS),0) --out data/runs/things
 	cp data/runs/{smallsegnet,unet}.pt data/runs/things/unet_rgbd.pt labkit/weights/
 	for model in smallsegnet unet; do $(BIN)/labkit export --model $$model --onnx labkit/weights/$$model.onnx; done
 

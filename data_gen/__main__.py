@@ -16,7 +16,7 @@ def main(
     out: Annotated[Path, typer.Argument(help="folder of the dataset")],
     scenes: Annotated[int, typer.Option(help="how many", min=1)] = 100,
     first_seed: Annotated[int, typer.Option(help="seed of the first scene; the others follow", min=0)] = 0,
-    config: Annotated[str, typer.Option(help="train, wide, any, clutter, bin, test, hard or other")] = "train",
+    config: Annotated[str, typer.Option(help="train, wide, any, clutter, bin, messy, test, hard or other")] = "train",
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels")] = "320x240",
     workers: Annotated[int, typer.Option(help="processes", min=1)] = 1,
     dask: Annotated[str | None, typer.Option(help="a Dask scheduler, tcp://host:8786, whose workers see OUT")] = None,

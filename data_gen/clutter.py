@@ -1,4 +1,6 @@
-"""Crowded scenes: things dropped in a heap, side by side, or into a bin, whatever they are (configs clutter and bin).
+"""Crowded scenes: things dropped in a heap, side by side, or into a bin (configs clutter, bin, messy).
+
+Config messy is both, in bins that are moulded rather than made of boards, and amid furniture.
 
 Nothing is kept apart here: things touch, lean and lie on and in each other, as they fall. Tables are small, large or
 beside a shelf, and the arm stands anywhere above them: what the camera sees of these is no thing.
@@ -19,7 +21,7 @@ from labkit.sim.spec import Furniture, ObjectSpec, Table, Texture
 
 APART = 0.004  # metres between bounding boxes where things start: they fall into contact
 BIN_FLOOR = 0.006  # metres
-CLEAR = 0.3  # metres that the hand stays over the table
+CLEAR = 0.3  # metres that the hand stays over the table where nothing else is asked for
 
 
 class Area(NamedTuple):
@@ -76,6 +78,64 @@ def bin_around(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, tu
     return area._replace(half_x=0.75 * half_x, half_y=0.75 * half_y), (*pieces, floor)
 
 
+def moulded_bin(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, tuple[Furniture, ...]]:
+    """A bin as it is moulded, whose floor bends up into leaning walls with a rim; and the area inside it.
+
+    A side is a strip of boards, each steeper than the one before.
+    """
+    half_x, half_y = (float(side) / 2 for side in rng.uniform((0.2, 0.26), (0.4, 0.5)))
+    yaw, lean = float(rng.uniform(-0.3, 0.3)), rng.uniform(1.0, 1.5)
+    bend, wall, rim = rng.uniform(0.005, 0.09), rng.uniform(0.03, 0.15), rng.choice([0.0, rng.uniform(0.01, 0.04)])
+    spare = np.maximum(np.array(stand.size[:2]) / 2.0 - (half_x, half_y), 0.0)
+    x, y = np.array(stand.centre) + 0.6 * rng.uniform(-1.0, 1.0, 2) * spare
+    area = Area(float(x), float(y), half_x, half_y, yaw, stand.z + BIN_FLOOR)
+    texture, thick, pieces = Texture(colour_a=colour), 0.004, []
+    slopes = [(bend / 4, angle) for angle in lean * np.array([0.1, 0.3, 0.55, 0.8])]
+    for turn, ahead, aside in (
+        (0.0, half_x, half_y),
+        (0.5, half_y, half_x),
+        (1.0, half_x, half_y),
+        (1.5, half_y, half_x),
+    ):
+        heading, out, rise = yaw + np.pi * turn, 0.0, area.z - thick / 2
+        for length, slope in [*slopes, (wall, lean), (rim, 0.0)]:
+            if length == 0.0:
+                continue
+            step = length * np.array([np.cos(slope), np.sin(slope)])
+            reach, z = ahead + out + step[0] / 2, rise + step[1] / 2
+            centre = area.x + reach * np.cos(heading), area.y + reach * np.sin(heading), z
+            size = length + thick / 2, 2 * (aside + out + step[0]), thick
+            pieces.append(
+                Furniture(tuple(map(float, size)), tuple(map(float, centre)), texture, heading, False, -slope)
+            )
+            out, rise = out + step[0], rise + step[1]
+    size, centre = (2 * half_x, 2 * half_y, BIN_FLOOR), (area.x, area.y, stand.z + BIN_FLOOR / 2)
+    floor = Furniture(size, centre, texture, yaw, True)
+    return area._replace(half_x=0.75 * half_x, half_y=0.75 * half_y), (*pieces, floor)
+
+
+def bystanders(rng: np.random.Generator, stand: Table, azimuth: float, texture) -> list[Furniture]:
+    """Up to five boxes on the far side of the table and beside it, such as chairs, screens and cupboards.
+
+    azimuth: of the camera; texture: function without arguments.
+    """
+    pieces = []
+    for _ in range(rng.integers(6) if rng.random() < 0.6 else 0):
+        heading, turn = azimuth + np.pi + rng.uniform(-1.9, 1.9), float(rng.uniform(-np.pi, np.pi))
+        wide, deep = rng.uniform((0.1, 0.03), (0.7, 0.5))
+        top, bottom = stand.z + rng.uniform(-0.4, 0.6), stand.z - 0.69
+        if rng.random() < 0.4:  # a screen, a seat: something that stands on a leg
+            bottom = top - rng.uniform(0.05, 0.4)
+        ray = np.array([np.cos(heading), np.sin(heading)])
+        edge = (np.array(stand.size[:2]) / 2 / np.maximum(np.abs(ray), 1e-6)).min()
+        x, y = stand.centre + ray * (edge + 0.02 + np.hypot(wide, deep) / 2 + rng.exponential(0.2))
+        if np.hypot(x, y) < 0.25 + np.hypot(wide, deep) / 2:  # the robot stands there
+            continue
+        size, centre = (wide, deep, top - bottom), (x, y, (top + bottom) / 2)
+        pieces.append(Furniture(tuple(map(float, size)), tuple(map(float, centre)), texture(), turn))
+    return pieces
+
+
 def second_plane(rng: np.random.Generator, stand: Table, texture: Texture) -> tuple[Furniture, ...]:
     """Nothing, a floor close below the table, or a shelf beside it, lower or higher."""
     kind = rng.random()
@@ -92,15 +152,15 @@ def second_plane(rng: np.random.Generator, stand: Table, texture: Texture) -> tu
     )
 
 
-def arm(rng: np.random.Generator, stand: Table) -> tuple[float, ...] | None:
-    """Joints that hold the hand above the table, so that the arm hangs into the picture; None for its home."""
+def arm(rng: np.random.Generator, stand: Table, clear: float = CLEAR) -> tuple[float, ...] | None:
+    """Joints that hold the hand `clear` metres over the table, so that the arm is in the picture; None: home."""
     if rng.random() < 0.6:
         return None
     while True:
         q = np.array(HOME)
         q[:7] = rng.uniform((-0.9, -0.8, -0.3, -2.6, -0.3, 1.2, -1.0), (0.9, 0.5, 0.3, -1.2, 0.3, 2.6, 2.5))
         hand = link_frames(q[:7])[8, :3, 3]
-        if hand[2] - 0.12 > stand.z + CLEAR and hand[0] > 0.3:
+        if hand[2] - 0.12 > stand.z + clear and hand[0] > 0.3:
             return tuple(q.tolist())
 
 

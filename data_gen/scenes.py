@@ -31,7 +31,8 @@ class SceneConfig:
     sensor: as in `labkit.sim.spec.Camera`. crowd: so many things of any class, dropped as they fall
     (`data_gen.clutter`), in place of targets among obstacles. bins: the share of scenes whose things lie in a bin.
     sizes: factor of things that are not of a household's size. painted: things have patches and stripes of other
-    colours.
+    colours. messy: what holds and surrounds a crowd is of more kinds: bins are moulded and often black, furniture
+    stands about the table, the arm hangs lower, and neighbours often have like colours.
     """
 
     stream: int
@@ -50,6 +51,7 @@ class SceneConfig:
     bins: float = 0.0
     sizes: tuple[float, float] = (1.0, 1.0)
     painted: bool = False
+    messy: bool = False
 
 
 CROWDED = {
@@ -99,6 +101,15 @@ CONFIGS = {
     "bin": SceneConfig(
         stream=7, crowd=(2, 20), bins=1.0, elevations=((0.6, 1.0), (1.0, 1.56)), distance=(0.5, 1.1), **CROWDED
     ),
+    "messy": SceneConfig(
+        stream=8,
+        crowd=(1, 20),
+        bins=0.5,
+        elevations=((0.3, 0.7), (0.7, 1.1), (1.1, 1.56)),
+        distance=(0.5, 1.4),
+        messy=True,
+        **CROWDED,
+    ),
 }
 
 
@@ -116,8 +127,8 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     (wide's objects from every elevation up to 89 degrees, at any roll: training data as well), "other" (test's objects
     as another camera sees them: from overhead, wide-angled, drawn by another renderer, with depth of a stereo pair),
     "clutter" (1 to 20 things from a marker to a jug, in heaps or loosely, on tables that end in view, beside shelves,
-    with the arm in the picture: training data) or "bin" (such things in a bin). Raises ValueError for a negative seed
-    or an unknown config.
+    with the arm in the picture: training data), "bin" (such things in a bin) or "messy" (both, before more kinds of
+    bins and furniture: training data). Raises ValueError for a negative seed or an unknown config.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
@@ -156,6 +167,8 @@ def _as_held(kind: SceneConfig) -> SceneConfig:
 
 def _crowded(rng: np.random.Generator, kind: SceneConfig, seed: int, config: str) -> SceneSpec:
     """Draw a scene of things as they fall, on a table or in a bin."""
+    if kind.messy:
+        return _messy(rng, kind, seed, config)
     table = clutter.table(rng, _texture(rng, kind))
     count = int(rng.integers(kind.crowd[0], kind.crowd[1] + 1))
     furniture = clutter.second_plane(rng, table, _texture(rng, kind))
@@ -177,6 +190,46 @@ def _crowded(rng: np.random.Generator, kind: SceneConfig, seed: int, config: str
         seed=seed,
         config=config,
     )
+
+
+def _messy(rng: np.random.Generator, kind: SceneConfig, seed: int, config: str) -> SceneSpec:
+    """Draw a scene of things as they fall, on a table or in a moulded bin, amid furniture."""
+    table = clutter.table(rng, _texture(rng, kind))
+    count, azimuth = int(rng.integers(kind.crowd[0], kind.crowd[1] + 1)), float(rng.uniform(-1.75, 1.75))
+    furniture = [*clutter.second_plane(rng, table, _texture(rng, kind))]
+    furniture += clutter.bystanders(rng, table, azimuth, lambda: _texture(rng, kind))
+    if rng.random() < kind.bins:
+        area, walls = clutter.moulded_bin(rng, table, _shade(rng) if rng.random() < 0.5 else _colour(rng))
+        furniture += walls
+    else:
+        area = clutter.heap_area(rng, table, count)
+    few = [_object_colour(rng, table) for _ in range(rng.integers(1, 4))]
+    alike = rng.choice([0.0, 0.0, 0.7])
+    objects = clutter.things(
+        rng,
+        table,
+        area,
+        count,
+        kind.sizes,
+        lambda: few[rng.integers(len(few))] if rng.random() < alike else _object_colour(rng, table),
+    )
+    return SceneSpec(
+        objects=objects,
+        camera=_camera(rng, kind, azimuth, np.array([[area.x, area.y, area.z + 0.03]])),
+        table=table,
+        light=_light(rng),
+        floor=_texture(rng, kind),
+        walls=_texture(rng, kind),
+        furniture=tuple(furniture),
+        joints=clutter.arm(rng, table, clear=float(rng.uniform(0.12, 0.3))),
+        seed=seed,
+        config=config,
+    )
+
+
+def _shade(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Black or a dark grey, hardly coloured."""
+    return colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.0, 0.3), rng.uniform(0.01, 0.25))
 
 
 def _colour(rng: np.random.Generator) -> tuple[float, float, float]:

@@ -28,6 +28,9 @@ def train(
         float | None, typer.Option(help="Metres per unit of a folder's depth; else the camera file's, or 0.001.")
     ] = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
+    workers: Annotated[
+        int, typer.Option(help="Processes that make batches ahead, for a GPU; the run is the same.", min=0)
+    ] = 0,
     seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in OUT, if there is one.")] = True,
@@ -63,7 +66,7 @@ def train(
     val_set = None if val is None else opened(val)
     train_set = data_gen.Joined([opened(path) for path in data], each=scenes)
     try:
-        history = training.train(train_set, val_set, config, out, resume, device, model=network)
+        history = training.train(train_set, val_set, config, out, resume, device, model=network, workers=workers)
     except KeyboardInterrupt as stop:  # it says where the checkpoint is
         if ranks.leads():
             typer.echo(f"labkit: {stop}", err=True)

@@ -18,7 +18,7 @@ from labkit.geometry.sensor import DepthSensor
 from labkit.labels import IGNORE, OBSTACLE, TARGET
 from labkit.learning.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
 from labkit.learning.channels import geometry_channels, mirrored
-from labkit.learning.paint import painted
+from labkit.learning.paint import BANDS, painted
 from labkit.learning.view import rolled_camera
 
 SIZES = 0.8, 1.7  # of a world, to that which was rendered, where things shall be told apart
@@ -86,7 +86,7 @@ def correlated_noise(shape: tuple[int, int], rng: np.random.Generator) -> Float[
     noise = np.zeros(shape, np.float32)
     for _ in range(rng.integers(1, 4)):
         apart = np.exp(rng.uniform(np.log(2.0), np.log(24.0)))
-        knots = rng.standard_normal([int(side / apart) + 2 for side in shape]).astype(np.float32)
+        knots = knots_of(shape, rng, apart)
         noise += np.float32(rng.uniform(0.2, 1.0)) * cv2.resize(knots, shape[::-1])
     return noise * np.float32(rng.uniform(0.0, 0.004)) / noise.std()
 
@@ -147,9 +147,55 @@ def hidden_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     return replace(frame, depth=depth)
 
 
+def exposed(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """The picture at another exposure: too dark, too bright, or with other mid tones."""
+    gamma, gain = np.exp(rng.uniform(np.log((0.6, 0.35)), np.log((2.2, 1.8))))
+    tones = np.clip(255.0 * gain * (np.arange(256) / 255.0) ** gamma, 0.0, 255.0).astype(np.uint8)
+    return replace(frame, rgb=cv2.LUT(frame.rgb, tones))
+
+
+def bent(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """Depth with an error of 1 to 15 mm that changes over a third of the picture or more: nothing is quite plane.
+
+    Lenses err so, and bins and worn tables are so.
+    """
+    error = smooth_field(frame.depth.shape, rng, rng.uniform(0.3, 1.0) * max(frame.depth.shape))
+    error *= np.float32(np.exp(rng.uniform(np.log(0.001), np.log(0.015))) / max(np.abs(error).max(), 1e-6))
+    return replace(frame, depth=np.where(frame.depth > 0.0, frame.depth + error, np.float32(0.0)))
+
+
+def without_depth(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+    """Up to a third of the picture without depth: in ragged patches, or where it is darkest; sometimes black there.
+
+    A scanner that gives a colour with each point alone gives none, which is black, where it has no point.
+    """
+    field = smooth_field(frame.depth.shape, rng, np.exp(rng.uniform(np.log(6.0), np.log(120.0))))
+    if rng.random() < 0.4:
+        field = frame.rgb.max(axis=2) / np.float32(40.0) + np.float32(0.3) * field
+    field += np.float32(rng.uniform(0.1, 0.7)) * rng.standard_normal(field.shape, np.float32)
+    lost = field < np.quantile(field[::4, ::4], rng.uniform(0.02, 0.33))
+    rgb = np.where(lost[..., None], np.uint8(0), frame.rgb) if rng.random() < 0.3 else frame.rgb
+    return replace(frame, rgb=rgb, depth=np.where(lost, np.float32(0.0), frame.depth))
+
+
+def smooth_field(shape: tuple[int, int], rng: np.random.Generator, apart: float) -> Float[np.ndarray, "H W"]:
+    """Numbers around 0, about 1 in size, interpolated between random knots that are `apart` pixels apart."""
+    return cv2.resize(knots_of(shape, rng, apart), shape[::-1], interpolation=cv2.INTER_CUBIC)
+
+
+def knots_of(shape: tuple[int, int], rng: np.random.Generator, apart: float) -> Float[np.ndarray, "h w"]:
+    """As many random numbers as cover a picture of `shape` at `apart` pixels."""
+    return rng.standard_normal([int(side / apart) + 2 for side in shape]).astype(np.float32)
+
+
 def varied_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
-    """A frame with instances as it may be before the canonical view: painted, and one in two of another size."""
-    frame = painted(frame, rng)
+    """A frame with instances as it may be before the canonical view.
+
+    Painted, and some each of another exposure, with bent or missing depth, and of another size.
+    """
+    frame = painted(frame, rng, bands=BANDS)
+    for change, share in ((exposed, 0.4), (bent, 0.35), (without_depth, 0.35)):
+        frame = change(frame, rng) if rng.random() < share else frame
     return random_size(frame, rng, *SIZES) if rng.random() < 0.5 else frame
 
 

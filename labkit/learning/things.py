@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import torch
 
 CELL = 3  # pixels of the view along a side of the histogram's cells
-SPREAD = 1.6  # cells: standard deviation of the Gaussian that smooths the histogram
-APART = 16  # pixels: of two peaks that are closer, the lower one is none
+SPREAD = 1.0  # cells: standard deviation of the Gaussian that smooths the histogram
+APART = 10  # pixels: of two peaks that are closer, the lower one is none
 ENOUGH = 1.2  # votes in a cell of the smoothed histogram: a lower peak is none
 LEAST = 60  # pixels of the view: a smaller thing is none
 AGREES = 0.5  # of the radius of a disc of the thing's area: a vote that misses the peak by less agrees with it

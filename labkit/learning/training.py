@@ -17,10 +17,12 @@ from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional as F
+from torch.utils.data import DataLoader
 from tqdm.auto import tqdm
 
 from labkit.labels import CLASSES, IGNORE
@@ -260,9 +262,16 @@ class Trainer:
             truth = [F.pad(image, edges, value=IGNORE) for image in truth]
         return arrays, truth[0], truth[1] if self.things else None
 
-    def step(self) -> float:
-        """Make one optimiser step and return its loss, over all ranks' images."""
-        arrays, y, instances = self.batch_of_step(self.done)
+    def ahead(self, workers: int):
+        """The batches of all steps that are left, made by so many forked processes: the very same ones."""
+        steps = range(self.done, self.total)
+        how = {"collate_fn": self.batch_of_step, "num_workers": workers, "multiprocessing_context": "fork"}
+        cv2.setNumThreads(1)  # its threads do not outlive a fork, and a worker would wait for them
+        return iter(DataLoader(steps, batch_size=None, worker_init_fn=_leave_ctrl_c, **how))
+
+    def step(self, batch=None) -> float:
+        """Make one optimiser step and return its loss, over all ranks' images; batch: that of `batch_of_step`."""
+        arrays, y, instances = self.batch_of_step(self.done) if batch is None else batch
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.learning_rate(self.done, self.total)
         self.model.train()
@@ -328,6 +337,11 @@ class Trainer:
         require("out", together, "a checkpoint that every process reads, or none", f"step {self.done} here alone")
 
 
+def _leave_ctrl_c(worker: int) -> None:
+    """A worker does not stop at Ctrl-C: its parent ends it, after the step that is being made."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def stacked(images: Sequence[np.ndarray], beyond: int | None = None) -> torch.Tensor:
     """Images as one tensor: smaller ones get the value `beyond` at their right and lower edge, None repeats theirs."""
     H, W = np.max([image.shape[:2] for image in images], axis=0)
@@ -357,14 +371,16 @@ def train(
     progress: bool = True,
     model: nn.Module | None = None,
     loss: Callable = segmentation_loss,
+    workers: int = 0,
 ) -> list[dict]:
     """Train a network and return its history: one dict per epoch (epoch, steps, loss, and mean_iou and iou by class).
 
     train_set, val_set: datasets as ImagesInMemory takes them, or ImagesInMemory; val_set may be None. model: a network
     of one's own, which is trained in place, as `labkit.network.TorchEngine` describes it. loss: a function of logits
     (N, C, H, W), labels (N, H, W) and class weights (C,) to a scalar, as `segmentation_loss` is; its attribute
-    `sums_over_pixels` tells that the scalar is a sum over pixels, divided by how many are counted. In the
-    folder `out` are written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json;
+    `sums_over_pixels` tells that the scalar is a sum over pixels, divided by how many are counted. workers: processes
+    that make batches ahead, where processes can fork; the run is the same with any number of them. In the folder `out`
+    are written, atomically, after each epoch: NAME.pt, the weights for load_model; NAME.history.json;
     NAME.checkpoint.pt, from which `resume` goes on. The checkpoint is written at Ctrl-C, too, which then raises
     KeyboardInterrupt and says where it is. On one machine, with as many threads, a resumed run ends with the very
     weights of an undisturbed one. Under torchrun, each process makes its part of every batch; the first one writes.
@@ -384,7 +400,7 @@ def train(
         if resume and checkpoint.is_file():
             trainer.restore(read_checkpoint("out", checkpoint), checkpoint)
         trainer.check_together()
-        run(trainer, val_data, checkpoint, progress)
+        run(trainer, val_data, checkpoint, progress, workers)
         return trainer.history
 
 
@@ -402,13 +418,14 @@ def check_loss(loss: Callable, config: TrainConfig, validated: bool) -> None:
         require("weights", config.weights == "none" or not validated, expected, repr(config.weights))
 
 
-def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, progress: bool) -> None:
+def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, progress: bool, workers: int = 0) -> None:
     """Make all steps that are left, and write what there is after each epoch and at Ctrl-C."""
     config, out = trainer.config, checkpoint.parent
     bar = tqdm(total=trainer.total, initial=trainer.done, desc=config.model, unit="step", disable=not progress)
     with bar, DeferredInterrupt() as interrupt:
+        batches = trainer.ahead(workers) if workers else None
         while trainer.done < trainer.total:
-            loss = trainer.step()
+            loss = trainer.step() if batches is None else trainer.step(next(batches))
             bar.update()
             bar.set_postfix_str(progress_line(loss, trainer.history), refresh=False)
             if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:

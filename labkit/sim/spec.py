@@ -94,8 +94,9 @@ class Table:
 class Furniture:
     """A fixed box that is no thing to grasp: a bin's wall or floor, a shelf, a second table.
 
-    size: lengths in x, y and z before it is turned by `yaw` (radians) about the vertical through `centre`. surface:
-    whether its pixels are labelled surface, as the table's are, and not background.
+    size: lengths in x, y and z before it is turned about `centre`, by `pitch` about y (its side at +x sinks) and
+    then by `yaw` about the vertical, radians. surface: whether its pixels are labelled surface, as the table's are, and
+    not background.
     """
 
     size: Vector
@@ -103,6 +104,7 @@ class Furniture:
     texture: Texture = Texture()
     yaw: float = 0.0
     surface: bool = False
+    pitch: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -176,22 +176,23 @@ class World:
         self.table = self._box((length, width, thickness), centre, table.texture)
         self.surfaces = [self.table]
         for piece in spec.furniture:
-            body = self._box(piece.size, piece.centre, piece.texture, piece.yaw)
+            body = self._box(piece.size, piece.centre, piece.texture, piece.yaw, piece.pitch)
             if piece.surface:
                 self.surfaces.append(body)
         if spec.robot:
             stand = Texture(colour_a=(0.3, 0.3, 0.32))
             self._box((0.2, 0.2, -floor - 0.001), (0.0, 0.0, floor / 2), stand)
 
-    def _box(self, size, centre, texture: Texture, yaw: float = 0.0) -> int:
-        """A fixed box with a texture on each side, turned about the vertical."""
+    def _box(self, size, centre, texture: Texture, yaw: float = 0.0, pitch: float = 0.0) -> int:
+        """A fixed box with a texture on each side, turned about y and then about the vertical."""
         half = [length / 2 for length in size]
+        (s, c), (s_pitch, c_pitch) = ((np.sin(angle / 2.0), np.cos(angle / 2.0)) for angle in (yaw, pitch))
         body = self.client.createMultiBody(
             0.0,
             self.client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half),
             self.client.createVisualShape(pybullet.GEOM_BOX, halfExtents=half, rgbaColor=(1, 1, 1, 1)),
             centre,
-            (0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0)),
+            (-s * s_pitch, c * s_pitch, s * c_pitch, c * c_pitch),
         )
         picture = cv2.imencode(".png", cv2.cvtColor(paint(texture), cv2.COLOR_RGB2BGR))[1].tobytes()
         with as_file(picture, ".png") as path:

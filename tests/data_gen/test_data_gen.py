@@ -10,26 +10,29 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import data_gen
-from data_gen import dataset
+from data_gen import clutter, dataset
 from data_gen.families import FAMILIES
 from data_gen.scenes import CONFIGS
 from data_gen.statistics import statistics
 from data_gen.wide import WIDE
+from labkit.geometry import back_project_to_base
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import OBSTACLE, TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.shapes import object_mesh
-from labkit.sim.spec import SceneSpec
+from labkit.sim.spec import Camera, SceneSpec, Table
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
 
 SIZE = (80, 60)
+OVERHEAD = Camera.looking_at((0.55, 0.0, 0.0), 0.9, 0.3, 1.5)
 
 
 @cache
@@ -150,7 +153,7 @@ def test_statistics_of_test_are_as_promised():
     assert s.target_pixels <= 0.02
 
 
-@pytest.mark.parametrize("config", ["clutter", pytest.param("bin", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("config", ["messy", *(pytest.param(c, marks=pytest.mark.nightly) for c in ("clutter", "bin"))])
 def test_crowds_are_repeatable_and_what_holds_them_is_no_thing(config):
     """1 to 20 things of many sizes; walls, floors of bins and shelves have no instance, and only floors are surface."""
     specs = [data_gen.sample_scene(seed, config) for seed in range(12)]
@@ -161,7 +164,7 @@ def test_crowds_are_repeatable_and_what_holds_them_is_no_thing(config):
     assert min(lengths) < 0.05 and max(lengths) > 0.2
     assert any(spec.joints for spec in specs) and not all(spec.joints for spec in specs)
     walled = [sum(piece.surface for piece in spec.furniture) for spec in specs]
-    assert walled == [config == "bin"] * len(specs)
+    assert set(walled) == {"clutter": {0}, "bin": {1}, "messy": {0, 1}}[config]
     with World(specs[3]) as world:
         frame = dataset.picture_of(world, SIZE)
     again = data_gen.render(specs[3], SIZE)
@@ -180,6 +183,29 @@ def test_things_in_a_bin_lie_in_it_and_on_each_other():
     inside = np.abs((middles[:, :2] - floor.centre[:2]) @ [[c, -s], [s, c]]) < np.array(floor.size[:2]) / 2
     assert inside.all(axis=1).mean() > 0.6 and max(bottoms) > floor.centre[2] + 0.02
     assert all(wall.size[2] >= 0.05 for wall in walls)
+
+
+def test_a_moulded_bin_bends_up_into_walls_that_lean_outwards_without_a_gap():
+    """Straight down, its sides rise without a step from the floor to the rim; nothing of it is below the floor."""
+    stand = Table(centre=(0.55, 0.0), size=(0.7, 0.9, 0.05), z=0.0)
+    for seed in range(4):
+        area, (*boards, floor) = clutter.moulded_bin(np.random.default_rng(seed), stand, (0.1, 0.1, 0.1))
+        slopes = [piece.pitch for piece in boards]
+        assert min(slopes) < -0.9 and max(slopes) <= 0.0 and floor.pitch == 0.0 and floor.surface
+        ahead = np.array([np.cos(floor.yaw), np.sin(floor.yaw)])
+        side = [piece for piece in boards if piece.yaw == floor.yaw]
+        ends = [np.cos(p.pitch) * (p.size[0] - 0.002) / 2 for p in side]
+        middles = [(np.array(p.centre[:2]) - floor.centre[:2]) @ ahead for p in side]
+        assert np.isclose(middles[0] - ends[0], floor.size[0] / 2, atol=1e-6)
+        for (end, middle), (next_end, next_middle) in pairwise(zip(ends, middles, strict=True)):
+            assert np.isclose(middle + end, next_middle - next_end, atol=1e-6)
+        assert min(piece.centre[2] for piece in boards) > floor.centre[2]
+        with World(
+            SceneSpec(objects=(), camera=OVERHEAD, table=stand, furniture=(*boards, floor), robot=False)
+        ) as world:
+            frame = world.render(SIZE)
+        height = back_project_to_base(frame.depth, frame.K, frame.T_base_cam)[..., 2]
+        assert (frame.instances == 0).all() and np.nanmax(height) > area.z + 0.02
 
 
 # Datasets -----------------------------------------------------------------------------------------------------------

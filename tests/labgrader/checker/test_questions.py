@@ -8,10 +8,13 @@ weak.
 
 import ast
 import inspect
+import math
 import textwrap
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -28,6 +31,7 @@ from labgrader.course import find, of_topic, topics
 CHECKS, SEEDS = (0,), (0, 1, 20_260_101)  # the seed of `check`; those of the night
 SEARCHED = 150  # random inputs on which a surviving mutant must differ nowhere
 LIMIT_S = 1.0
+SEARCH_S = 1.0  # of a processor, in which a difference is looked for
 
 KINDS = ("operator", "comparison", "order", "sign", "not", "axis", "constant", "function", "brackets")
 
@@ -42,7 +46,8 @@ class Mutant:
 
 def mutants(reference: Callable) -> list[Mutant]:
     """The mutations of a reference that change one node, each as a function that can be called."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(reference))))
+    reference = inspect.unwrap(reference)  # the globals of what is wrapped round it are others
+    tree = ast.parse(textwrap.dedent(inspect.getsource(reference)))
     found = []
     for mutation in mutations(tree.body[0]):
         if mutation.kind not in KINDS or mutation.cost > 1 or len(mutation.places) > 1:
@@ -104,9 +109,7 @@ def grade(question: Question, extra: tuple[Callable, ...] = (), seeds: tuple[int
     survivors = [m for m in all_mutants if any(passes(question, m.function, of_seed) for of_seed in cases)]
     drawn = [question.inputs(rng) for _ in range(SEARCHED)] if survivors else []
     searched = [Case(args, trusted(question.reference, args), False) for args in drawn]
-    accepted += [
-        m.name for m in survivors if not all(passes(question, m.function, some) for some in (searched, *cases))
-    ]
+    accepted += [m.name for m in survivors if not passes(question, m.function, [*chain(*cases), *searched], SEARCH_S)]
     equivalent = [m.name for m in survivors if m.name not in accepted]
     wrong = len(question.misconceptions) + len(all_mutants) - len(equivalent)
     return Trial(len(right), wrong, tuple(rejected), tuple(accepted), tuple(equivalent))
@@ -119,9 +122,15 @@ def objections(question: Question, answer: Callable, seeds: tuple[int, ...]) -> 
     return [f"{title}, seed {seed}: {v.problem} in {v.where}" for seed, v in verdicts.items() if not v.passed]
 
 
-def passes(question: Question, answer: Callable, cases: list[Case]) -> bool:
-    """Whether an answer is right on all cases, and returns in time; the judge asks more, and says what is wrong."""
+def passes(question: Question, answer: Callable, cases: list[Case], seconds: float = math.inf) -> bool:
+    """Whether an answer is right on all cases, and returns in time; the judge asks more, and says what is wrong.
+
+    seconds: of a processor, after which no further case is tried: a mutant may go round a loop a thousand times.
+    """
+    end = time.process_time() + seconds
     for case in cases:
+        if time.process_time() > end:
+            break
         try:
             with limited(LIMIT_S):
                 (got,), _ = outputs_of(answer, [case.args])
@@ -161,7 +170,8 @@ def test_a_reference_is_short_and_complete_in_itself(name):
     source = inspect.getsource(question.reference)
     assert question.reference.__name__ == question.function
     assert ast.get_docstring(ast.parse(source).body[0])
-    used = {node.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)}
+    names = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)]
+    used = {node.id for node in names} - {node.id for node in names if isinstance(node.ctx, ast.Store)}
     globals_used = {key: question.reference.__globals__[key] for key in used & question.reference.__globals__.keys()}
     assert not [key for key, value in globals_used.items() if inspect.isfunction(value) or inspect.isclass(value)]
 
