@@ -258,7 +258,7 @@ def wrong_dtype(expected, got) -> Problem | None:
     if wanted != "b" and came == "b":
         numbers = "real numbers" if wanted == "f" else "whole numbers"
         return Problem("dtype", f"expected {numbers}, got dtype bool: write .astype(float) or .astype(int)")
-    if wanted in "iu" and came == "f" and not (np.mod(got, 1.0) == 0.0).all():
+    if wanted in "iu" and came == "f" and not (np.isfinite(got) & (np.floor(got) == got)).all():
         return Problem("dtype", f"expected whole numbers, got fractions or NaN in an array of {got.dtype}")
     if wanted in "iu" and came == "f" and got.size and got.shape:
         cast = ", so write .astype(int)" if np.array_equal(expected, got) else ""

@@ -36,7 +36,7 @@ QUESTION = Question(
     inputs=_points_near_a_plane,
     by_hand=(
         (np.array([[0.0, 0, 2], [1, 0, 2], [0, 3, 2], [1, 3, 2]]), np.ones(4)),  # level, at height 2
-        (np.array([[0.0, 0, 1], [1, 0, 0], [0, 5, 1], [1, 5, 0]]), np.ones(4)),  # 45 degrees: x + z = 1
+        (np.array([[0.0, 0, 1], [1, 0, 0], [0, 5, 1], [1, 5, 0]]), np.full(4, 1.5)),  # 45 degrees: x + z = 1
         (np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0], [4, 3, 0.1]]), np.array([0.01, 0.01, 0.01, 100.0])),
     ),
     random_cases=6,
