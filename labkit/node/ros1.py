@@ -73,6 +73,11 @@ class Ros1Transport(Transport):
         """Leave ROS."""
         self._closing.set()
         self._keeper.join()
+        for hook in self._rospy.core._shutdown_hooks:
+            # rospy closes its server's socket and lets it go on: it would poll what is closed with all of a core.
+            if server := getattr(node := getattr(hook, "__self__", None), "server", None):
+                node.is_shutdown = True
+                server.shutdown()
         self._rospy.signal_shutdown("done")
 
     def advertise(self, topic: str, kind: type) -> None:
