@@ -65,7 +65,7 @@ REPAIRS = {
     "names exchanged": "Two names are exchanged here. Which one belongs where?",
     "a hair": "The marked part comes out a hair below a whole number, 12.999... for 13, and is then cut off. "
     "How do whole numbers, divided once and at last, avoid that?",
-    "off by one": "The marked part is off by one, or by a half. Where do you begin to count? Which way do you round?",
+    "off by one": "The marked part is off by one, or by a half. Where do you begin to count? If you round: which way?",
     "factor": "The marked part should be larger or smaller by a constant factor. Which one, and why?",
     "logarithm": "A logarithm is missing here. What does the formula take: the number, or its logarithm?",
     "reciprocal": "Numerator and denominator are exchanged here. What is divided by what?",

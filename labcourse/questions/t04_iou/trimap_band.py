@@ -37,7 +37,7 @@ QUESTION = Question(
         (np.full((4, 7), 3, np.uint8), 2),  # one class: no edge, at the image's border neither
         (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 1),  # one step from 1 nothing was judged
         (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 2),
-        (np.array([[0, 0, 255, 255]], np.uint8), 1),  # beside class 0, too, nothing was judged
+        (np.array([[0, 0, 255, 255]], np.uint8), 2),  # beside class 0, too, nothing was judged
         (np.array([[4, 4, 4, 9, 9, 254]], np.uint8), 1),  # nor is 3 the last class
         (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
     ),
