@@ -58,13 +58,25 @@ def heap_area(rng: np.random.Generator, stand: Table, count: int) -> Area:
     return Area(float(x), float(y), *map(float, half), 0.0, stand.z)
 
 
+def bin_area(rng: np.random.Generator, stand: Table, half_x: float, half_y: float, yaw: float) -> Area:
+    """Where the floor of a bin of that size lies on the table."""
+    spare = np.maximum(np.array(stand.size[:2]) / 2.0 - (half_x, half_y), 0.0)
+    x, y = np.array(stand.centre) + 0.6 * rng.uniform(-1.0, 1.0, 2) * spare
+    return Area(float(x), float(y), half_x, half_y, yaw, stand.z + BIN_FLOOR)
+
+
+def with_floor(area: Area, stand: Table, texture: Texture, sides) -> tuple[Area, tuple[Furniture, ...]]:
+    """Where things start in a bin whose floor is `area`, and its sides with the floor."""
+    size, centre = (2 * area.half_x, 2 * area.half_y, BIN_FLOOR), (area.x, area.y, stand.z + BIN_FLOOR / 2)
+    floor = Furniture(size, centre, texture, area.yaw, True)
+    return area._replace(half_x=0.75 * area.half_x, half_y=0.75 * area.half_y), (*sides, floor)
+
+
 def bin_around(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, tuple[Furniture, ...]]:
     """A bin of four walls and a floor on the table, and the area inside it."""
     half_x, half_y = (float(side) / 2 for side in rng.uniform((0.26, 0.32), (0.4, 0.5)))
     height, wall, yaw = rng.uniform(0.05, 0.15), rng.uniform(0.003, 0.012), float(rng.uniform(-0.3, 0.3))
-    spare = np.maximum(np.array(stand.size[:2]) / 2.0 - (half_x, half_y), 0.0)
-    x, y = np.array(stand.centre) + 0.6 * rng.uniform(-1.0, 1.0, 2) * spare
-    area = Area(float(x), float(y), half_x, half_y, yaw, stand.z + BIN_FLOOR)
+    area = bin_area(rng, stand, half_x, half_y, yaw)
     texture = Texture(colour_a=colour)
     middle = stand.z + height / 2
     walls = [((wall, 2 * half_y + 2 * wall, height), (side, 0.0)) for side in (-1.0, 1.0)]
@@ -72,10 +84,7 @@ def bin_around(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, tu
     pieces = [
         Furniture(tuple(map(float, size)), (*area.at(a, b).tolist(), middle), texture, yaw) for size, (a, b) in walls
     ]
-    floor = Furniture(
-        (2 * half_x, 2 * half_y, BIN_FLOOR), (area.x, area.y, stand.z + BIN_FLOOR / 2), texture, yaw, True
-    )
-    return area._replace(half_x=0.75 * half_x, half_y=0.75 * half_y), (*pieces, floor)
+    return with_floor(area, stand, texture, pieces)
 
 
 def moulded_bin(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, tuple[Furniture, ...]]:
@@ -86,9 +95,7 @@ def moulded_bin(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, t
     half_x, half_y = (float(side) / 2 for side in rng.uniform((0.2, 0.26), (0.4, 0.5)))
     yaw, lean = float(rng.uniform(-0.3, 0.3)), rng.uniform(1.0, 1.5)
     bend, wall, rim = rng.uniform(0.005, 0.09), rng.uniform(0.03, 0.15), rng.choice([0.0, rng.uniform(0.01, 0.04)])
-    spare = np.maximum(np.array(stand.size[:2]) / 2.0 - (half_x, half_y), 0.0)
-    x, y = np.array(stand.centre) + 0.6 * rng.uniform(-1.0, 1.0, 2) * spare
-    area = Area(float(x), float(y), half_x, half_y, yaw, stand.z + BIN_FLOOR)
+    area = bin_area(rng, stand, half_x, half_y, yaw)
     texture, thick, pieces = Texture(colour_a=colour), 0.004, []
     slopes = [(bend / 4, angle) for angle in lean * np.array([0.1, 0.3, 0.55, 0.8])]
     for turn, ahead, aside in (
@@ -109,9 +116,7 @@ def moulded_bin(rng: np.random.Generator, stand: Table, colour) -> tuple[Area, t
                 Furniture(tuple(map(float, size)), tuple(map(float, centre)), texture, heading, False, -slope)
             )
             out, rise = out + step[0], rise + step[1]
-    size, centre = (2 * half_x, 2 * half_y, BIN_FLOOR), (area.x, area.y, stand.z + BIN_FLOOR / 2)
-    floor = Furniture(size, centre, texture, yaw, True)
-    return area._replace(half_x=0.75 * half_x, half_y=0.75 * half_y), (*pieces, floor)
+    return with_floor(area, stand, texture, pieces)
 
 
 def bystanders(rng: np.random.Generator, stand: Table, azimuth: float, texture) -> list[Furniture]:

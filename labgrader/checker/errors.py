@@ -23,11 +23,10 @@ def explain(text: str, args: dict, line: str = "", program: str = "") -> str:
     >>> explain("ZeroDivisionError: division by zero", {"n": 1})
     'Something that you divide by is 0 in this case.'
     """
-    for look in OF_THE_LINE:
-        if says := look(text, line):
-            return says
-    if says := divided_first(text, program) or flattened(text, program):
-        return says
+    for looks, source in ((OF_THE_LINE, line), (OF_THE_PROGRAM, program)):
+        for look in looks:
+            if says := look(text, source):
+                return says
     for pattern, function in EXPLAINED:
         if (found := pattern.match(text)) and (said := function(found, args)):
             return said
@@ -111,10 +110,11 @@ def flattened(text: str, program: str) -> str:
 
 def joined(text: str, line: str) -> str:
     """Slices of an array with + between them, as lists are joined."""
-    pairs = [node for node in expressions_of(line) if isinstance(getattr(node, "op", None), ast.Add)]
-    for node in pairs if "broadcast" in text else ():
-        sides = [getattr(node, "left", None), getattr(node, "right", None)]
-        if all(isinstance(getattr(side, "slice", None), ast.Slice) for side in sides):
+    if "broadcast" not in text:
+        return ""
+    for node in expressions_of(line):
+        sides = (node.left, node.right) if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add) else ()
+        if sides and all(isinstance(getattr(side, "slice", None), ast.Slice) for side in sides):
             return "+ joins lists. Of arrays it adds the numbers, entry by entry: np.concatenate joins those."
     return ""
 
@@ -134,6 +134,7 @@ def counted(text: str, line: str) -> str:
 
 
 OF_THE_LINE = (compared, called, of_one_vector, transformed, joined, nothing_to_average, counted)
+OF_THE_PROGRAM = (divided_first, flattened)
 
 # ---------------------------------------------------------------------------------------- by the exception's text
 

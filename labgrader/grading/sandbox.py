@@ -211,10 +211,11 @@ def greeted(packages: Sequence[str], limits: Limits) -> tuple[Server, Worker]:
             return server, started
         except WorkerLost as lost:
             server.close()
-            if is_new and (pause := next(pauses, None)) is None:
+            if not is_new:
+                continue
+            if (pause := next(pauses, None)) is None:
                 raise ValueError(f"sandbox: a worker with {', '.join(packages)} does not start: {lost}") from None
-            if is_new:
-                time.sleep(pause)
+            time.sleep(pause)
 
 
 def probe(packages: Sequence[str], limits: Limits) -> None:

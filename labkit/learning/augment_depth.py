@@ -86,8 +86,8 @@ def correlated_noise(shape: tuple[int, int], rng: np.random.Generator) -> Float[
     noise = np.zeros(shape, np.float32)
     for _ in range(rng.integers(1, 4)):
         apart = np.exp(rng.uniform(np.log(2.0), np.log(24.0)))
-        knots = knots_of(shape, rng, apart)
-        noise += np.float32(rng.uniform(0.2, 1.0)) * cv2.resize(knots, shape[::-1])
+        field = smooth_field(shape, rng, apart, cv2.INTER_LINEAR)
+        noise += np.float32(rng.uniform(0.2, 1.0)) * field
     return noise * np.float32(rng.uniform(0.0, 0.004)) / noise.std()
 
 
@@ -178,14 +178,12 @@ def without_depth(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     return replace(frame, rgb=rgb, depth=np.where(lost, np.float32(0.0), frame.depth))
 
 
-def smooth_field(shape: tuple[int, int], rng: np.random.Generator, apart: float) -> Float[np.ndarray, "H W"]:
-    """Numbers around 0, about 1 in size, interpolated between random knots that are `apart` pixels apart."""
-    return cv2.resize(knots_of(shape, rng, apart), shape[::-1], interpolation=cv2.INTER_CUBIC)
-
-
-def knots_of(shape: tuple[int, int], rng: np.random.Generator, apart: float) -> Float[np.ndarray, "h w"]:
-    """As many random numbers as cover a picture of `shape` at `apart` pixels."""
-    return rng.standard_normal([int(side / apart) + 2 for side in shape]).astype(np.float32)
+def smooth_field(
+    shape: tuple[int, int], rng: np.random.Generator, apart: float, between: int = cv2.INTER_CUBIC
+) -> Float[np.ndarray, "H W"]:
+    """Numbers around 0, about 1 in size, interpolated as `between` says from random knots `apart` pixels apart."""
+    knots = rng.standard_normal([int(side / apart) + 2 for side in shape]).astype(np.float32)
+    return cv2.resize(knots, shape[::-1], interpolation=between)
 
 
 def varied_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:

@@ -262,16 +262,18 @@ class Trainer:
             truth = [F.pad(image, edges, value=IGNORE) for image in truth]
         return arrays, truth[0], truth[1] if self.things else None
 
-    def ahead(self, workers: int):
-        """The batches of all steps that are left, made by so many forked processes: the very same ones."""
+    def ahead(self, workers: int = 0):
+        """The batches of all steps that are left, each made when it is asked for, or before, by forked processes."""
         steps = range(self.done, self.total)
+        if not workers:
+            return map(self.batch_of_step, steps)
         how = {"collate_fn": self.batch_of_step, "num_workers": workers, "multiprocessing_context": "fork"}
         cv2.setNumThreads(1)  # its threads do not outlive a fork, and a worker would wait for them
         return iter(DataLoader(steps, batch_size=None, worker_init_fn=_leave_ctrl_c, **how))
 
-    def step(self, batch=None) -> float:
+    def step(self, batch) -> float:
         """Make one optimiser step and return its loss, over all ranks' images; batch: that of `batch_of_step`."""
-        arrays, y, instances = self.batch_of_step(self.done) if batch is None else batch
+        arrays, y, instances = batch
         for group in self.optimiser.param_groups:
             group["lr"] = self.config.learning_rate(self.done, self.total)
         self.model.train()
@@ -423,9 +425,9 @@ def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, pro
     config, out = trainer.config, checkpoint.parent
     bar = tqdm(total=trainer.total, initial=trainer.done, desc=config.model, unit="step", disable=not progress)
     with bar, DeferredInterrupt() as interrupt:
-        batches = trainer.ahead(workers) if workers else None
+        batches = trainer.ahead(workers)
         while trainer.done < trainer.total:
-            loss = trainer.step() if batches is None else trainer.step(next(batches))
+            loss = trainer.step(next(batches))
             bar.update()
             bar.set_postfix_str(progress_line(loss, trainer.history), refresh=False)
             if trainer.done % trainer.batches == 0 or trainer.done == trainer.total:

@@ -75,7 +75,8 @@ class Ros1Transport(Transport):
         self._keeper.join()
         for hook in self._rospy.core._shutdown_hooks:
             # rospy closes its server's socket and lets it go on: it would poll what is closed with all of a core.
-            if server := getattr(node := getattr(hook, "__self__", None), "server", None):
+            node = getattr(hook, "__self__", None)
+            if server := getattr(node, "server", None):
                 node.is_shutdown = True
                 server.shutdown()
         self._rospy.signal_shutdown("done")

@@ -56,12 +56,17 @@ def softmax(a):
     return np.exp(a - np.logaddexp.reduce(a, axis=-1, keepdims=True))
 
 
+def repeated(step, guess, rounds):
+    """The guess after some rounds of step(guess)."""
+    for _ in range(rounds):
+        guess = step(guess)
+    return guess
+
+
 def of_rounds(z, shares, rounds, believed, first=None):
     """Rounds with another step: believed(logits (N, C), guess) -> probabilities (N, C)."""
-    z, guess = z.reshape(-1, z.shape[-1]), shares if first is None else first
-    for _ in range(rounds):
-        guess = believed(z, guess).mean(axis=0)
-    return guess
+    z = z.reshape(-1, z.shape[-1])
+    return repeated(lambda guess: believed(z, guess).mean(axis=0), shares if first is None else first, rounds)
 
 
 @wrong("The network was trained with weights, and its logits still hold them. Where do you take them out?")
@@ -120,27 +125,24 @@ def summed_over_pixels(z, w, shares, rounds):
 
 @wrong("A pixel's probabilities sum to 1 over its classes, the last axis. Over which axis do yours?")
 def summed_over_the_first_axis(z, w, shares, rounds):
-    guess = shares
-    for _ in range(rounds):
+    def step(guess):
         p = np.moveaxis(softmax(np.moveaxis(z + np.log(guess / shares / w), 0, -1)), -1, 0)
-        guess = p.reshape(-1, len(shares)).mean(axis=0)
-    return guess
+        return p.reshape(-1, len(shares)).mean(axis=0)
+
+    return repeated(step, shares, rounds)
 
 
 @wrong("Each pixel's probabilities sum to 1. Yours sum to 1 over all pixels together.")
 def summed_over_everything(z, w, shares, rounds):
-    guess = shares
-    for _ in range(rounds):
-        guess = softmax((z + np.log(guess / shares / w)).ravel()).reshape(-1, len(shares)).sum(axis=0)
-    return guess
+    def step(guess):
+        return softmax((z + np.log(guess / shares / w)).ravel()).reshape(-1, len(shares)).sum(axis=0)
+
+    return repeated(step, shares, rounds)
 
 
 @wrong("The mean is one over all pixels. In an image they lie along two axes: over how many does yours go?")
 def mean_over_the_first_axis(z, w, shares, rounds):
-    guess = shares
-    for _ in range(rounds):
-        guess = softmax(z + np.log(guess / shares / w)).mean(axis=0)
-    return guess
+    return repeated(lambda guess: softmax(z + np.log(guess / shares / w)).mean(axis=0), shares, rounds)
 
 
 @wrong(

@@ -78,6 +78,11 @@ def right_places(C, H, W, block, step):
     return places(C, H, W, block, step, lambda c, v, u: (c // block * H + v) * step + 2 * (u * block + c % block))
 
 
+def all_scores(buffer, C, H, W, block, step):
+    """The scores of all classes, and of those that fill up the last block."""
+    return read(buffer, right_places(-(-C // block) * block, H, W, block, step))
+
+
 def best(buffer, C, H, W, block, step, at):
     """Labels by scores that are read at other places."""
     return read(buffer, places(C, H, W, block, step, at)).argmax(axis=0)
@@ -145,18 +150,18 @@ def as_pixels(buffer, C, H, W, block, step):
 
 @wrong("A label is above C - 1: the last block holds more scores than there are classes. What are they?")
 def filled_up_classes_too(buffer, C, H, W, block, step):
-    return read(buffer, right_places(-(-C // block) * block, H, W, block, step)).argmax(axis=0)
+    return all_scores(buffer, C, H, W, block, step).argmax(axis=0)
 
 
 @wrong("You keep the first C places of each block. Which classes are they, once the blocks are side by side?")
 def cut_within_the_blocks(buffer, C, H, W, block, step):
-    scores = read(buffer, right_places(-(-C // block) * block, H, W, block, step)).reshape(-1, block, H, W)
+    scores = all_scores(buffer, C, H, W, block, step).reshape(-1, block, H, W)
     return scores[:, :C].reshape(-1, H, W).argmax(axis=0)
 
 
 @wrong("The numbers that fill up the last block may be large: leave them out by their place, not because they are NaN.")
 def filled_up_classes_but_for_nan(buffer, C, H, W, block, step):
-    scores = read(buffer, right_places(-(-C // block) * block, H, W, block, step))
+    scores = all_scores(buffer, C, H, W, block, step)
     return np.where(np.isnan(scores), -np.inf, scores).argmax(axis=0)
 
 
@@ -182,7 +187,7 @@ def number_of_the_block(buffer, C, H, W, block, step):
 
 def blocked(buffer, C, H, W, block, step):
     """All scores, the filling of blocks too, (blocks, H, W, block)."""
-    every = read(buffer, right_places(-(-C // block) * block, H, W, block, step))
+    every = all_scores(buffer, C, H, W, block, step)
     return every.reshape(-1, block, H, W).transpose(0, 2, 3, 1)
 
 

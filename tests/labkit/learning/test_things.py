@@ -299,7 +299,7 @@ def test_training_leaves_classes_as_they_are_and_goes_on_where_it_stopped(tmp_pa
     train(frames, None, config, tmp_path / "whole", progress=False, model=network())
     data = ImagesInMemory(frames, depth=True, instances=True, progress=False)
     trainer = Trainer(data, config, torch.device("cpu"), network())
-    losses = [trainer.step() for _ in range(2)]
+    losses = [trainer.step(next(trainer.ahead())) for _ in range(2)]
     torch.save(trainer.state(), tmp_path / "unet_rgbd.checkpoint.pt")
     train(frames, None, config, tmp_path, progress=False, model=network())
     whole, resumed = (load_model(folder / "unet_rgbd.pt").state_dict() for folder in (tmp_path / "whole", tmp_path))

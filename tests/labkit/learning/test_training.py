@@ -194,8 +194,8 @@ def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, make, 
     expected = run("a")
     plain_step, handler = Trainer.step, signal.getsignal(signal.SIGINT)
 
-    def interrupted_step(self):
-        loss = plain_step(self)
+    def interrupted_step(self, batch):
+        loss = plain_step(self, batch)
         if self.done in (1, 3, 5):
             signal.raise_signal(signal.SIGINT)
         return loss
@@ -216,10 +216,10 @@ def test_a_finished_run_is_not_run_again_and_a_seed_is_a_result(tmp_path, monkey
     train(data, None, CONFIG, tmp_path / "b", progress=False)
     plain_step = Trainer.step
 
-    def fails_in_the_second_epoch(self):
+    def fails_in_the_second_epoch(self, batch):
         if self.done == self.batches:
             raise RuntimeError("power cut")
-        return plain_step(self)
+        return plain_step(self, batch)
 
     monkeypatch.setattr(Trainer, "step", fails_in_the_second_epoch)
     with pytest.raises(RuntimeError, match="power cut"):
@@ -286,7 +286,9 @@ def test_the_loss_of_a_step_is_the_weighted_loss_of_its_batch():
     model = SmallSegNet()
     model.load_state_dict(trainer.model.state_dict())
     weights = class_weights(data.class_counts(4), "inverse")
-    assert trainer.step() == pytest.approx(float(segmentation_loss(model(x), y, weights).detach()), rel=2e-2)
+    assert trainer.step(next(trainer.ahead())) == pytest.approx(
+        float(segmentation_loss(model(x), y, weights).detach()), rel=2e-2
+    )
 
 
 def focal(logits, labels, weights):
@@ -320,7 +322,7 @@ def test_a_loss_of_ones_own_is_what_a_run_lowers_and_its_checkpoint_names_it(los
     model = SmallSegNet()
     model.load_state_dict(trainer.model.state_dict())
     weights = torch.from_numpy(class_weights(data.class_counts(4), config.weights)).float()
-    assert trainer.step() == pytest.approx(float(loss(model(x), y, weights).detach()), rel=2e-2)
+    assert trainer.step(next(trainer.ahead())) == pytest.approx(float(loss(model(x), y, weights).detach()), rel=2e-2)
     with pytest.raises(ValueError, match=rf"config: .* differs in loss: expected \['{loss.__name__}'\]"):
         train(data, None, config, tmp_path, progress=False)
 
