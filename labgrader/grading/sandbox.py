@@ -67,6 +67,7 @@ class Server:
         self.packages, self.limits, self.forked = tuple(packages), limits, False
         self.shown = show_in_container(self.packages) if limits.container else None
         ours, theirs = socket.socketpair()
+        theirs.setblocking(True)  # also where some library gave all sockets a time limit: the server would not wait
         with theirs:
             quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
             if self.shown is None:

@@ -7,6 +7,7 @@ environment's own packages; put first, it would bring the system's NumPy and Ope
 import functools
 import importlib
 import logging
+import socket
 import sys
 import threading
 import xmlrpc.client
@@ -41,7 +42,7 @@ class Ros1Transport(Transport):
     """
 
     def __init__(self, name: str, arguments=()):
-        self._rospy = ros("rospy")
+        self._rospy, self._time_limit = ros("rospy"), socket.getdefaulttimeout()
         self._rospy.init_node(name, argv=[name, *arguments], disable_signals=True)
         self._wire = Wire(ros1=True)
         self._publishers, self._subscribers = {}, {}
@@ -80,6 +81,7 @@ class Ros1Transport(Transport):
                 node.is_shutdown = True
                 server.shutdown()
         self._rospy.signal_shutdown("done")
+        socket.setdefaulttimeout(self._time_limit)  # rospy sets one for all sockets of the process
 
     def advertise(self, topic: str, kind: type) -> None:
         """Tell the master that messages of the class `kind` come from here."""

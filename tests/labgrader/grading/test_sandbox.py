@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -350,6 +351,20 @@ def test_a_machine_that_can_start_no_worker_for_a_moment_costs_nobody_and_else_i
         started = stack.enter_context(sandbox.fresh_worker(("numpy",), LIMITS))
         assert told(started, "return 2") == 2
     sandbox.servers.close()
+
+
+def test_a_time_limit_of_all_sockets_of_the_process_costs_no_answer(monkeypatch):
+    """As rospy sets one: a server that does not wait for its next word would end, and the answer with it."""
+    monkeypatch.setattr(sandbox, "servers", sandbox.Servers())
+    before = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(60.0)
+    try:
+        for _ in range(3):
+            with sandbox.fresh_worker(("numpy",), LIMITS) as started:
+                assert told(started, "import time\ntime.sleep(0.2)\nreturn 7") == 7
+    finally:
+        socket.setdefaulttimeout(before)
+        sandbox.servers.close()
 
 
 def test_closing_ends_everything():

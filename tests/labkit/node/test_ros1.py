@@ -96,6 +96,7 @@ def tester(port, tmp_path_factory):
         begin = time.process_time()
         time.sleep(1.0)
         assert time.process_time() - begin < 0.5, "something of rospy's runs on, and everything else here waits for it"
+        assert socket.getdefaulttimeout() is None, "sockets of this process still have rospy's time limit"
     finally:
         if ros1.DIST_PACKAGES in sys.path:
             sys.path.remove(ros1.DIST_PACKAGES)
