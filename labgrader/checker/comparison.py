@@ -126,10 +126,10 @@ def array_of_list(got: list) -> np.ndarray | Problem | None:
     waiting, truths, count = [(got, 1)], set(), 0
     while waiting:
         rows, depth = waiting.pop()
+        count += len(rows)
+        if count > MOST_BYTES or depth > DEEPEST:
+            return Problem("size", f"it returns more than {MOST_BYTES >> 20} MB")
         for part in rows:
-            count += 1
-            if count > MOST_BYTES or depth > DEEPEST:
-                return Problem("size", f"it returns more than {MOST_BYTES >> 20} MB")
             if issubclass(type(part), list | tuple):
                 waiting.append((part, depth + 1))
             elif issubclass(type(part), np.generic | np.ndarray):

@@ -75,7 +75,7 @@ def doubled(source: str | None) -> Callable[[list], list]:
 
 def better_marks(cells: list) -> None:
     """A wrong answer whose tests, points and marks the student has improved."""
-    cell(cells, "iou")["source"] = WRONG
+    cell(cells, "iou")["source"] = "import numpy as np\n" + WRONG
     cell(cells, "iou")["metadata"]["tags"] = ["skip-execution", "raises-exception"]
     tests = cell(cells, "check_iou")
     tests["source"] = "assert True"

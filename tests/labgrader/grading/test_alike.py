@@ -95,7 +95,7 @@ def labs(tmp_path_factory):
     """A course with three labs, by topic."""
     course = tmp_path_factory.mktemp("course")
     for topic in LABS:
-        kit.write(course / "labs" / topic / f"{topic}.ipynb", kit.lab_notebook(topic))
+        kit.write(course / "labs" / topic / f"{topic}.ipynb", kit.lab_notebook(topic, whole=True))
     return {topic: (course, read_lab(course, topic)) for topic in LABS}
 
 
@@ -155,7 +155,7 @@ def test_a_copied_solution_or_reference_is_listed_whatever_was_added(labs):
     reference = kit.copied_answers("04_iou")["trimap_band"]
     solution = OWN.replace("def iou", "def mean_iou")
     path = course / "solutions/04_iou/04_iou.ipynb"
-    kit.write(path, kit.lab_notebook("04_iou", {"mean_iou": solution}))
+    kit.write(path, kit.lab_notebook("04_iou", {"mean_iou": solution}, whole=True))
     body = renamed(reference).split("\n")
     hidden = "\n".join([*body[:-1], "    pass", body[-1]])
     records = [record("ada", {"trimap_band": hidden, "mean_iou": renamed(solution)}), record("ben", {"iou": OWN})]

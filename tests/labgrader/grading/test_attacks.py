@@ -29,8 +29,8 @@ from labkit import metrics
 
 TOPIC = "04_iou"
 SECRET_VARIABLE = "LABKIT_TEST_SECRET"
-LIMITS = Limits(case_s=1.0, memory_mb=512)
-POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
+LIMITS = Limits(case_s=0.4, memory_mb=512)
+POINTS = {name: float(question.points) for name, question in kit.asked(TOPIC).items()}
 REST = sum(POINTS.values()) - POINTS["iou"]
 FILE = Path(__file__).parents[2] / "attacks/attacks.toml"
 RIGHT = """
@@ -222,9 +222,9 @@ def test_copies_of_the_kits_code_are_flagged_whatever_their_names_and_layout(tmp
     copied = kit.copied_answers(TOPIC)
     renamed = {name: re.sub(r"\bn\b", "counts", cell).replace("\n", "  # mine\n", 1) for name, cell in copied.items()}
     library = inspect.getsource(metrics.boundary_counts).replace("boundary_counts", "trimap_band")
-    kit.write_lab(tmp_path, TOPIC)
-    kit.submit(tmp_path, "renamed", TOPIC, renamed)
-    kit.submit(tmp_path, "library", TOPIC, kit.right_answers(TOPIC) | {"trimap_band": library})
+    kit.write_lab(tmp_path, TOPIC, whole=True)
+    kit.submit(tmp_path, "renamed", TOPIC, renamed, whole=True)
+    kit.submit(tmp_path, "library", TOPIC, kit.right_answers(TOPIC) | {"trimap_band": library}, whole=True)
     library, same = grade_course(TOPIC, tmp_path, seed="secret", progress=False).records
     assert all("has a copy of the kit's" in result.flag for result in same.results)
     flags = {result.question: result.flag for result in library.results}

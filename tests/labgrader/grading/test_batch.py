@@ -30,7 +30,7 @@ from labgrader.worker.answer import Answer, packages_of, public_cases
 
 TOPIC = "04_iou"
 SECRET = "2718281828459045"
-POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
+POINTS = {name: float(question.points) for name, question in kit.asked(TOPIC).items()}
 TOTAL = sum(POINTS.values())
 BUT_IOU = TOTAL - POINTS["iou"]
 ROOT = Path(__file__).parents[3]
@@ -38,7 +38,7 @@ ROOT = Path(__file__).parents[3]
 
 def misconceived() -> dict[str, str]:
     """Each question answered with the first of its misconceptions."""
-    return {name: kit.as_cell(question.misconceptions[0].answer, name) for name, question in of_topic(TOPIC).items()}
+    return {name: kit.as_cell(question.misconceptions[0].answer, name) for name, question in kit.asked(TOPIC).items()}
 
 
 def write_class(folder: Path) -> None:
@@ -95,7 +95,7 @@ def test_points_and_words_are_as_constructed(graded_once):
     ada, ben, eve = graded.records
     assert {result.question: result.points for result in ada.results} == POINTS and not ada.needs_a_look
     assert ben.points == 0.0
-    for result, question in zip(ben.results, of_topic(TOPIC).values(), strict=True):
+    for result, question in zip(ben.results, kit.asked(TOPIC).values(), strict=True):
         assert result.hint == question.misconceptions[0].hint
     page = (course / "grades" / TOPIC / "feedback" / "ben.html").read_text()
     for result in ben.results:  # the call of a public case, and what came and was expected
@@ -118,7 +118,7 @@ def test_students_learn_no_seed_and_no_expected_value(graded_once):
     told = for_students(course)
     assert len(told) == 6
 
-    questions = of_topic(TOPIC).values()
+    questions = kit.asked(TOPIC).values()
     students = [folder.name for folder in (course / "submitted").iterdir()]
 
     def values_of(cases):
@@ -199,9 +199,11 @@ def test_a_new_round_or_lab_grades_everything_again_and_late_work_joins_the_roun
     assert grade(course, seed=None).graded_now == 4
 
 
-def test_what_appears_or_changes_while_a_run_grades_waits_for_the_next(course, monkeypatch):
+def test_what_appears_or_changes_while_a_run_grades_waits_for_the_next(graded, monkeypatch):
     """A new student and another notebook come after the folder was read: what is shown is what was graded."""
     grade_all = run.grade_batch
+
+    course = graded
 
     def meanwhile(*arguments):
         kit.submit(course, "dan", TOPIC, kit.right_answers(TOPIC))
@@ -219,6 +221,8 @@ def test_what_appears_or_changes_while_a_run_grades_waits_for_the_next(course, m
 
 
 def test_only_the_instructor_can_read_what_is_written(course):
+    for student in ("ben", "eve"):
+        shutil.rmtree(course / "submitted" / student)
     (course / "gradebook.db").chmod(0o644)
     (course / "grades").mkdir(mode=0o755)
     grade(course)
@@ -229,7 +233,9 @@ def test_only_the_instructor_can_read_what_is_written(course):
 
 
 @pytest.mark.parametrize("broken", ["write_scores", "copy_for_formgrader"])
-def test_a_student_whom_the_gradebook_cannot_take_stops_nobody_else(course, monkeypatch, broken):
+def test_a_student_whom_the_gradebook_cannot_take_stops_nobody_else(graded, monkeypatch, broken):
+    course = graded
+    kit.submit(course, "ben", TOPIC, kit.right_answers(TOPIC))
     original = getattr(gradebook, broken)
 
     def fails_for_ben(*arguments):
@@ -245,11 +251,12 @@ def test_a_student_whom_the_gradebook_cannot_take_stops_nobody_else(course, monk
     monkeypatch.undo()
     assert grade(course).failures == {}
     with gradebook.opened(course) as book:
-        assert book.find_submission(TOPIC, "ben").score == 0.0
+        assert book.find_submission(TOPIC, "ben").score == TOTAL
 
 
 @pytest.mark.parametrize("cases", ["public", "secret"])
-def test_an_error_of_the_grader_flags_one_answer_stops_nobody_and_is_tried_again(course, monkeypatch, cases):
+def test_an_error_of_the_grader_flags_one_answer_stops_nobody_and_is_tried_again(graded, monkeypatch, cases):
+    course = graded
     right = kit.right_answers(TOPIC)["iou"]
     answer = "def iou(n):\n    return n / 7\n" if cases == "public" else f"{right}\n# mine\n"
     kit.submit(course, "fay", TOPIC, kit.right_answers(TOPIC) | {"iou": answer})
@@ -275,8 +282,9 @@ def test_an_error_of_the_grader_flags_one_answer_stops_nobody_and_is_tried_again
     assert grade(course).graded_now == 0
 
 
-def test_a_folder_that_cannot_be_entered_stops_nobody_else(course, monkeypatch):
+def test_a_folder_that_cannot_be_entered_stops_nobody_else(graded, monkeypatch):
     """As an ordinary user would find it: a folder of mode 000."""
+    course = graded
     ask = os.lstat
 
     def refuse(path, *rest, **more):
@@ -396,7 +404,8 @@ def test_what_can_not_be_read_any_more_loses_its_scores(graded):
         assert book.find_grade("check_iou", TOPIC, TOPIC, "ada").needs_manual_grade
 
 
-def test_a_time_of_submission_is_kept(course):
+def test_a_time_of_submission_is_kept(graded):
+    course = graded
     folder = course / "submitted" / "ada" / TOPIC
     (folder / "timestamp.txt").write_text("2026-03-01 12:00:00 UTC")
     (folder / "submission_secret.txt").write_text("5c0e")
@@ -426,7 +435,7 @@ def test_a_process_has_the_packages_that_its_program_names_and_the_question_allo
 def test_what_the_task_says_to_do_without_is_refused_in_the_words_of_the_check(course, monkeypatch):
     """Torch where the task says NumPy: neither the answer nor what it calls gets it."""
     forbidden = ("sklearn", "torch")
-    questions = {name: replace(question, forbidden=forbidden) for name, question in of_topic(TOPIC).items()}
+    questions = {name: replace(question, forbidden=forbidden) for name, question in kit.asked(TOPIC).items()}
     monkeypatch.setattr(grading, "of_topic", lambda topic: questions)
     with_torch = "import torch\ndef iou(n):\n    return torch.as_tensor(n).diag() / n.sum()\n"
     hidden = 'def iou(n):\n    return __import__("to" + "rch").as_tensor(n).diag()\n'

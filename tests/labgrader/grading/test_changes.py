@@ -18,7 +18,7 @@ from labgrader.grading.gradebook import opened
 from labgrader.worker.answer import public_cases
 
 TOPIC = "04_iou"
-POINTS = {name: float(question.points) for name, question in of_topic(TOPIC).items()}
+POINTS = {name: float(question.points) for name, question in kit.asked(TOPIC).items()}
 TOTAL = sum(POINTS.values())
 IOU = POINTS["iou"]
 

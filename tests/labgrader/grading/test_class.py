@@ -20,9 +20,9 @@ AT_NIGHT = [pytest.param(topic, marks=pytest.mark.nightly) for topic in LABS if 
 @pytest.mark.parametrize("topic", EACH_TIME + AT_NIGHT)
 def test_every_grade_is_as_constructed(topic, tmp_path):
     students = kit.synthetic_class(topic)
-    kit.write_lab(tmp_path, topic)
+    kit.write_lab(tmp_path, topic, whole=True)
     for student, (cells, _) in students.items():
-        kit.submit(tmp_path, student, topic, cells)
+        kit.submit(tmp_path, student, topic, cells, whole=True)
     graded = grade_course(topic, tmp_path, seed=SEED, workers=2, limits=Limits(), progress=False)
     assert [record.student for record in graded.records] == sorted(students)
     odd = []

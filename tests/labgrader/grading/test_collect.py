@@ -18,7 +18,7 @@ from labgrader.grading.run import grade_course
 
 ROOT = Path(__file__).parents[3]
 TOPIC = "04_iou"
-TOTAL = sum(question.points for question in of_topic(TOPIC).values())
+TOTAL = sum(question.points for question in kit.asked(TOPIC).values())
 MOODLE = {
     "Ada Lovelace_1234567_assignsubmission_file_/04_iou.ipynb": True,
     "Zoë Müller_1234568_assignsubmission_file_/04_iou (1).ipynb": False,

@@ -78,7 +78,7 @@ def course(graded):
 
 
 def total(lab: str) -> float:
-    return sum(float(question.points) for question in of_topic(lab).values())
+    return sum(float(question.points) for question in kit.asked(lab).values())
 
 
 def written(course: Path, *options: str) -> list[dict]:

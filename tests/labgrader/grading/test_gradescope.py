@@ -20,7 +20,7 @@ from labgrader.grading.run import grade_course
 
 ROOT = Path(__file__).parents[3]
 TOPIC = "04_iou"
-POINTS = {name: question.points for name, question in of_topic(TOPIC).items()}
+POINTS = {name: question.points for name, question in kit.asked(TOPIC).items()}
 # Right only if it can do what it must not: read the autograder or other packages, start a process, reach the network.
 LOOKS_AROUND = """import os
 import socket

@@ -22,7 +22,7 @@ from labgrader.grading.totals import NOT_FINAL
 
 ROOT = Path(__file__).parents[3]
 TOPIC = "04_iou"
-TOTAL = sum(question.points for question in of_topic(TOPIC).values())
+TOTAL = sum(question.points for question in kit.asked(TOPIC).values())
 MOODLE = (
     "Ada Lovelace_1234567_assignsubmission_file_/04_iou.ipynb",
     "Zoë O'Brien_12_assignsubmission_file_/04_iou.ipynb",

@@ -475,4 +475,4 @@ def test_a_saved_lab_is_checked_in_the_sandbox_or_said_to_be_without_one(there, 
     assert labkit("check", lab) == int(not there)
     told = capsys.readouterr()
     assert ("WITHOUT a sandbox, with your rights: none is installed" in told.err) is not there
-    assert ("\u2714 iou is right" in told.out) is there and "\u2714 confusion_matrix is right" in told.out
+    assert ("\u2714 iou is right" in told.out) is there and "\u2714 mean_iou is right" in told.out
