@@ -1,7 +1,7 @@
 """The course's notebooks, for the tests that look into them; as a plugin of pytest, what nbval compares.
 
 Outputs of lessons and solutions are compared with the committed ones. Labs have none: they run as students get them,
-but on fewer scenes and for fewer steps of training; their solutions do so where no compared output shows it. Each
+but on fewer scenes and for fewer steps of training; the others do so where no compared output shows it. Each
 notebook has a kernel of its own, which is forked from one that has imported what they import.
 """
 
@@ -48,9 +48,14 @@ def is_compared(cell) -> bool:
     return bool(texts) and not ignored and cell.execution_count is not None
 
 
-# What cells say of scenes, trainings and pictures, and what they say when only the notebook's running is at stake: in
-# labs and solutions what no compared output shows, in labs the rest as well.
-FEWER = {"05_class_weights": {"of=40": "of=4"}, "07_grasp": {"of=40": "of=2", "workers=2": "workers=1"}}
+# What cells say of scenes, trainings and pictures, and what they say when only the notebook's running is at stake: what
+# no compared output shows, and in labs the rest as well.
+FEWER = {
+    "05_class_weights": {"of=40": "of=4"},
+    "07_grasp": {"of=40": "of=2", "workers=2": "workers=1"},
+    "07_grasp_worth": {"range(600_100, 600_110)": "range(600_100, 600_102)"},
+    "10_capstone": {"else (12, 10, 8)": "else (12, 2, 2)"},
+}
 FEWER_IN_LABS = {
     "03_gradient": {"range(200)": "range(5)"},
     "05_class_weights": {"steps=400": "steps=5"},
@@ -86,7 +91,7 @@ def pytest_collectstart(collector):
 
 def pytest_itemcollected(item):
     """Let a cell do with fewer scenes; the file that students get says what it says."""
-    changes = {} if item.path.is_relative_to(ROOT / "lessons") else FEWER.get(item.path.stem, {})
+    changes = FEWER.get(item.path.stem, {})
     if item.path.is_relative_to(ROOT / "labs"):
         changes = changes | FEWER_IN_LABS.get(item.path.stem, {})
     for many, few in changes.items():

@@ -36,9 +36,9 @@ def said(path: Path, capsys) -> dict[str, str]:
 
 
 def test_a_right_lab_is_right_and_a_released_one_is_not_answered(tmp_path, capsys):
-    assert check_file(saved(tmp_path, lab_notebook(TOPIC, right_answers(TOPIC))))
+    assert check_file(saved(tmp_path, lab_notebook(TOPIC, right_answers(TOPIC), whole=True)))
     assert f"{ANSWERS} of {ANSWERS} answers are right" in capsys.readouterr().out
-    assert not check_file(saved(tmp_path, lab_notebook(TOPIC)))
+    assert not check_file(saved(tmp_path, lab_notebook(TOPIC, whole=True)))
     shown = capsys.readouterr().out
     assert shown.count("not answered yet") == ANSWERS and "below" not in shown, "nothing follows a notebook's last cell"
 

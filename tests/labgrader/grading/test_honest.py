@@ -23,7 +23,7 @@ TOPICS = sorted({submission.name.partition(".")[0] for submission in HONEST})
 @pytest.mark.parametrize("third", [0, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2))])
 @pytest.mark.parametrize("topic", TOPICS)
 def test_what_is_honest_is_right_and_the_file_check_says_the_same_before(topic, third, tmp_path):
-    kit.write_lab(tmp_path, topic)
+    kit.write_lab(tmp_path, topic, whole=True)
     submissions = [one for one in HONEST if one.name.startswith(topic)]
     students = {f"s{i}": one for i, one in enumerate(submissions[third::3])}
     for student, submission in students.items():
@@ -53,7 +53,7 @@ def test_whole_labs_are_right_however_an_editor_saves_them_and_wherever_the_cell
     right = whole_lab(topic)
     ways = as_editors_save_it(right) | as_students_leave_it(right)
     mine = list(ways.items())[TOPICS.index(topic) :: len(TOPICS)]
-    kit.write_lab(tmp_path, topic)
+    kit.write_lab(tmp_path, topic, whole=True)
     for way, notebook in mine:
         kit.submit(tmp_path, way, topic, notebook)
     records = grade_course(topic, tmp_path, seed="secret", workers=2, progress=False).records
@@ -75,7 +75,7 @@ def fates(submissions: list[Honest], place: Path) -> dict[str, tuple[bool, Resul
     found = {}
     for topic in sorted({one.name.partition(".")[0] for one in submissions}):
         folder = place / topic
-        kit.write_lab(folder, topic)
+        kit.write_lab(folder, topic, whole=True)
         mine = {f"s{one.name.rpartition(' ')[2]}": one for one in submissions if one.name.startswith(topic)}
         for student, one in mine.items():
             kit.submit(folder, student, topic, one.notebook())
