@@ -60,7 +60,8 @@ def blank(question: Question) -> str:
     return f"def {question.function}{inspect.signature(question.reference)}:\n    raise NotImplementedError\n"
 
 
-FEW = {"04_iou": ("iou", "mean_iou"), "07_grasp": ("pad_slice",)}  # each question costs each submission of each test its time
+# Each question costs each submission of each test its time.
+FEW = {"04_iou": ("iou", "mean_iou"), "07_grasp": ("pad_slice",)}
 
 
 def asked(topic: str) -> dict[str, Question]:

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from labcli.cli import app
 from labgrader.checker.program import Program
-from labgrader.course import find, of_topic
+from labgrader.course import find
 from labgrader.grading import bwrap, gradebook, reading, run
 from labgrader.grading import grade as grading
 from labgrader.grading.batch import read_record, record_path, secret_for

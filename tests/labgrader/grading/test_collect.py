@@ -12,7 +12,6 @@ from pathlib import Path
 import grading_course as kit
 import pytest
 
-from labgrader.course import of_topic
 from labgrader.grading.collect import LmsExtractor, handed_in, marked_late, student_and_notebook
 from labgrader.grading.run import grade_course
 

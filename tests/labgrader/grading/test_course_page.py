@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from labcli.cli import app
-from labgrader.course import of_topic
 from labgrader.grading.batch import Record
 from labgrader.grading.course_page import rows_of
 from labgrader.grading.deadlines import Lateness, read_deadline

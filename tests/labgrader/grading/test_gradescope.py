@@ -13,7 +13,6 @@ from pathlib import Path
 import grading_course as kit
 import pytest
 
-from labgrader.course import of_topic
 from labgrader.grading import bwrap, gradescope
 from labgrader.grading.changes import change_of
 from labgrader.grading.run import grade_course

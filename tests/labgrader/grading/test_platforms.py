@@ -14,7 +14,6 @@ import pytest
 from typer.testing import CliRunner
 
 from labcli.cli import app
-from labgrader.course import of_topic
 from labgrader.grading.changes import change_of
 from labgrader.grading.gradebook import opened
 from labgrader.grading.run import grade_course
