@@ -15,7 +15,7 @@ from pathlib import Path
 
 from labkit.node import ros2_types
 from labkit.node.bus import Transport
-from labkit.node.messages import Message, Transforms
+from labkit.node.messages import Message, Point, Transforms
 from labkit.node.wire import TYPES, Wire
 from labkit.support.validation import require
 
@@ -60,6 +60,7 @@ class Ros2Transport(Transport):
         self._wire = Wire(ros1=False)
         self._publishers, self._readers, self._services, self._numbers = {}, {}, {}, {}
         self._lost, self._refused = Counter(), {}
+        self._optional = set()  # topics that nobody need publish
         self._publishing, self._closed = threading.Lock(), False
         self._context = rclpy.Context()
         self._context.init([name, *arguments])
@@ -144,6 +145,8 @@ class Ros2Transport(Transport):
     def subscribe(self, topic: str, kind: type, callback: Callable[[Message | ValueError], None]) -> None:
         """Call `callback` in the thread of ROS with every message, or with the error if it cannot be read."""
         name = TYPES[kind]
+        if kind is Point or topic.endswith(STATIC):  # a point comes only where a person clicks
+            self._optional.add(topic)
 
         def receive(data: bytes, info: dict) -> None:
             self._count_lost(topic, info)
@@ -230,8 +233,8 @@ class Ros2Transport(Transport):
 
     def troubles(self) -> dict[str, str]:
         """Topics that nobody publishes, messages that were lost on the way, and peers that cannot be talked to."""
-        inputs = {topic: reader for topic, reader in self._readers.items() if not topic.endswith(STATIC)}
-        silent = {topic: SILENT for topic, reader in inputs.items() if not reader.get_publisher_count()}
+        awaited = {topic: reader for topic, reader in self._readers.items() if topic not in self._optional}
+        silent = {topic: SILENT for topic, reader in awaited.items() if not reader.get_publisher_count()}
         lost = {topic: f"{count} messages lost on the way" for topic, count in tuple(self._lost.items()) if count}
         return silent | lost | self._refused
 
