@@ -99,8 +99,9 @@ class Pipeline:
     find_objects: in place of a model, any function from a frame to the numbers of objects, integers (H, W), 0 for none,
     or to such things as `labkit.learning.things.find_things` gives, which have these numbers and a certainty each: then
     each object is a target. `anything` makes such a function of a network.
-    mirror: let a network look at the image and at its mirror image, and average: a little better, at twice its time;
-    None does so for a network that sees the canonical view, whose size, and so its time, no picture changes.
+    mirror: let a network look at the image and at its mirror image, and average: a little better, at twice its time
+    (and where `at` asks for a thing in two sizes as well, at three times that); None does so for a network that sees
+    the canonical view, whose size, and so its time, no picture changes.
     engine: "torch", "opencv" or "onnxruntime" runs the network there (labkit.learning.engines): equal numbers, other
     speeds; the model may then be an ONNX file of `labkit export`.
     crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
@@ -225,7 +226,7 @@ class Pipeline:
         require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
         instances = certainty = None
         with timed(seconds, "network"):
-            if things and tells_things(self.model):  # by the same run of the network
+            if things and tells_things(self.model):
                 from labkit.learning.things import find_things
 
                 found = find_things(self.model, frame, self.mirror)

@@ -19,7 +19,7 @@ from labkit.labels import IGNORE, OBSTACLE, TARGET
 from labkit.learning.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
 from labkit.learning.channels import geometry_channels, mirrored
 from labkit.learning.paint import BANDS, painted
-from labkit.learning.view import rolled_camera
+from labkit.learning.view import resized, rolled_camera
 
 SIZES = 0.8, 1.7  # of a world, to that which was rendered, where things shall be told apart
 
@@ -131,10 +131,7 @@ def random_calibration(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
 
 def random_size(frame: RGBDFrame, rng: np.random.Generator, low: float = 0.887, high: float = 1.127) -> RGBDFrame:
     """All lengths times one factor, the table at 0: objects of another size, seen from as many times as far."""
-    factor = np.exp(rng.uniform(np.log(low), np.log(high)))
-    T = frame.T_base_cam.copy()
-    T[:3, 3] = factor * (T[:3, 3] - (0.0, 0.0, frame.table_z or 0.0))
-    return replace(frame, T_base_cam=T, depth=frame.depth * np.float32(factor), table_z=0.0)
+    return resized(frame, np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def hidden_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:

@@ -5,7 +5,7 @@ much of the table its pixels cover, is told by T_base_cam, K and depth. So the p
 in it, and resampled; the network looks at that view, and its probabilities are brought back to the picture's pixels.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -129,6 +129,13 @@ def table_pixel(depth: Float[np.ndarray, "H W"], A, c, down, height: float) -> f
     chosen = d[near if near.any() else known]
     middle = np.median(chosen) if chosen.size else np.nanmedian(np.where(depth > 0.0, depth, np.nan))
     return float(middle / np.sqrt(A[0, 0] * A[1, 1]))
+
+
+def resized(frame: RGBDFrame, factor: float) -> RGBDFrame:
+    """The same picture of a world whose lengths are all `factor` times as large, with the table at height 0."""
+    T = frame.T_base_cam.copy()
+    T[:3, 3] = factor * (T[:3, 3] - (0.0, 0.0, frame.table_z or 0.0))
+    return replace(frame, T_base_cam=T, depth=frame.depth * np.float32(factor), table_z=0.0)
 
 
 def rolled_camera(frame: RGBDFrame, roll: float, K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> RGBDFrame:

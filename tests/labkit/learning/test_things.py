@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -18,7 +19,7 @@ from labkit.learning.images import ImagesInMemory
 from labkit.learning.inference import THINGS, VOTE_UNIT, Engine, NetworkInput
 from labkit.learning.network import TorchEngine, UNetRGBD, load_model, save_model, weights_path, with_things
 from labkit.learning.paint import painted
-from labkit.learning.things import CELL, LEAST, SPREAD, find_things, group, histogram, things_loss, vote_targets
+from labkit.learning.things import CELL, LEAST, SPREAD, find_things, group, histogram, look, things_loss, vote_targets
 from labkit.learning.training import THINGS_RECIPE, Trainer, train
 from labkit.learning.view import canonical_view
 
@@ -198,6 +199,28 @@ def test_a_vote_in_the_mirror_points_the_other_way(crowd):
     once, twice = (Right(NetworkInput(), 4, things=True).see(crowd.rgb, mirror)[1] for mirror in (False, True))
     assert once.votes[3, 5].tolist() == [VOTE_UNIT, 2 * VOTE_UNIT]
     assert twice.votes[3, 5].tolist() == [0.0, 2 * VOTE_UNIT]
+
+
+def test_looks_in_other_sizes_are_averaged_in_pixels_of_the_one_view(crowd):
+    class Told(Engine):
+        """Sees things in the upper half of each view, whose middles are 20 pixels of that view to the right."""
+
+        def forward(self, image, geometry):
+            z = np.zeros((len(image), 4 + len(THINGS), *image.shape[2:]), np.float32)
+            z[:, 4], z[:, 4, image.shape[2] // 2 :], z[:, 5] = 9.0, -9.0, 1.0
+            return z
+
+    engine = Told(NetworkInput(arrays=("image", "geometry"), pixel=0.0025), 4, things=True)
+    (p, once), (q, thrice) = engine.see(crowd), look(engine, crowd, False, (0.5, 2.0))
+    np.testing.assert_array_equal(p, q)
+    assert once.votes.shape == thrice.votes.shape and thrice.view.to_turned.tolist() == once.view.to_turned.tolist()
+    assert once.votes[5, 5].tolist() == [VOTE_UNIT, 0.0]
+    np.testing.assert_allclose(thrice.votes[5, 5], [VOTE_UNIT * (2.0 + 0.5) / 2.0, 0.0], rtol=0.03)
+    h = len(once.foreground)
+    away = np.abs(np.arange(h) - h / 2.0) > 4.0  # the three halves end within a few pixels of one another
+    np.testing.assert_allclose(thrice.foreground[away], once.foreground[away], atol=1e-4)
+    for unsized in (look(engine, crowd, False, ())[1], look(engine, replace(crowd, depth=0.0 * crowd.depth), False)[1]):
+        assert unsized.votes[5, 5].tolist() == [VOTE_UNIT, 0.0]
 
 
 def test_a_network_of_classes_alone_finds_no_things(crowd):
