@@ -52,9 +52,11 @@ def check_file(path: Path | str | None = None, start: Start = plain.fresh_worker
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"path: expected a notebook, but {path} cannot be read as one") from error
     topic = topic_of(path, cells)
-    lab = CheckedLab(cells, of_topic(topic), start)
+    if topic is None and not texts:
+        raise ValueError(f"path: expected a lab of the course, but {path.name} calls no check of one")
+    lab = CheckedLab(cells, of_topic(topic) if topic else {}, start)
     order = [cell.grade_id for cell in cells if cell.grade_id in lab.questions]
-    expected = [name for name in released_by(notebook)[1] or asked(topic) if name in lab.questions]
+    expected = [name for name in released_by(notebook)[1] or (asked(topic) if topic else {}) if name in lab.questions]
     names = list(dict.fromkeys([*order, *expected]))
     for name in names:
         print(describe(lab.questions[name], lab.verdict(name)))
@@ -93,13 +95,16 @@ def texts_of(cells: Sequence[dict]) -> dict[str, str]:
     return {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in name): text for name, text in texts.items()}
 
 
-def topic_of(path: Path, cells: Sequence[Cell]) -> str:
-    """The topic of a lab: the one whose checks it calls most often, else the one in its name."""
+def topic_of(path: Path, cells: Sequence[Cell]) -> str | None:
+    """The topic of a lab: the one whose checks it calls most often, else the one in its name; None if neither says.
+
+    A lab of texts alone calls no checks, and on Colab its name is not known.
+    """
     called = Counter(topic for cell in cells for topic in re.findall(r"check\(\s*[\"'](\w+)\.", cell.source))
     for topic in (*(topic for topic, _ in called.most_common()), path.stem):
         if topic in topics():
             return topic
-    raise ValueError(f"path: expected a lab of the course, but {path.name} calls no check of one")
+    return None
 
 
 @dataclass

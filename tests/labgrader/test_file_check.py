@@ -72,8 +72,18 @@ def test_what_is_only_there_at_home_is_not_there(tmp_path, capsys):
 def test_the_topic_is_that_of_the_checks_or_of_the_name():
     assert topic_of(Path("my copy.ipynb"), [Cell('iou = check("04_iou.iou", iou)')]) == TOPIC
     assert topic_of(Path("04_iou.ipynb"), []) == TOPIC
+    assert topic_of(Path("notes.ipynb"), []) is None
+
+
+def test_a_lab_of_texts_alone_is_checked_under_any_name_and_other_notebooks_are_no_labs(tmp_path, capsys):
+    """As on Colab, which tells no name: "This notebook"."""
+    path = tmp_path / "This notebook.ipynb"
+    path.write_bytes((ROOT / "labs/10_capstone/10_capstone.ipynb").read_bytes())
+    assert not check_file(path)
+    assert "texts that a person grades; still empty: " in capsys.readouterr().out
+    path.write_text(json.dumps({"cells": [], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
     with pytest.raises(ValueError, match="calls no check"):
-        topic_of(Path("notes.ipynb"), [])
+        check_file(path)
 
 
 @pytest.mark.parametrize(
