@@ -94,9 +94,8 @@ def decide(rng):
 @question(points=3, minutes=4)
 def weight_of_recall(rng):
     """Find the smallest weight with which enough pixels are found."""
-    q = np.sort(
-        rng.choice([0.02, 0.04, 0.05, 0.08, 0.1, 0.125, 0.16, 0.2, 0.25, 0.4, 0.5, 0.6, 0.625, 0.8], 5, replace=False)
-    )[::-1]
+    many = [0.01, 0.02, 0.04, 0.05, 0.08, 0.1, 0.125, 0.15, 0.16, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.625, 0.75, 0.8]
+    q = np.sort(rng.choice(many, 5, replace=False))[::-1]
     need = int(rng.integers(2, 5))
     w = weight_for_recall(q, np.ones(5, bool), need / 5)
     again(w <= 1)
