@@ -14,12 +14,17 @@ def exam(
         int, typer.Option(help="What the numbers are drawn from: keep it where students do not look.", min=0)
     ],
     topics: Annotated[str, typer.Option(help="Numbers of topics: 01-05, or 01,04,06-07.")] = "01-09",
-    minutes: Annotated[int, typer.Option(help="How long the exam may take.", min=1)] = 60,
+    minutes: Annotated[
+        int, typer.Option(help="How long the exam takes; questions fill five sixths of it.", min=1)
+    ] = 60,
     versions: Annotated[int, typer.Option(help="Versions with the same questions and other numbers, 1 to 3.")] = 1,
+    without: Annotated[list[str] | None, typer.Option(help="A question not to ask, by its name in a key.")] = None,
+    course: Annotated[str, typer.Option(help="Printed at the head; a line to fill in if left out.")] = "",
+    aids: Annotated[str, typer.Option(help="What students may use; pen and paper if left out.")] = "",
 ) -> None:
     """Write an exam on paper: pages to print, and a key that the kit computes."""
     from labcourse.exam.draw import topics_of
-    from labcourse.exam.page import write
+    from labcourse.exam.page import AIDS, write
     from labgrader.course import topics as taught
 
-    tell_written(write(topics_of(topics, taught()), minutes, seed, versions, out))
+    tell_written(write(topics_of(topics, taught()), minutes, seed, versions, out, without or (), course, aids or AIDS))

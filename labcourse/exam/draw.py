@@ -1,9 +1,11 @@
-"""Draw an exam: which questions, and numbers for each version, none of which another version has in the same place."""
+"""Draw an exam: which questions, and numbers for each version; no other has them, or its answers, in the same place."""
 
 import importlib
 import pkgutil
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+from math import ceil
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from labcourse import exam
 from labcourse.exam.paper import Again, Paper, PaperQuestion
 
 TRIES = 4000
+ANSWERING = Fraction(5, 6)  # of an exam's time; the rest is for reading, and for looking twice
 
 
 def topics() -> tuple[str, ...]:
@@ -44,22 +47,29 @@ def bank(topic: str) -> tuple[PaperQuestion, ...]:
     return tuple(value for value in vars(module).values() if isinstance(value, PaperQuestion))
 
 
-def choose(chosen: Sequence[str], minutes: int, seed: int) -> list[PaperQuestion]:
-    """Choose questions that fill the minutes: one of each topic in turn, until none is left that fits.
+def choose(chosen: Sequence[str], minutes: int, seed: int, without: Collection[str] = ()) -> list[PaperQuestion]:
+    """Choose questions that fill five sixths of the minutes: one of each topic in turn, until none is left that fits.
 
-    Raises ValueError if there is not time for the shortest question of each topic.
+    without: names of questions that are not asked. Raises ValueError for one that no topic has, if a topic has no other
+    question, or if there is not time for the shortest question of each topic.
     """
+    unknown = set(without) - {q.name for topic in topics() for q in bank(topic)}
+    if unknown:
+        raise ValueError(f"without: expected names of questions, as a key prints them, got {', '.join(unknown)}")
     rng = np.random.default_rng([seed, 0])
     piles = {topic: [bank(topic)[i] for i in rng.permutation(len(bank(topic)))] for topic in chosen}
+    piles = {topic: [q for q in pile if q.name not in without] for topic, pile in piles.items()}
+    if not all(piles.values()):
+        raise ValueError("without: expected to leave a question of each topic; ask for fewer topics")
     least = {topic: min(q.minutes for q in pile) for topic, pile in piles.items()}
-    if sum(least.values()) > minutes:
-        need = f"at least {sum(least.values())}, a question of each topic"
+    if sum(least.values()) > minutes * ANSWERING:
+        need = f"at least {ceil(sum(least.values()) / ANSWERING)}, for a question of each topic"
         raise ValueError(f"minutes: expected {need}, got {minutes}; ask for fewer topics")
     taken: list[PaperQuestion] = []
     while any(piles.values()):
         for topic, pile in piles.items():
             waiting = sum(m for t, m in least.items() if t > topic and not any(q.topic == t for q in taken))
-            left = minutes - sum(q.minutes for q in taken) - waiting
+            left = minutes * ANSWERING - sum(q.minutes for q in taken) - waiting
             fits = [q for q in pile if q.minutes <= left]
             pile[:] = fits[1:]
             taken += fits[:1]
@@ -77,17 +87,27 @@ def draw(question: PaperQuestion, seed: int, versions: int = 1) -> list[Paper]:
             paper = question.draw(rng)
         except Again:
             continue
-        if not any(share_a_number(paper, other) for other in papers):
+        if not any(alike(paper, other) for other in papers):
             papers.append(paper)
     raise ValueError(
         f"versions: expected at most {len(papers)}, since {question.name} has no more numbers to draw, got {versions}"
     )
 
 
-def share_a_number(one: Paper, other: Paper) -> bool:
-    """Whether two versions have a number in the same place; labels, which are names, only all of them together."""
+def alike(one: Paper, other: Paper) -> bool:
+    """Whether two versions have a given or a right number in the same place.
+
+    Only all of them together count of labels, which are names, and of an answer's whole numbers, such as labels and
+    counts. Not counted are an answer's zeros, and words, such as yes and no.
+    """
     for name in one.given.keys() & other.given.keys():
         a, b = np.asarray(one.given[name]), np.asarray(other.given[name])
         if a.shape == b.shape and (np.array_equal(a, b) if a.dtype == np.uint8 else (a == b).any()):
+            return True
+    for name in one.answer.keys() & other.answer.keys():
+        a, b = np.asarray(one.answer[name]), np.asarray(other.answer[name])
+        if a.dtype.kind in "iu" and a.any() and np.array_equal(a, b):
+            return True
+        if a.dtype.kind == "f" and (np.isclose(a, b) & (a != 0)).any():
             return True
     return False

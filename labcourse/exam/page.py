@@ -1,6 +1,8 @@
 """Write an exam: a page to print per version, and one key for whoever corrects."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+from html import escape
 from pathlib import Path
 
 from labcourse.exam.draw import choose, draw
@@ -16,7 +18,9 @@ body { max-width: 170mm; margin: 8mm auto }
 h1 { font-size: 17pt; margin: 0 } h2 { font-size: 12pt; margin: 9mm 0 1mm; break-after: avoid }
 h2 { display: flex; justify-content: space-between; gap: 6mm }
 h2 span { font-weight: normal; white-space: nowrap } p { margin: 2mm 0 }
-section { break-inside: avoid } .name { margin: 7mm 0; border-bottom: .3mm solid #000 }
+section { break-inside: avoid }
+.head { display: grid; grid-template-columns: 1fr 1fr auto; gap: 5mm; margin: 4mm 0; align-items: end }
+.head div { border-bottom: .3mm solid } .head .total { border: .3mm solid; padding: 9mm 3mm 2mm 16mm; grid-area: 1/3/3 }
 table { border-collapse: collapse; margin: 2mm 6mm 2mm 0; font-size: 11pt; display: inline-table }
 table { vertical-align: middle }
 td, th { border: .2mm solid #555; padding: .7mm 2.4mm; text-align: center; min-width: 6mm }
@@ -25,23 +29,39 @@ th { font-weight: normal; background: #eee }
 sup, sub { line-height: 0 }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 1mm 4mm; margin: 1mm 0 }
 dt, dd { margin: 0 } dt { font-style: italic }
-.how { color: #333 } ul { margin: 1mm 0; padding-left: 5mm }
+dd span { float: right; color: #333 } .how { color: #333 } ul { margin: 1mm 0; padding-left: 5mm }
 """
 ROOM_MM = 9  # of paper for each minute that a question takes
+AIDS = "pen and paper; nobody needs a calculator"
+RULES = (
+    "Not for students. An answer's points stand beside it; each of its values earns an equal part. A mistake that is "
+    "listed costs 1 point, a slip in reckoning ½, and neither more than the answer is worth. What follows rightly from "
+    "a wrong value costs nothing more."
+)
 
 
-def write(topics: Sequence[str], minutes: int, seed: int, versions: int, out: Path) -> list[Path]:
+def write(
+    topics: Sequence[str],
+    minutes: int,
+    seed: int,
+    versions: int,
+    out: Path,
+    without: Collection[str] = (),
+    course: str = "",
+    aids: str = AIDS,
+) -> list[Path]:
     """Write exam_A.html, exam_B.html, ... and key.html into a folder, and return their paths.
 
-    Raises ValueError if the minutes do not hold a question of each topic, or for more versions than there are numbers.
+    without: names of questions that are not asked. Raises ValueError as `choose` does, or for more versions than there
+    are numbers.
     """
     if not 1 <= versions <= MOST_VERSIONS:
         raise ValueError(f"versions: expected 1 to {MOST_VERSIONS}, got {versions}; draw more with another seed")
-    questions = choose(topics, minutes, seed)
+    questions = choose(topics, minutes, seed, without)
     papers = [draw(question, seed, versions) for question in questions]
     letters = "ABC"[:versions]
     pages = {
-        f"exam_{letter}.html": exam_page(questions, [drawn[i] for drawn in papers], letter)
+        f"exam_{letter}.html": exam_page(questions, [drawn[i] for drawn in papers], letter, minutes, course, aids)
         for i, letter in enumerate(letters)
     }
     pages["key.html"] = key_page(questions, papers, letters, seed)
@@ -56,14 +76,19 @@ def page(title: str, body: str) -> str:
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
 
 
-def exam_page(questions: Sequence[PaperQuestion], papers: Sequence[Paper], letter: str) -> str:
+def exam_page(
+    questions: Sequence[PaperQuestion], papers: Sequence[Paper], letter: str, minutes: int, course: str, aids: str
+) -> str:
     """What students get of a version; it does not say the seed, from which the key could be made."""
-    points, minutes = sum(q.points for q in questions), sum(q.minutes for q in questions)
+    points, answering = sum(q.points for q in questions), sum(q.minutes for q in questions)
+    lines = (f"Course: {escape(course)}", "Date", "Name", "Matriculation number")
     parts = [
         f"<h1>Exam, version {letter}</h1>",
-        f"<p>{len(questions)} questions, {minutes} minutes, {points} points. Fractions and roots may stay as they are; "
-        "say how you got there. Rows and columns, pixels and classes are counted from 0.</p>",
-        '<p class="name">Name</p>',
+        f'<div class="head">{"".join(f"<div>{line}</div>" for line in lines)}',
+        f'<div class="total">of {points}</div></div>',
+        f"<p>{len(questions)} questions, {points} points, {minutes} minutes: {answering} for the questions, the rest "
+        f"for reading. Allowed: {escape(aids)}. Fractions and roots may stay as they are. Write how you got there: a "
+        "right way to a wrong number earns points. Rows and columns, pixels and classes are counted from 0.</p>",
     ]
     for number, (question, paper) in enumerate(zip(questions, papers, strict=True), 1):
         worth = f"<span>{count(question.points)}, {question.minutes} min</span>"
@@ -76,12 +101,15 @@ def exam_page(questions: Sequence[PaperQuestion], papers: Sequence[Paper], lette
 
 def key_page(questions: Sequence[PaperQuestion], papers: Sequence[Sequence[Paper]], letters: str, seed: int) -> str:
     """The key of all versions, question by question, with the mistakes that wrong values tell."""
-    parts = [f"<h1>Key, seed {seed}</h1><p>{sum(q.points for q in questions)} points. Not for students.</p>"]
+    parts = [f"<h1>Key, seed {seed}</h1><p>{sum(q.points for q in questions)} points. {RULES}</p>"]
     for number, (question, drawn) in enumerate(zip(questions, papers, strict=True), 1):
-        title = f"{number}. {question.about}<span>{question.topic}, {count(question.points)}</span>"
+        title = f"{number}. {question.about}<span>{question.topic}, {question.name}, {count(question.points)}</span>"
         versions, ways = [], {paper.how for paper in drawn}
         for letter, paper in zip(letters, drawn, strict=True):
-            answer = "".join(f"<dt>{name}</dt><dd>{shown(value)}</dd>" for name, value in paper.answer.items())
+            answer = "".join(
+                f"<dt>{name}</dt><dd><span>{count(worth)}</span>{shown(paper.answer[name])}</dd>"
+                for name, worth in paper.worth(question.points).items()
+            )
             told = "".join(f"<li>{mistake_in_words(what, value)}</li>" for what, value in paper.mistakes.items())
             versions.append(
                 f"<h3>{letter}</h3><dl>{answer}</dl>"
@@ -105,10 +133,10 @@ def mistake_in_words(what: str, value) -> str:
     return f"{shown(value)}: {what}"
 
 
-def count(points: int) -> str:
-    """Say how many points.
+def count(points: int | Fraction) -> str:
+    """Say how many points, in halves.
 
-    >>> count(1), count(3)
-    ('1 point', '3 points')
+    >>> count(1), count(3), count(Fraction(1, 2)), count(Fraction(5, 2))
+    ('1 point', '3 points', '½ point', '2½ points')
     """
-    return f"{points} point" + "s" * (points != 1)
+    return f"{int(points) or ''}{'½' * (points % 1 > 0)} point" + "s" * (points > 1)

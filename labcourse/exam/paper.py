@@ -19,7 +19,8 @@ class Paper:
 
     given: what was drawn, by name; labels, which are names and no quantities, are uint8 arrays. text: HTML. answer: the
     key, by the name of what is asked. how: the way there, for whoever corrects. mistakes: sentences, each with the
-    wrong value that it explains, in the form of the first answer, or {name of an answer: value}.
+    wrong value that it explains, in the form of the first answer, or {name of an answer: value}. Raises Again if such
+    a value looks on paper like the right one, or like that of another mistake.
     """
 
     given: dict[str, object]
@@ -29,11 +30,25 @@ class Paper:
     mistakes: dict[str, object] = field(default_factory=dict)
 
     def __post_init__(self):
+        seen = {(name, shown(value)) for name, value in self.answer.items()}
+        for what, (name, wrong) in self.wrong().items():
+            if (name, shown(wrong)) in seen:
+                raise Again(f"who {what} is right here, or made another mistake")
+            seen.add((name, shown(wrong)))
+
+    def wrong(self) -> dict[str, tuple[str, object]]:
+        """Give for each mistake the name of the answer that it spoils, and the wrong value."""
         first = next(iter(self.answer))
-        for what, value in self.mistakes.items():
-            (name, wrong), *_ = value.items() if isinstance(value, dict) else {first: value}.items()
-            if np.array_equal(np.asarray(wrong), np.asarray(self.answer[name])):
-                raise Again(f"who {what} is right here")
+        of = {what: value if isinstance(value, dict) else {first: value} for what, value in self.mistakes.items()}
+        return {what: next(iter(value.items())) for what, value in of.items()}
+
+    def worth(self, points: int) -> dict[str, Fraction]:
+        """Split a question's points among its answers, in halves: each gets one, and more for more numbers."""
+        halves = dict.fromkeys(self.answer, 1)
+        values = {name: 0 if isinstance(value, str) else np.size(value) for name, value in self.answer.items()}
+        for _ in range(2 * points - len(halves)):
+            halves[max(halves, key=lambda name: (values[name] / halves[name], -halves[name]))] += 1
+        return {name: Fraction(n, 2) for name, n in halves.items()}
 
 
 @dataclass(frozen=True)

@@ -14,24 +14,24 @@ from labkit.labels import from_one_hot
 def raw_mask(rng):
     """Decode a simulator's mask of bodies and links."""
     classes = rng.integers(0, 4, (3, 3), np.uint8)
-    bodies, parts = rng.permutation(3), np.array([0, 1, 2])[rng.permutation(3)]
+    bodies, parts = rng.permutation(3), rng.permutation(3)
     again(len({int(c) for c in classes.ravel()}) < 4)
+    again((np.diff(classes.astype(int)) == 0).any())
     raw = np.append(bodies + (parts << 24), -1)
     words = [
         f"{body}&nbsp;+&nbsp;{part}&nbsp;·&nbsp;2<sup>24</sup>" for body, part in zip(bodies, parts, strict=True)
     ] + ["−1"]
     labels = labels_from_segmentation(raw[None].astype(np.int32), classes)[0]
-    shifted = labels_from_segmentation(raw[None].astype(np.int32), np.roll(classes, -1, axis=1))[0]
+    shifted = [str(np.append(classes[body], -1)[part + 1]) for body, part in zip(bodies, parts, strict=True)] + ["0"]
     return Paper(
         {"classes": classes},
-        "<p>A simulator's mask holds body + ((link + 1) · 2<sup>24</sup>), where link −1 is the body's base, and −1 "
-        "where "
-        "nothing is seen. The table gives the class of each part.</p>"
+        "<p>In a simulator's mask, a pixel that sees nothing holds −1. Others hold body + (link + 1) · 2<sup>24</sup>; "
+        "the base counts as link −1. The table gives the class of each part.</p>"
         + names(classes, top=["base", "link 0", "link 1"], left=[f"body {i}" for i in range(3)])
         + f"<p>Which labels do four pixels get whose raw values are <b>{'; '.join(words)}</b>? Nothing is class 0.</p>",
         {"labels": labels},
         "The lower 24 bits are the body; what stands above them is link + 1, so 0 is the base; −1 is 0.",
-        {"took the upper bits for the link itself": shifted},
+        {"took the upper bits for the link itself": f"({', '.join(shifted).replace('-1', 'no such link')})"},
     )
 
 
@@ -66,9 +66,9 @@ def ghosts(rng):
         "Pixel centres lie at the middles of the pixels.</p>"
         "<p>Write the eight values. Which of them are labels that the row did not hold?</p>",
         {"row": wide, "invented": np.array(sorted({int(x) for x in wide} - {a, b}))},
-        "New centres lie a quarter and three quarters of the way between old ones; only the pair in the middle "
-        "differs.",
-        {"blended half and half": {"invented": np.array([(a + b) / 2])}},
+        "New centre i lies at (i + 1/2)/2 − 1/2 of the old row: a quarter or three quarters of the way between two old "
+        "ones. Only the pair in the middle differs. Outside of the first and last old centre, their labels go on.",
+        {"sampled at i/2, half a pixel off": {"invented": np.array([(a + b) / 2])}},
     )
 
 
@@ -82,7 +82,7 @@ def shares(rng):
     again(counts.min() == 0)
     return Paper(
         {"y": y[0]},
-        f"<p>Of this label image, in which 255 means that nobody judged the pixel:</p>{names(y[0])}"
+        f"<p>In this label image, 255 means that nobody judged the pixel.</p>{names(y[0])}"
         "<p>Give the share of each of the classes 0, 1 and 2 among the judged pixels.</p>",
         {"shares": class_shares(y, 3)},
         f"{counts.tolist()} of {12 - hidden} judged pixels; the shares sum to 1.",
@@ -102,7 +102,11 @@ def flat_index(rng):
         f"At which byte, counted from 0, is the pixel in column u = {u} of row v = {v}?</p>",
         {"byte": int(np.ravel_multi_index((v, u), (H, W)))},
         f"v whole rows come first: {v} · {W} + {u}.",
-        {"counted columns of the image first": u * H + v, "took u for the row": u * W + v},
+        {
+            "counted columns of the image first": u * H + v,
+            "took u for the row": u * W + v,
+            "took H for the width": v * H + u,
+        },
     )
 
 
@@ -117,7 +121,7 @@ def unanimous(rng):
     votes[:, empty] = [0, 0, 0, 0]
     one_hot = (votes == votes.max(axis=0)) & (votes.max(axis=0) > 0)
     return Paper(
-        {"votes": votes.astype(np.uint8)},
+        {"votes": votes.astype(np.uint8), "empty": np.uint8(empty)},
         "<p>Several people labelled four pixels. The table counts their votes; for one pixel nobody voted.</p>"
         + names(votes, top=[f"pixel {i}" for i in range(4)], left=[f"class {c}" for c in range(4)])
         + "<p>Which labels does <code>votes.argmax(axis=0)</code> give? Which pixel's label is wrong, and what "

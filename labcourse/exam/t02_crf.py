@@ -32,7 +32,7 @@ def energy_2x3(rng):
     unary = int(np.take_along_axis(psi, y[..., None], -1).sum())
     return Paper(
         {"psi": psi, "lam": lam, "y": y.astype(np.uint8)},
-        "<p>Six pixels, two classes. The costs ψ of class 0 and of class 1, and a labelling y:</p><p>"
+        "<p>Each of six pixels gets one of two classes. These are their costs ψ, and a labelling y:</p><p>"
         + captioned(table(psi[..., 0]), "ψ of class 0")
         + captioned(table(psi[..., 1]), "ψ of class 1")
         + captioned(names(y), "y")
@@ -84,8 +84,8 @@ def two_pixels(rng):
     together = int(psi[0].sum(axis=0).min())
     return Paper(
         {"psi": psi, "w": w},
-        "<p>Two neighbouring pixels p and q, two classes; ψ says what each class costs, and different labels cost "
-        f"w = {w}.</p>{table(psi[0].T, NAMES, ['class 0', 'class 1'])}"
+        "<p>Two neighbouring pixels p and q each get one of two classes. The table says what each class costs; "
+        f"different labels cost w = {w}.</p>{table(psi[0].T, NAMES, ['class 0', 'class 1'])}"
         "<p>Which labelling (y<sub>p</sub>, y<sub>q</sub>) costs least, and how much? "
         "At which w do the best equal and the best different labelling cost the same?</p>",
         {"least energy": best.energy, "labels": best.labels[0].astype(int), "w of a tie": together - free},
@@ -105,10 +105,11 @@ def augment(rng):
     flow, side = grid_max_flow(np.array([[source, -sink]]), weights, ((0, 1), (1, 0)))
     place = ["source → p", "p → q", "q → sink"][[source, pair, sink].index(flow)]
     return Paper(
-        {"source": source, "pair": pair, "sink": sink},
-        f"<p>What is left of a graph: source → p with capacity {source}, p → q and q → p with capacity {pair} each, "
-        f"q → sink with capacity {sink}.</p><p>Push as much as you can along source → p → q → sink. How much is it? "
-        "Write what is then left on source → p, p → q, q → p and q → sink. Which arc is cut?</p>",
+        {"source": source, "pair": pair, "sink": sink, "cut": np.uint8([source, pair, sink].index(flow))},
+        f"<p>In a graph these capacities are left: source → p with capacity {source}, p → q and q → p with capacity "
+        f"{pair} each, q → sink with capacity {sink}.</p><p>Push as much as you can along source → p → q → sink. "
+        "How much is it? Write what is then left on source → p, p → q, q → p and q → sink. Which arc is now full, so "
+        "that the cut goes through it?</p>",
         {
             "flow": flow,
             "left": np.array([source - flow, pair - flow, pair + flow, sink - flow]),
@@ -132,7 +133,8 @@ def terminals(rng):
     to_sink_side, to_source_side, constant = terminal_capacities(psi.astype(float), np.full((1, 3), -1), 1e3)
     return Paper(
         {"psi": psi},
-        "<p>Three pixels, two classes; whoever stays on the source's side gets class 0. Costs:</p>"
+        "<p>Each of three pixels gets one of two classes: class 0 if it stays on the source's side. The table says "
+        "what each class costs.</p>"
         + table(psi[0].T, [f"pixel {i}" for i in range(3)], ["class 0", "class 1"])
         + "<p>Subtract from each pixel its smaller cost. Write the capacities source → pixel and pixel → sink, and "
         "the constant "
@@ -156,11 +158,10 @@ def gibbs(rng):
     worth = np.array([1 / k[1], 1 / m, 1 / (k[0] * k[1] * m), 1 / k[0]])
     return Paper(
         {"k": k, "m": m},
-        f"<p>Two neighbouring pixels. At p, class 0 costs 0 and class 1 costs ln {k[0]}; at q, class 0 costs ln "
-        f"{k[1]} and "
-        f"class 1 costs 0. Different labels cost ln {m}.</p><p>Give exp(−E) of the four labellings 00, 01, 10 and "
-        "11, and the "
-        "probability of 01 under p(y) = exp(−E(y)) / Z.</p>",
+        f"<p>The pixels p and q are neighbours. At p, class 0 costs 0 and class 1 costs ln {k[0]}; at q, class 0 costs "
+        f"ln {k[1]} and class 1 costs 0. Different labels cost ln {m}.</p><p>"
+        "Give exp(−E) of the four labellings 00, 01, 10 and 11, and the probability of 01 under "
+        "p(y) = exp(−E(y)) / Z.</p>",
         {"exp(−E)": worth, "p(01)": p[1]},
         "exp turns sums of logarithms into products: exp(−ln a − ln b) = 1/(ab). Z is the sum of the four.",
         {"forgot to divide by Z": {"p(01)": worth[1]}},

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcourse.exam.paper import Paper, again, blank, named, question, table
+from labcourse.exam.paper import Paper, again, blank, named, question, shown, table
 from labcourse.questions.t03_gradient.input_window import input_window
 from labcourse.questions.t03_gradient.max_pool_backward import max_pool_backward
 from labcourse.questions.t03_gradient.softmax_backward import softmax_backward
@@ -16,7 +16,7 @@ def logarithms(k) -> str:
 
 @question(points=2, minutes=3)
 def softmax_of_logs(rng):
-    """Compute a softmax, and shift it."""
+    """Compute a softmax, and say what a constant does to it."""
     k, shift = rng.integers(1, 10, 3), int(rng.integers(3, 90))
     again(k.sum() not in (5, 8, 10, 16, 20) or len(set(k.tolist())) < 3)
     p = softmax(np.log(k) + shift)
@@ -42,8 +42,8 @@ def one_gradient(rng):
         {"k": k},
         f"<p>A pixel has the logits z = ({logarithms(k)}) and the true class {named(y)} (the first one is class 0). "
         "Compute dL/dz of its cross-entropy. What do the four numbers sum to, and why?</p>",
-        {"dL/dz": g, "sum": 0},
-        "p − one-hot of y: softmax, and 1 less at the true class. Both sum to 1, so the gradient sums to 0.",
+        {"dL/dz": g, "sum": 0, "why": "softmax and one-hot both sum to 1"},
+        "p − one-hot of y: softmax, and 1 less at the true class.",
         {"did not subtract the one-hot": softmax(z)[0], "has the sign turned round": -g},
     )
 
@@ -60,7 +60,7 @@ def summed_loss(rng):
     return Paper(
         {"powers": powers},
         "<p>The network gives the true class of four pixels the probabilities "
-        f"{', '.join(f'1/{2**n}' for n in powers)}; pixel {named(hidden + 1)} of them is labelled 255. "
+        f"{', '.join(f'1/{2**n}' for n in powers)}; pixel {named(hidden)} of them is labelled 255. "
         "How large is the cross-entropy, summed over the pixels that count, as a multiple of ln 2? And its mean?</p>",
         {"sum": loss, "mean": loss / 3},
         "−ln(1/2ⁿ) = n ln 2; pixels of 255 add nothing, and are not counted in the mean.",
@@ -82,7 +82,7 @@ def through_softmax(rng):
         f"({', '.join(map(str, g)).replace('-', '−')}). Compute dL/dz.</p>",
         {"dL/dz": back},
         "p<sub>c</sub> (g<sub>c</sub> − Σ<sub>k</sub> p<sub>k</sub> g<sub>k</sub>); "
-        f"the mean of g under p is {(p @ g):g}. The three sum to 0.",
+        f"the mean of g under p is {shown(p @ g)}. The three sum to 0.",
         {"left the mean out": p * g},
     )
 
@@ -124,5 +124,9 @@ def window(rng):
         f"<p>An image goes through {layers}. Along one axis, which input pixels does output pixel {u} depend on?</p>",
         {"first": first, "last": last},
         "From the output back: first · stride − padding, and last · stride − padding + width − 1, layer by layer.",
-        {"went through the layers from the image's side": inside[0], "forgot the padding": first + paddings[0]},
+        {
+            "went through the layers from the image's side": inside[0],
+            "forgot the first layer's padding": first + paddings[0],
+            "forgot both paddings": u * strides.prod(),
+        },
     )

@@ -19,7 +19,7 @@ def fill_matrix(rng):
     again(np.diag(n).min() == 0 or (n - np.diag(np.diag(n)) > 0).sum() < 3)
     return Paper(
         {"truth": y_true.astype(np.uint8), "prediction": y_pred.astype(np.uint8)},
-        "<p>Truth and prediction of twelve pixels; 255 means that nobody judged the pixel.</p><p>"
+        "<p>These are truth and prediction of twelve pixels; 255 means that nobody judged the pixel.</p><p>"
         + captioned(names(y_true), "truth")
         + captioned(names(y_pred), "prediction")
         + "</p>"
@@ -33,26 +33,31 @@ def fill_matrix(rng):
 
 @question(points=4, minutes=6)
 def scores(rng):
-    """Compute IoU of each class and its mean from a matrix."""
+    """Compute the IoU of each class and the pixel accuracy from a matrix."""
     n = rng.integers(0, 20, (3, 3)) + np.diag(rng.integers(20, 60, 3))
     values = iou(n)
-    again(not np.isclose(values * 20, np.round(values * 20)).sum() >= 2)
+    again(not np.isclose(values * 20, np.round(values * 20)).any())
     again(len(set(values.tolist())) < 3)
     right = np.diag(n)
     return Paper(
         {"n": n},
-        "<p>A confusion matrix; rows are true classes.</p>"
+        "<p>In this confusion matrix, rows are true classes.</p>"
         + table(n, range(3), range(3), "true, predicted")
         + "<p>Compute the IoU of each class, and the pixel accuracy. (Fractions will do.)</p>",
         {"IoU": values, "pixel accuracy": pixel_accuracy(n)},
-        "n<sub>cc</sub> / (row sum + column sum − n<sub>cc</sub>); accuracy is the trace over the sum.",
-        {"counted the right pixels twice below": right / (n.sum(0) + n.sum(1)), "gave recall": right / n.sum(1)},
+        "n<sub>cc</sub> / (row sum + column sum − n<sub>cc</sub>); accuracy is the trace over the sum, "
+        f"{right.sum()}/{n.sum()}.",
+        {
+            "counted the right pixels twice below": right / (n.sum(0) + n.sum(1)),
+            "gave recall": right / n.sum(1),
+            "gave precision": right / n.sum(0),
+        },
     )
 
 
 @question(points=3, minutes=4)
 def absent(rng):
-    """Average IoU where a class is in neither image."""
+    """Average the IoU of four classes."""
     n = np.zeros((4, 4), int)
     gone = int(rng.integers(1, 4))
     here = [c for c in range(4) if c != gone]
@@ -63,7 +68,7 @@ def absent(rng):
     again(not np.isclose(values * 20, np.round(values * 20)).all() or len(set(values.tolist())) < 3)
     return Paper(
         {f"n[{i}, {j}]": n[i, j] for i, j in np.argwhere(n)},
-        f"<p>A confusion matrix of four classes; rows are true classes.</p>{table(n, range(4), range(4))}"
+        f"<p>In this confusion matrix of four classes, rows are true classes.</p>{table(n, range(4), range(4))}"
         "<p>Compute the mean IoU.</p>",
         {"mean IoU": mean_iou(n)},
         f"Class {gone} is in neither image: 0/0 is no score. IoU of the others: {', '.join(f'{v:g}' for v in values)}.",
@@ -94,7 +99,7 @@ def useless_mask(rng):
 
 @question(points=3, minutes=4)
 def which_mistake(rng):
-    """Tell precision from recall, and what each does to a grasp."""
+    """Compute precision, recall and IoU, and say which mistake bends a cloud."""
     tp, fp, fn = (int(x) for x in rng.integers(1, 40, 3) * 5)
     n = np.array([[1000, fp], [fn, tp]])
     precision, recall = (values[1] for values in precision_recall(n))
@@ -113,7 +118,7 @@ def which_mistake(rng):
 
 @question(points=3, minutes=4)
 def two_images(rng):
-    """Average over frames, and add counts."""
+    """Compute an IoU over two frames, in two ways."""
     small, large = int(rng.choice([2, 4, 5, 10])), int(rng.choice([40, 50, 80, 100, 200]))
     hit = [int(rng.integers(1, small + 1)), int(rng.integers(1, large))]
     matrices = [
@@ -146,10 +151,10 @@ def merged(rng):
     again(not np.isclose(value * 100, round(value * 100)))
     return Paper(
         {"n": n},
-        "<p>A confusion matrix; rows are true classes.</p>"
+        "<p>In this confusion matrix, rows are true classes.</p>"
         + table(n, range(3), range(3), "true, predicted")
-        + f"<p>Classes {named((a, b))} get one name. Write the 2x2 matrix (the other class first), and the IoU of "
-        "the new class.</p>",
+        + f"<p>Classes {named(a)} and {named(b)} get one name. Write the 2x2 matrix (the other class first), and the "
+        "IoU of the new class.</p>",
         {"matrix": together, "IoU": value},
         "Add their rows, and then their columns; what was confused between the two is right now.",
         {"left their confusions out": {"IoU": (n[a, a] + n[b, b]) / (together[1].sum() + together[0, 1])}},

@@ -29,7 +29,7 @@ def inverse_weights(rng):
 
 @question(points=3, minutes=4)
 def optimum(rng):
-    """Predict where weighted training ends, and undo it."""
+    """Predict where weighted training ends."""
     p = int(rng.choice([1, 2, 4, 5, 10, 20])) / 100
     w = int(rng.integers(2, 50))
     q = weighted_optimum(np.array([1 - p, p]), np.array([1.0, w]))[1]
@@ -41,13 +41,14 @@ def optimum(rng):
         "background. Which probability of mug does it learn to give these pixels? Does it call them mug?</p>",
         {"q": q, "mug?": "yes" if q > 0.5 else "a tie" if np.isclose(q, 0.5) else "no"},
         f"q = {w} · {p:g} / ({w} · {p:g} + {1 - p:g}).",
-        {"multiplied, and did not divide by the sum": w * p, "left the probability as it is": p},
+        {"left the probability as it is": p}
+        | ({"multiplied, and did not divide by the sum": w * p} if w * p < 1 else {}),
     )
 
 
 @question(points=3, minutes=5)
 def weighted_mean(rng):
-    """Tell a weighted sum, its mean over pixels, and PyTorch's mean."""
+    """Tell a weighted sum of losses from PyTorch's mean."""
     powers, w = rng.integers(1, 7, 4), int(rng.integers(2, 12))
     y = np.array([0, 0, 0, 1])
     p = 0.5**powers
@@ -93,8 +94,9 @@ def decide(rng):
 @question(points=3, minutes=4)
 def weight_of_recall(rng):
     """Find the smallest weight with which enough pixels are found."""
-    q = np.sort(rng.choice([0.05, 0.1, 0.125, 0.2, 0.25, 0.4, 0.5, 0.625, 0.8], 5, replace=False))[::-1]
-    need = int(rng.integers(2, 6))
+    many = [0.01, 0.02, 0.04, 0.05, 0.08, 0.1, 0.125, 0.15, 0.16, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.625, 0.75, 0.8]
+    q = np.sort(rng.choice(many, 5, replace=False))[::-1]
+    need = int(rng.integers(2, 5))
     w = weight_for_recall(q, np.ones(5, bool), need / 5)
     again(w <= 1)
     return Paper(
@@ -105,8 +107,8 @@ def weight_of_recall(rng):
         "found). "
         f"Which is the smallest w with which {need} of the five pixels are found?</p>",
         {"w": w},
-        f"The {need}. best pixel has q = {q[need - 1]:g}; w q ≥ 1 − q at w = (1 − q)/q.",
-        {"compared w q with 1/2": 0.5 / q[need - 1], "took the pixel after it": (1 - q[need % 5]) / q[need % 5]},
+        f"The last of the first {need} has q = {q[need - 1]:g}; w q ≥ 1 − q at w = (1 − q)/q.",
+        {"compared w q with 1/2": 0.5 / q[need - 1], "took the pixel after it": (1 - q[need]) / q[need]},
     )
 
 
@@ -129,7 +131,7 @@ def other_scenes(rng):
         "What are the odds mug : background there, and what is the probability?</p>",
         {"odds": np.exp(odds), "probability": answer},
         f"Odds times new odds over old odds: {q / (1 - q):.4g} · {new / (1 - new):.4g} / {old / (1 - old):.4g}.",
-        {"multiplied by the ratio of the shares": {"probability": q * new / old}},
+        {"took the ratio of the shares, not of their odds": q / (1 - q) * new / old},
     )
 
 
@@ -148,5 +150,5 @@ def weighted_gradient(rng):
         f"{w[1]} and {w[2]}. Compute the gradient of its weighted cross-entropy by the logits.</p>",
         {"dL/dz": g},
         f"The true class's weight, {w[y]}, times (p − one-hot); it still sums to 0.",
-        {"weighted each entry by its own class": w * plain},
+        {"weighted each entry by its own class": w * plain, "left the weight out": plain},
     )

@@ -9,13 +9,13 @@ from labkit.geometry.projection import back_project, back_projection_noise, inve
 FOCAL = (200, 250, 400, 500, 600, 800, 1000)
 TURNS = np.array(
     [
-        [[0, -1, 0], [-1, 0, 0], [0, 0, -1]],
+        [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
         [[0, 0, 1], [-1, 0, 0], [0, -1, 0]],
         [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
         [[0, 0, -1], [1, 0, 0], [0, -1, 0]],
-        [[0, 1, 0], [1, 0, 0], [0, 0, -1]],
+        [[0, -1, 0], [0, 0, -1], [1, 0, 0]],
     ]
-)
+)  # none is its own transpose, so who forgets to transpose gets another one
 
 
 def camera(rng):
@@ -98,14 +98,17 @@ def inverse(rng):
     """Invert a rigid transform."""
     T = pose(rng)
     inverted = invert_transform(T)
-    again(np.allclose(T[:3, :3], T[:3, :3].T) and np.allclose(-T[:3, 3], inverted[:3, 3]))
     return Paper(
         {"t": T[:3, 3]},
         f"<p>T<sub>base,cam</sub> is</p>{names(T)}<p>Write T<sub>cam,base</sub>. In the camera's frame, where is the "
         "base's origin?</p>",
-        {"origin": inverted[:3, 3], "T": inverted},
-        "Rᵀ and −Rᵀ t: a rotation's inverse is its transpose.",
-        {"turned the sign of t alone": -T[:3, 3]},
+        {"origin": inverted[:3, 3], "R": inverted[:3, :3].astype(int)},
+        "The upper left of T is Rᵀ, since a rotation's inverse is its transpose; its last column is the origin, −Rᵀ t.",
+        {
+            "turned the sign of t alone": -T[:3, 3],
+            "forgot to transpose": -T[:3, :3] @ T[:3, 3],
+            "left R as it is": {"R": T[:3, :3].astype(int)},
+        },
     )
 
 
@@ -149,7 +152,7 @@ def height_error(rng):
         {"fy": fy, "d": d, "dv": dv, "pixel": pixel, "depth": depth},
         f"<p>A camera looks level, so a point's height is that of the camera minus y. f<sub>y</sub> = {fy}. A point "
         f"{dv} rows below "
-        f"the principal point has the depth {d:g} m. The row is uncertain by {pixel:g} pixels (one standard "
+        f"the principal point has the depth {d:g} m. The row is uncertain by {pixel:g} px (one standard "
         "deviation), the depth "
         f"by {depth} mm, independently. By how many millimetres is the height uncertain?</p>",
         {"mm": round(height, 6)},

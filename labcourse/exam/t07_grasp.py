@@ -23,11 +23,11 @@ def covariance(rng):
     second = xy.T @ xy / 4
     return Paper(
         {"xy": xy},
-        "<p>A cloud of four points, seen from above, in centimetres: "
+        "<p>Seen from above, a cloud has four points, in centimetres: "
         f"{', '.join(f'({x}, {y})' for x, y in xy)}.</p><p>Compute its centroid and its covariance, with "
         "1/N.</p>".replace("-", "−"),
         {"covariance": Sigma[:2, :2], "centroid": mu[:2]},
-        f"Less the centroid, the points are {', '.join(f'({x:g}, {y:g})' for x, y in xy - mu[:2])}.",
+        f"Less the centroid, the points are {', '.join(f'({x:g}, {y:g})' for x, y in xy - mu[:2])}.".replace("-", "−"),
         {"divided by N − 1": Sigma[:2, :2] * 4 / 3, "did not subtract the centroid": second},
     )
 
@@ -53,7 +53,11 @@ def axes(rng):
         f"{table(Sigma)}<p>Show that ({long_way[0]}, {long_way[1]}) is an eigenvector, and give both eigenvalues. "
         "Along which "
         "direction do the jaws close? (A vector of whole numbers.)</p>".replace("-", "−"),
-        {"eigenvalues": np.array([high, low]) * square, "jaws": jaws.round(9)},
+        {
+            "eigenvalues": np.array([high, low]) * float(square),
+            "Σ v": Sigma @ long_way,
+            "jaws": jaws.round().astype(int),
+        },
         f"Σ v = {high * square} v. The trace is the sum of both, so the other is {low * square}. The jaws close "
         "across the long "
         "axis; the vector may be turned round.",
@@ -63,12 +67,13 @@ def axes(rng):
 
 @question(points=2, minutes=3)
 def nearest_yaw(rng):
-    """Choose among equal yaws the one nearest to the hand's."""
+    """Choose the yaw to which a hand turns."""
     axis, hand = int(rng.integers(-17, 18)) * 10, int(rng.integers(-35, 36)) * 10
     x, y = np.cos(np.radians(axis)), np.sin(np.radians(axis))
     Sigma = np.eye(3) - 0.9 * np.outer([x, y, 0], [x, y, 0])
     yaw = float(np.degrees(closing_yaw(Sigma, np.radians(hand))))
     again(abs(yaw - hand) > 80 or abs(yaw - axis) < 1 or abs(hand) > 180)
+    whole = axis + 360 * round((hand - axis) / 360)
     return Paper(
         {"axis": axis, "hand": hand},
         f"<p>The jaws are to close along an axis at {axis}°; the hand's yaw is {hand}°. Which yaw does it turn to, "
@@ -76,7 +81,7 @@ def nearest_yaw(rng):
         "little as it can?</p>".replace("-", "−"),
         {"yaw": round(yaw, 6)},
         "Jaws that are exchanged hold the same way: the yaw counts modulo 180°.",
-        {"turned to the axis as it is given": axis, "added a whole turn": axis + 360 * round((hand - axis) / 360)},
+        {"turned to the axis as it is given": axis} | ({} if whole == axis else {"counted modulo 360°": whole}),
     )
 
 
@@ -92,7 +97,8 @@ def height(rng):
     names = "the palm", "what was seen", "the table"
     again(len(set(bounds)) < 3)
     return Paper(
-        {"bottom": bottom, "top": top, "palm": palm, "above": above, "tips": tips, "table": table_z},
+        {"bottom": bottom, "top": top, "palm": palm, "above": above, "tips": tips, "table": table_z}
+        | {"bound": np.uint8(np.argmax(bounds))},
         f"<p>The table's top is at z = {table_z} mm. Of an object, points from z = {bottom} mm to {top} mm were "
         "seen. The palm may come "
         f"down to the highest point, and the fingertips reach {palm} mm below the palm. They stay {above} mm above "
@@ -102,9 +108,10 @@ def height(rng):
         "it may? Which bound counts?</p>",
         {"z": round(z, 6), "bound": names[int(np.argmax(bounds))]},
         f"The lowest fingertips: the largest of {bounds[0]}, {bounds[1]} and {bounds[2]} mm.",
-        {"forgot the palm": max(bounds[1:]) + tips}
-        if z > max(bounds[1:]) + tips
-        else {"took the lowest bound": min(bounds) + tips},
+        {
+            "gave the fingertips' height": max(bounds),
+            **({"forgot the palm": max(bounds[1:]) + tips} if z > max(bounds[1:]) + tips else {}),
+        },
     )
 
 

@@ -51,13 +51,13 @@ def between_poses(rng):
     still = np.tile([0.0, 0, 0, 1], (2, 1))
     place = 1000 * pose_at(np.array([start, start + gap]), places, still, at)[0][0]
     return Paper(
-        {"start": start, "end": start + gap, "at": at, "x": x, "there": x + way},
+        {"start": start, "end": start + gap, "at": at, "x": x, "there": x + way, "speed": speed},
         f"<p>At {start} ms an arm's camera is at x = {x} mm, at {start + gap} ms at x = {x + way:g} mm; it does not "
         "turn. An image has "
         f"the stamp {at} ms. Where was the camera then? By how many millimetres are the points off if the latest "
         "pose is used "
         "instead? How fast does the arm move?</p>",
-        {"x": round(place, 6), "off": round(x + way - place, 6), "speed": f"{speed} mm/s"},
+        {"x": round(place, 6), "off": round(x + way - place, 6), "speed in mm/s": speed},
         f"{at - start} of {gap} ms have passed: {x} + {share:g} · {way:g}.",
         {"took the latest pose": x + way, "took the pose before": x},
     )
@@ -82,7 +82,7 @@ def two_bytes(rng):
 
 @question(points=2, minutes=3)
 def row_step(rng):
-    """Find a byte in an image message with padded rows."""
+    """Find a byte in an image message."""
     width, channels = int(rng.integers(20, 80)) * 10 + int(rng.integers(1, 10)), int(rng.choice([2, 3, 4, 6]))
     step = -(-width * channels // 64) * 64
     v, u = int(rng.integers(2, 60)), int(rng.integers(2, 90))
@@ -95,7 +95,7 @@ def row_step(rng):
         f"does the pixel in row v = {v}, column u = {u} begin? Why is step not {width * channels}?</p>",
         {"byte": int(place), "why": "rows are padded"},
         f"{v} · {step} + {u} · {channels}.",
-        {"left the padding out": channels * (v * width + u)},
+        {"left the padding out": channels * (v * width + u), "counted a byte per pixel": v * step + u},
     )
 
 
@@ -109,7 +109,7 @@ def cloud_bytes(rng):
         {"i": i},
         "<p>A point cloud has the fields x, y, z and rgb, a float32 each without gaps. At which byte, counted from "
         f"0, does {name} of "
-        f"point number {i} (the first is 0) begin? How many bytes has a cloud of {i + 1} points?</p>",
+        f"point number {i} (the first is 0) begin? How many bytes does a cloud of {i + 1} points have?</p>",
         {"byte": i * message.point_step + field.offset, "all": len(message.data)},
         f"point_step is {message.point_step}, the offset of {name} is {field.offset}.",
         {

@@ -109,10 +109,10 @@ def pieces(rng):
     many = len(np.unique(eight[eight > 0]))
     return Paper(
         {"image": image},
-        f"<p>A mask, 1 where something was found:</p>{names(image)}"
-        "<p>How many pieces has it with 4 neighbours, and with 8? Of the largest piece with 4 neighbours give the "
-        "area, the centroid "
-        "(u, v) and the box (u<sub>0</sub>, v<sub>0</sub>, u<sub>1</sub>, v<sub>1</sub>), ends included.</p>",
+        f"<p>This mask is 1 where something was found.</p>{names(image)}"
+        "<p>How many pieces does it have with 4 neighbours, and with 8? Of the largest piece with 4 neighbours give "
+        "the area, the centroid (u, v) and the box "
+        "(u<sub>0</sub>, v<sub>0</sub>, u<sub>1</sub>, v<sub>1</sub>), ends included.</p>",
         {"centroid": centroid[0], "pieces": np.array([len(numbers), many]), "area": int(area[0]), "box": box[0]},
         "Corners join pieces only with 8 neighbours. u counts columns, v rows, both from 0.",
         {"exchanged u and v": centroid[0][::-1], "exchanged 4 and 8": {"pieces": np.array([many, len(numbers)])}},
@@ -139,7 +139,7 @@ def mahalanobis(rng):
         f"length of {mean[1]} pixels with one of {spread[1]}, independently. Three pieces were found:</p>"
         + table(features, ["area", "length"], ["piece 1", "piece 2", "piece 3"])
         + "<p>Compute the squared Mahalanobis distance of each. Which piece is chosen?</p>",
-        {"squared": squared, "piece": number},
+        {"squared": squared.astype(float), "piece": number},
         "Each difference over its own standard deviation, squared, and added.",
         {
             "did not divide by the spread": {"piece": int(plain.argmin()) + 1},
