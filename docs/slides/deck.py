@@ -139,15 +139,20 @@ def capital(sentence: str) -> str:
 def in_lines(formula: str) -> str:
     r"""A formula of several parts with a line for each, so that it can be large; the lesson has them in one line.
 
-    >>> in_lines(r"a = 1, \qquad\text{and}\qquad b = 2")
-    '\\begin{gathered} a = 1, \\\\ \\text{and} \\quad b = 2 \\end{gathered}'
+    >>> in_lines(r"a = 1, \qquad\text{and}\qquad b_\text{cam} \\ c")
+    '\\begin{gathered} a = 1, \\\\ \\text{and} \\quad b_\\text{cam} \\\\ c \\end{gathered}'
     """
     parts = [part.strip() for part in re.split(r"(?:\\qquad\s*)+", formula)]
     whole = all(p.count("{") == p.count("}") and p.count(r"\begin") == p.count(r"\end") for p in parts)
     if len(parts) == 1 or not whole:
         return formula
-    lines = re.sub(r"(\\text\{[^{}]*\}) \\\\", r"\1 \\quad", r" \\ ".join(parts))
-    return rf"\begin{{gathered}} {lines} \end{{gathered}}"
+    lines = []
+    for part in parts:
+        if lines and re.fullmatch(r"\\text\{[^{}]*\}", lines[-1]):
+            lines[-1] += rf" \quad {part}"
+        else:
+            lines.append(part)
+    return r"\begin{gathered} " + r" \\ ".join(lines) + r" \end{gathered}"
 
 
 def title(cells: list, place: int) -> str:
