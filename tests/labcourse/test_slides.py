@@ -83,3 +83,33 @@ def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
     nbformat.write(book, path)
     with pytest.raises(ValueError, match="promises what the slide does not show"):
         deck.slides_of(path)
+
+
+@pytest.mark.parametrize(("week", "topic"), list(enumerate(TOPICS, start=1)))
+def test_the_week_by_week_names_slides_and_minutes_that_the_deck_has(week, topic):
+    page = (ROOT / "docs" / "week_by_week.md").read_text(encoding="utf-8")
+    slides = deck.slides_of_topic(topic)
+    core = [slide for slide in slides if slide["core"]]
+    row = f"| {week} | {len(core)}, {deck.minutes(core)} | {len(slides)}, {deck.minutes(slides)} | slide "
+    assert row in page
+    explorer = slides[int(re.search(re.escape(row) + r"(\d+)", page)[1]) - 1]
+    assert not explorer["core"] and re.search(r"In JupyterLab|click|Turn the jaws", explorer["ask"])
+    said = re.search(rf"^\*\*{week}, .*?(?=^\*\*|^## )", page, re.MULTILINE | re.DOTALL)[0]
+    asked = re.findall(r"([^?:]+)\s\(slide\s(\d+),\s(\d+)\smin:\s[^?]+\)\?", said)
+    assert len(asked) >= 2
+    for question, number, minutes in asked:
+        slide = slides[int(number) - 1]
+        shown = f"{slide['title']} {slide['text']} {slide['ask']}".lower()
+        assert slide["minutes"] == int(minutes), question
+        assert [w for w in re.findall(r"[a-z]{4,}|\d/\d+", question.lower()) if w in shown], question
+
+
+@pytest.mark.parametrize(("week", "topic"), list(enumerate(TOPICS, start=1)))
+def test_a_weeks_minutes_add_up(week, topic):
+    page = (ROOT / "docs" / "teaching.md").read_text(encoding="utf-8")
+    sum_, total = re.search(rf"^\| {week} \| \[.*\| ([\d +]+) = (\d+) \|$", page, re.MULTILINE).groups()
+    *lessons, lab, hour = map(int, sum_.split("+"))
+    solution = nbformat.read(ROOT / "solutions" / topic / f"{topic}.ipynb", as_version=4)
+    stated = re.search(r"(\d+) minutes in all", "".join(cell.source for cell in solution.cells[:3]))
+    assert (len(lessons), lab, hour) == (len(TOPICS[topic]), int(stated[1]), 60)
+    assert sum(lessons) + lab + hour == int(total)
