@@ -85,7 +85,7 @@ def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
         deck.slides_of(path)
 
 
-@pytest.mark.parametrize(("week", "topic"), list(enumerate(TOPICS, start=1)))
+@pytest.mark.parametrize(("week", "topic"), [(int(topic[:2]), topic) for topic in TOPICS])
 def test_the_week_by_week_names_slides_and_minutes_that_the_deck_has(week, topic):
     page = (ROOT / "docs" / "week_by_week.md").read_text(encoding="utf-8")
     slides = deck.slides_of_topic(topic)
@@ -104,7 +104,7 @@ def test_the_week_by_week_names_slides_and_minutes_that_the_deck_has(week, topic
         assert [w for w in re.findall(r"[a-z]{4,}|\d/\d+", question.lower()) if w in shown], question
 
 
-@pytest.mark.parametrize(("week", "topic"), list(enumerate(TOPICS, start=1)))
+@pytest.mark.parametrize(("week", "topic"), [(int(topic[:2]), topic) for topic in TOPICS])
 def test_a_weeks_minutes_add_up(week, topic):
     page = (ROOT / "docs" / "teaching.md").read_text(encoding="utf-8")
     sum_, total = re.search(rf"^\| {week} \| \[.*\| ([\d +]+) = (\d+) \|$", page, re.MULTILINE).groups()
