@@ -6,11 +6,12 @@ A cell of a lesson that shows on slides says so in its metadata, and says no sen
 
     "slides": [{"kind": "question", "begin": ["What appears at"], "minutes": 2, "ask": "...", "wrong": "..."}]
 
-kind: question, picture, formula or answer. begin: the first words of each sentence that is shown, of this cell or,
-beside a picture, of the texts next to it. formula: which displayed formula of the cell, from 0; it stands where the
-lesson has it. picture: which drawing
-or image. The title is the heading that the cell stands under. ask, wrong, minutes: the speaker's notes. nbconvert
-writes reveal.js pages; the same slides are a notebook with all code of the lessons, in which explorers move.
+kind: question, picture, formula or answer. begin: the first words of each sentence that is shown, of this cell or of
+the texts next to it. then: likewise, shown at a second step, so that a picture does not answer its own question.
+formula: which displayed formula of the cell, from 0; it stands where the lesson has it. picture: which drawing or
+image. The title is the heading that the cell stands under. ask, wrong, minutes: the speaker's notes. core: true if
+the slide is of the part of a deck that fits an hour, which TOPIC.html?core shows alone. nbconvert writes reveal.js
+pages; the same slides are a notebook with all code of the lessons, in which explorers move.
 """
 
 import importlib.util
@@ -24,7 +25,9 @@ import nbformat
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 KINDS = {"question": "Question", "picture": "Look", "formula": "Formula", "answer": "Answer"}
-REACH = 2  # texts below a picture in which its sentences may stand; the one above comes after them
+REACH = 2  # texts below a cell in which its sentences may stand; the one above comes after them
+# What begins with a small letter: a variable of one letter (an "a" only before a sign), or a function of a number.
+SYMBOL = r"(?:[b-z]|a(?= *[=<>+/]))(?!\w)|(?:sin|cos|tan|atan|log|exp)(?= *[\d(])"
 # Not shown.
 LEAD = r"^(?:\*+[^*]{1,30}[.:]\*+:?|\*\*(?:Predict|Play|Task)[^*]*\*\*:?(?= [^a-z])|Predict first(?: \(\d\))?[.:]) +"
 
@@ -83,10 +86,12 @@ def balanced(sentence: str) -> str:
 
     >>> balanced("*Copy, do not average")
     'Copy, do not average'
+    >>> balanced("*Task:* find it.")
+    '*Task:* find it.'
     >>> balanced("5 + 3 * 16")
     '5 + 3 * 16'
     """
-    for star in (r"\*\*", r"(?<!\*)(?:\*(?=\w)|(?<=[\w.!?])\*)(?!\*)"):
+    for star in (r"\*\*", r"(?<!\*)(?:\*(?=\w)|(?<=[\w.!?:])\*)(?!\*)"):
         if len(re.findall(star, sentence)) % 2:
             sentence = re.sub(star, "", sentence)
     return sentence
@@ -97,14 +102,14 @@ def plain(text: str) -> str:
     return re.sub(r"[*`$_\\\s]+", " ", text).strip()
 
 
-def chosen(cells: list, place: int, slide: dict) -> list[str]:
+def chosen(cells: list, place: int, begins: list[str]) -> list[str]:
     """The sentences of a slide; raises ValueError if a beginning is that of none, or of several."""
     own = cells[place]["cell_type"] == "markdown"
     below = [cell for cell in cells[place + 1 :] if cell["cell_type"] == "markdown"][:REACH]
     above = [cell for cell in cells[:place] if cell["cell_type"] == "markdown"][-1:]
-    texts = [cells[place], *below] if own else [*below, *above]
+    texts = [cells[place], *below, *above] if own else [*below, *above]
     found = []
-    for begin in slide.get("begin", ()):
+    for begin in begins:
         for cell in texts:
             fits = list(dict.fromkeys(s for s in said(cell["source"]) if plain(s).startswith(plain(begin))))
             if fits:
@@ -123,22 +128,31 @@ def said(source: str) -> list[str]:
 
 
 def capital(sentence: str) -> str:
-    """A sentence that begins with a capital, which one has lost that had a lead or a formula before it."""
-    return sentence[0].upper() + sentence[1:]
+    """A sentence that begins with a capital, which one has lost that had a lead or a formula before it.
+
+    >>> capital("the rest"), capital("q = 2 is a ray."), capital("tan 45° = 1.")
+    ('The rest', 'q = 2 is a ray.', 'tan 45° = 1.')
+    """
+    return sentence if re.match(SYMBOL, sentence) else sentence[0].upper() + sentence[1:]
 
 
 def in_lines(formula: str) -> str:
     r"""A formula of several parts with a line for each, so that it can be large; the lesson has them in one line.
 
-    >>> in_lines(r"a = 1, \qquad\text{and}\qquad b = 2")
-    '\\begin{gathered} a = 1, \\\\ \\text{and} \\quad b = 2 \\end{gathered}'
+    >>> in_lines(r"a = 1, \qquad\text{and}\qquad b_\text{cam} \\ c")
+    '\\begin{gathered} a = 1, \\\\ \\text{and} \\quad b_\\text{cam} \\\\ c \\end{gathered}'
     """
     parts = [part.strip() for part in re.split(r"(?:\\qquad\s*)+", formula)]
     whole = all(p.count("{") == p.count("}") and p.count(r"\begin") == p.count(r"\end") for p in parts)
     if len(parts) == 1 or not whole:
         return formula
-    lines = re.sub(r"(\\text\{[^{}]*\}) \\\\", r"\1 \\quad", r" \\ ".join(parts))
-    return rf"\begin{{gathered}} {lines} \end{{gathered}}"
+    lines = []
+    for part in parts:
+        if lines and re.fullmatch(r"\\text\{[^{}]*\}", lines[-1]):
+            lines[-1] += rf" \quad {part}"
+        else:
+            lines.append(part)
+    return r"\begin{gathered} " + r" \\ ".join(lines) + r" \end{gathered}"
 
 
 def title(cells: list, place: int) -> str:
@@ -177,7 +191,7 @@ def one_slide(cells: list, place: int, slide: dict) -> dict:
     """Put one slide together."""
     if slide["kind"] not in KINDS:
         raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {slide['kind']!r}")
-    words, parts = chosen(cells, place, slide), []
+    words, then, parts = chosen(cells, place, slide.get("begin", [])), chosen(cells, place, slide.get("then", [])), []
     first = len(words)  # how many sentences come before the formula
     if "formula" in slide:
         source = cells[place]["source"]
@@ -186,23 +200,39 @@ def one_slide(cells: list, place: int, slide: dict) -> dict:
         first = len(set(words) & {capital(sentence) for sentence in said(source[: formula.start()])})
     if "picture" in slide and cells[place]["cell_type"] == "markdown":
         parts = [re.findall(r"!\[[^]]*\]\([^)]*\)", cells[place]["source"])[slide["picture"]]]
+    for number, sentence in enumerate([*words, *then], start=1):
+        if sentence.endswith(":") and not ("formula" in slide and number == first):
+            raise ValueError(f"begin: {sentence!r} promises what the slide does not show below it")
     texts = [*parts, *words] if slide["kind"] == "picture" else [*words[:first], *parts, *words[first:]]
     return {
         "kind": slide["kind"],
-        "title": title_of(cells, place, words if slide["kind"] != "picture" else []),
+        "title": title_of(cells, place, words if slide["kind"] != "picture" else parts),
         "text": "\n\n".join(texts),
-        "words": words,
+        "then": "\n\n".join(then),
+        "words": [*words, *then],
         "place": place,
         "picture": slide.get("picture") if cells[place]["cell_type"] == "code" else None,
         "minutes": slide["minutes"],
         "ask": slide.get("ask", ""),
         "wrong": slide.get("wrong", ""),
+        "core": slide.get("core", False),
     }
+
+
+def slides_of_topic(topic: str) -> list[dict]:
+    """All slides of a topic's deck, in order."""
+    return [slide for lesson in topics()[topic] for slide in slides_of(lesson)]
+
+
+def minutes(slides: list[dict]) -> int:
+    """How long some slides take."""
+    return sum(slide["minutes"] for slide in slides)
 
 
 def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
     """The slides of a topic as a notebook: what shows is a slide, and the lessons' other code is there but skipped."""
     book = nbformat.v4.new_notebook(metadata=nbformat.read(lessons[0], as_version=4).metadata | {"title": topic})
+    so_far = 0
     for lesson in lessons:
         cells = nbformat.read(lesson, as_version=4).cells
         made: dict[int, list[dict]] = {}
@@ -212,15 +242,21 @@ def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
             shown = made.get(place, [])
             with_picture = [slide for slide in shown if slide["picture"] is not None]
             for slide in shown:
+                so_far += slide["minutes"] if slide["core"] else 0
                 heading = f"# {slide['title']}\n\n## {KINDS[slide['kind']]}\n\n"
                 if slide["picture"] is None:
-                    book.cells += [text(heading + slide["text"], "slide"), notes(slide)]
+                    book.cells.append(start := text(heading + slide["text"], "slide"))
                 else:
                     picture = nbformat.from_dict({**cell, "id": f"{cell.id}-{slide['picture']}", "metadata": {}})
                     images = [out for out in cell.outputs if "image/png" in out.get("data", {})]
                     picture.outputs = [images[slide["picture"]]]
                     picture.metadata.slideshow = {"slide_type": "-"}
-                    book.cells += [text(heading, "slide"), picture, text(slide["text"], "-"), notes(slide)]
+                    book.cells += [start := text(heading, "slide"), picture, text(slide["text"], "-")]
+                if not slide["core"]:
+                    start.metadata.slideshow.data = {"more": "yes"}  # an attribute of the slide's section
+                book.cells.append(notes(slide, so_far))
+                if slide["then"]:
+                    book.cells.append(text(slide["then"], "fragment"))
             if cell.cell_type == "code" and not with_picture:
                 skipped = nbformat.from_dict({**cell, "metadata": {"slideshow": {"slide_type": "skip"}}, "outputs": []})
                 book.cells.append(skipped)
@@ -232,9 +268,10 @@ def text(source: str, kind: str) -> nbformat.NotebookNode:
     return nbformat.v4.new_markdown_cell(source, metadata={"slideshow": {"slide_type": kind}})
 
 
-def notes(slide: dict) -> nbformat.NotebookNode:
-    """What only the speaker sees."""
-    lines = [f"**{slide['minutes']} min.**", slide["ask"] and f"Ask: {slide['ask']}"]
+def notes(slide: dict, so_far: int) -> nbformat.NotebookNode:
+    """What only the speaker sees; `so_far` are the minutes of the core up to the end of this slide."""
+    lines = [f"**{slide['minutes']} min.** " + (f"Core: {so_far} min so far." if slide["core"] else "Not core.")]
+    lines.append(slide["ask"] and f"Ask: {slide['ask']}")
     lines.append(slide["wrong"] and f"What goes wrong: {slide['wrong']}")
     return text("\n\n".join(line for line in lines if line), "notes")
 
@@ -275,7 +312,12 @@ def write(out: Path) -> list[Path]:
         page, _ = exporter.from_notebook_node(book)
         pages.append(out / f"{topic}.html")
         pages[-1].write_text(page, encoding="utf-8")
-    links = "".join(f'<li><a href="{page.name}">{page.stem}</a></li>' for page in pages)
+    links = ""
+    for page in pages:
+        slides = slides_of_topic(page.stem)
+        core = [slide for slide in slides if slide["core"]]
+        links += f'<li><a href="{page.name}">{page.stem}</a> ({len(slides)} slides, {minutes(slides)} min), <a href='
+        links += f'"{page.name}?core">core</a> ({len(core)} slides, {minutes(core)} min)</li>'
     index = f'<!DOCTYPE html><meta charset="utf-8"><title>Slides</title><h1>Slides</h1><ul>{links}</ul>'
     (out / "index.html").write_text(index, encoding="utf-8")
     return pages

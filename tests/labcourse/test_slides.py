@@ -40,12 +40,28 @@ def test_a_deck_fits_an_hour_and_its_slides_the_back_of_a_room(topic):
     assert {slide["kind"] for slide in slides} == set(deck.KINDS)
     assert sum(slide["minutes"] for slide in slides) <= 60
     for slide in slides:
-        spoken = re.sub(r"\$\$.*?\$\$|\$.*?\$|!\[[^]]*\]\([^)]*\)", " x ", slide["text"], flags=re.DOTALL)
+        spoken = re.sub(
+            r"\$\$.*?\$\$|\$.*?\$|!\[[^]]*\]\([^)]*\)", " x ", slide["text"] + " " + slide["then"], flags=re.DOTALL
+        )
         assert len(spoken.split()) <= 75, slide["text"]
         assert slide["kind"] == "picture" or slide["words"], slide
         assert re.search(r"!\[|\$\$", slide["text"]) or slide["picture"] is not None or slide["words"]
     assert sum(bool(slide["ask"]) for slide in slides) >= 0.7 * len(slides)
     assert sum(bool(slide["wrong"]) for slide in slides) >= 3
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_the_core_of_a_deck_leaves_time_for_a_quiz_an_explorer_and_the_lab(topic):
+    core = [slide for slide in deck.slides_of_topic(topic) if slide["core"]]
+    assert len(core) >= 10 and 30 <= deck.minutes(core) <= 35
+    book = deck.deck(topic, TOPICS[topic])
+    kept = [c for c in book.cells if c.metadata.slideshow.slide_type == "slide" and "data" not in c.metadata.slideshow]
+    assert len(kept) == len(core)
+    assert f"Core: {deck.minutes(core)} min so far" in "".join(c.source for c in book.cells)
+    # The hour gives explorers minutes of their own.
+    for cell in (cell for lesson in TOPICS[topic] for cell in nbformat.read(lesson, as_version=4).cells):
+        if any(out.get("data", {}).get("text/plain", "").startswith("an explorer") for out in cell.get("outputs", [])):
+            assert not any(slide.get("core") for slide in cell.metadata.get("slides", ()))
 
 
 def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
@@ -58,6 +74,42 @@ def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
         nbformat.write(book, path)
         with pytest.raises(ValueError, match=rf"cell 0: begin: .*{many} are '{begin}'"):
             deck.slides_of(path)
-    book.cells[0].metadata.slides[0]["begin"] = ["A mask is not"]
+    book.cells[0].metadata.slides[0] |= {"begin": ["A mask is not"], "then": ["A mask is an"]}
     nbformat.write(book, path)
-    assert deck.slides_of(path)[0]["text"] == "A mask is not."
+    found = deck.slides_of(path)[0]
+    assert (found["text"], found["then"]) == ("A mask is not.", "A mask is an image.")
+    book.cells[0].source += " It holds:"
+    book.cells[0].metadata.slides[0]["then"] = ["It holds"]
+    nbformat.write(book, path)
+    with pytest.raises(ValueError, match="promises what the slide does not show"):
+        deck.slides_of(path)
+
+
+@pytest.mark.parametrize(("week", "topic"), [(int(topic[:2]), topic) for topic in TOPICS])
+def test_the_week_by_week_names_slides_and_minutes_that_the_deck_has(week, topic):
+    page = (ROOT / "docs" / "week_by_week.md").read_text(encoding="utf-8")
+    slides = deck.slides_of_topic(topic)
+    core = [slide for slide in slides if slide["core"]]
+    row = f"| {week} | {len(core)}, {deck.minutes(core)} | {len(slides)}, {deck.minutes(slides)} | slide "
+    assert row in page
+    explorer = slides[int(re.search(re.escape(row) + r"(\d+)", page)[1]) - 1]
+    assert not explorer["core"] and re.search(r"In JupyterLab|click|Turn the jaws", explorer["ask"])
+    said = re.search(rf"^\*\*{week}, .*?(?=^\*\*|^## )", page, re.MULTILINE | re.DOTALL)[0]
+    asked = re.findall(r"([^?:]+)\s\(slide\s(\d+),\s(\d+)\smin:\s[^?]+\)\?", said)
+    assert len(asked) >= 2
+    for question, number, minutes in asked:
+        slide = slides[int(number) - 1]
+        shown = f"{slide['title']} {slide['text']} {slide['ask']}".lower()
+        assert slide["minutes"] == int(minutes), question
+        assert [w for w in re.findall(r"[a-z]{4,}|\d/\d+", question.lower()) if w in shown], question
+
+
+@pytest.mark.parametrize(("week", "topic"), [(int(topic[:2]), topic) for topic in TOPICS])
+def test_a_weeks_minutes_add_up(week, topic):
+    page = (ROOT / "docs" / "teaching.md").read_text(encoding="utf-8")
+    sum_, total = re.search(rf"^\| {week} \| \[.*\| ([\d +]+) = (\d+) \|$", page, re.MULTILINE).groups()
+    *lessons, lab, hour = map(int, sum_.split("+"))
+    solution = nbformat.read(ROOT / "solutions" / topic / f"{topic}.ipynb", as_version=4)
+    stated = re.search(r"(\d+) minutes in all", "".join(cell.source for cell in solution.cells[:3]))
+    assert (len(lessons), lab, hour) == (len(TOPICS[topic]), int(stated[1]), 60)
+    assert sum(lessons) + lab + hour == int(total)
