@@ -1,6 +1,7 @@
 """Lifts by a planner of one's own, as lab 07's open task counts them."""
 
 import numpy as np
+import pytest
 
 from labcli import lifts
 from labkit.grasp import plan_grasps
@@ -13,6 +14,7 @@ def test_a_planner_lifts_and_its_trial_can_be_seen_again():
     assert lifts.picture(plan_grasps, SEED).shape == (150, 200, 3)
 
 
+@pytest.mark.nightly
 def test_a_planner_that_raises_costs_its_scene_and_the_table_says_where():
     """Here in every second scene, and in other processes."""
     calls = []

@@ -66,6 +66,7 @@ def test_of_25_pairs_of_kinds_with_nearly_equal_iou_one_has_a_small_p_value(tabl
     assert (np.sum(failed < 0.3), failed.size) == (30, 38)
 
 
+@pytest.mark.nightly
 def test_a_few_lifts_made_again_give_the_tables_rows(table):
     ways = [("true", 0.0), ("part missing", 0.2)]
     again = STUDY.of_scene(600_001, kinds=ways)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scenes import box, scene
 from typer.testing import CliRunner
 
@@ -26,6 +27,7 @@ def test_the_table_holds_ranked_grasps_of_every_scene():
     assert all((row.lifted == 1) == (row.reason == "lifted") for row in rows)
 
 
+@pytest.mark.nightly
 def test_a_scene_tried_again_gives_the_tables_rows():
     again = score_study.STUDY.of_scene(600_210)
     assert again == [row for row in score_study.read(TABLE) if row.seed == 600_210]

@@ -68,6 +68,7 @@ def test_the_committed_table_is_whole_and_says_what_the_lesson_says():
     assert found["HSV, this table"].surface_iou > 0.9 > 0.7 > found["HSV, other tables"].surface_iou
 
 
+@pytest.mark.nightly
 def test_a_row_of_the_committed_table_comes_out_again():
     row = next(row for row in read(COMMITTED) if row.method == "HSV, this table")
 

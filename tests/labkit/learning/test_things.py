@@ -275,6 +275,7 @@ def test_bad_exposure_and_depth_leave_instances_and_say_nothing_of_their_own(cro
                 assert 0.005 < lost.mean() < 0.45 and not off[~lost].any()
 
 
+@pytest.mark.nightly
 def test_batches_made_ahead_by_other_processes_are_the_same():
     """In a process of its own: here, threads that other tests began might be waited for after the fork."""
     program = """if True:
