@@ -90,7 +90,7 @@ def test_lesson_03_shows_the_photographs_and_the_ablations_that_were_measured():
 
     ablations = rows("ablations")
     assert len(ablations) == 7 and all(f"| {' | '.join(row)} |" in lesson for row in ablations[2:])
-    for way, shown in (("target or obstacle", "regions of target or obstacle"), ("its things", "things by votes")):
+    for way, shown in (("target or obstacle", "regions of target or obstacle"), ("its things", "in two sizes")):
         pieces, foreground, grasps = (row[1:] for row in rows("photographs") if row[0] == f"`unet_rgbd`, {way}")
         tables, _, board, bins = foreground
         assert f"| {shown} | {pieces[0].partition(' (')[0]} | {tables} | {board} | {bins} |" in lesson
