@@ -51,6 +51,7 @@ def is_compared(cell) -> bool:
 # What cells say of scenes, trainings and pictures, and what they say when only the notebook's running is at stake: what
 # no compared output shows, and in labs the rest as well.
 FEWER = {
+    "03_gradient_network": {"y_train, steps=300)": "y_train, steps=25)"},
     "05_class_weights": {"of=40": "of=4"},
     "07_grasp": {"of=40": "of=2", "workers=2": "workers=1"},
     "07_grasp_worth": {"range(600_100, 600_110)": "range(600_100, 600_102)"},
@@ -64,6 +65,8 @@ FEWER_IN_LABS = {
         "(600011, 600002, 600006, 600007)": "(600011, 600002)",
         "plt.subplots(3, 4": "plt.subplots(3, 2",
         "range(630000, 630008)": "range(630000, 630003)",
+        "[trial(*case) for case in zip(": "[k == 0 and trial(*case) for k, case in enumerate(zip(",
+        "masks, strict=True)] for way": "masks, strict=True))] for way",
     },
     # Its pictures lie in a folder that its solution, which runs at the same time, does not share.
     "10_capstone": {"else (12, 10, 8)": "else (4, 2, 2)", '"small")': '"few")'},

@@ -42,7 +42,7 @@ NIGHTLY = pytest.mark.nightly  # they train, as test_training does
             "A frame of your own",
             r"Plane\(.* mm\) at .*\nPerception\(.* grasps\)\nGraspPlan\(\d+ grasps, the best G",
         ),
-        ("A model of your own", r"\(240, 320, 2\) \[0 1\]\nPerception\(.*\n\(240, 320, 21\) .*\nPerception\("),
+        ("A model of your own", r"\(240, 320, 2\) \[0 1\]\nPerception\(.*\n\(240, 320, 7\) .*\nPerception\("),
         ("An exported network in a program of your own", r"equal labels: (100.00|99.99)%"),
         (
             "Things of your own",
