@@ -54,12 +54,13 @@ def check_file(path: Path | str | None = None, start: Start = plain.fresh_worker
     topic = topic_of(path, cells)
     if topic is None and not texts:
         raise ValueError(f"path: expected a lab of the course, but {path.name} calls no check of one")
-    lab = CheckedLab(cells, of_topic(topic) if topic else {}, start)
-    order = [cell.grade_id for cell in cells if cell.grade_id in lab.questions]
-    expected = [name for name in released_by(notebook)[1] or (asked(topic) if topic else {}) if name in lab.questions]
+    questions, tasks = (of_topic(topic), asked(topic)) if topic else ({}, {})
+    lab = CheckedLab(cells, questions, start)
+    order = [cell.grade_id for cell in cells if cell.grade_id in questions]
+    expected = [name for name in released_by(notebook)[1] or tasks if name in questions]
     names = list(dict.fromkeys([*order, *expected]))
     for name in names:
-        print(describe(lab.questions[name], lab.verdict(name)))
+        print(describe(questions[name], lab.verdict(name)))
     right = sum(lab.verdict(name).passed for name in names)
     if names:
         print(f"{path.name}, {state}: {right} of {len(names)} answers are right.")

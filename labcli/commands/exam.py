@@ -24,7 +24,7 @@ def exam(
 ) -> None:
     """Write an exam on paper: pages to print, and a key that the kit computes."""
     from labcourse.exam.draw import topics_of
-    from labcourse.exam.page import AIDS, write
+    from labcourse.exam.page import write
     from labgrader.course import topics as taught
 
-    tell_written(write(topics_of(topics, taught()), minutes, seed, versions, out, without or (), course, aids or AIDS))
+    tell_written(write(topics_of(topics, taught()), minutes, seed, versions, out, without or (), course, aids))

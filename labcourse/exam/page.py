@@ -48,12 +48,12 @@ def write(
     out: Path,
     without: Collection[str] = (),
     course: str = "",
-    aids: str = AIDS,
+    aids: str = "",
 ) -> list[Path]:
     """Write exam_A.html, exam_B.html, ... and key.html into a folder, and return their paths.
 
-    without: names of questions that are not asked. Raises ValueError as `choose` does, or for more versions than there
-    are numbers.
+    without: names of questions that are not asked. aids: AIDS if left out. Raises ValueError as `choose` does, or for
+    more versions than there are numbers.
     """
     if not 1 <= versions <= MOST_VERSIONS:
         raise ValueError(f"versions: expected 1 to {MOST_VERSIONS}, got {versions}; draw more with another seed")
@@ -87,8 +87,9 @@ def exam_page(
         f'<div class="head">{"".join(f"<div>{line}</div>" for line in lines)}',
         f'<div class="total">of {points}</div></div>',
         f"<p>{len(questions)} questions, {points} points, {minutes} minutes: {answering} for the questions, the rest "
-        f"for reading. Allowed: {escape(aids)}. Fractions and roots may stay as they are. Write how you got there: a "
-        "right way to a wrong number earns points. Rows and columns, pixels and classes are counted from 0.</p>",
+        f"for reading. Allowed: {escape(aids or AIDS)}. Fractions and roots may stay as they are. Write how you got "
+        "there: a right way to a wrong number earns points. Rows and columns, pixels and classes are counted from "
+        "0.</p>",
     ]
     for number, (question, paper) in enumerate(zip(questions, papers, strict=True), 1):
         worth = f"<span>{count(question.points)}, {question.minutes} min</span>"
