@@ -52,9 +52,11 @@ def test_two_ranks_go_through_the_losses_of_one_process(model, tmp_path, monkeyp
     by_two(__file__, model, str(tmp_path / "two"), "2")
     together = json.loads((tmp_path / "two" / f"{model}.history.json").read_text())
     ours, theirs = ([row["loss"] for row in history] for history in (alone, together))
-    # Rounding grows where depth is as noisy as training makes it; 6e-4 without the whole batch's statistics.
-    assert theirs[0] == pytest.approx(ours[0], rel=2e-4 if model == "unet_rgbd" else 1e-5)
-    assert theirs == pytest.approx(ours, rel=1e-3)
+    # Depth has many equal pixels, and rounding decides which is the largest: pixels changed by 1e-6 change the first
+    # gradient by 0.8 % in one process, too. Without the whole batch's statistics, losses differ by 3 and 5 %.
+    first, all_of_them = (2e-3, 4e-3) if model == "unet_rgbd" else (1e-5, 1e-3)
+    assert theirs[0] == pytest.approx(ours[0], rel=first)
+    assert theirs == pytest.approx(ours, rel=all_of_them)
     written = {path.name for path in (tmp_path / "two").iterdir()}
     assert written == {f"{model}{end}" for end in (".pt", ".history.json", ".checkpoint.pt")}
 
