@@ -95,14 +95,14 @@ class Finding:
     """What a watch or a repair found, or what stands idle.
 
     kind: of WATCHES, IDLE, RIGHT or REPAIRS. piece: number of the program's piece; spans: the places in its text.
-    value: a number that was met there, NaN if none. of_two: whether another place has to be changed, too, or a listed
+    value: a number that was met there, if any. of_two: whether another place has to be changed, too, or a listed
     mistake is the other one, of which value is the number.
     """
 
     kind: str
     piece: int
     spans: tuple[Span, ...]
-    value: float = math.nan
+    value: float | None = None
     of_two: bool = False
 
     @property
@@ -124,15 +124,17 @@ def read(text: str, pieces: Sequence[tuple[str, str]]) -> list[Finding]:
     """
     try:
         return [checked(entry, pieces) for entry in json.loads(text)[:MOST_FINDINGS]]
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return []
 
 
 def checked(entry: dict, pieces: Sequence[tuple[str, str]]) -> Finding:
     """One finding; raises ValueError, TypeError or KeyError for one that cannot be."""
-    kind, piece, value = entry["kind"], entry["piece"], float(entry["value"])
+    kind, piece, value = entry["kind"], entry["piece"], entry["value"]
     if kind not in (*WATCHES, *IDLE, *RIGHT, *REPAIRS) or type(piece) is not int or not 0 <= piece < len(pieces):
         raise ValueError("no such kind or piece")
+    if value is not None and not math.isfinite(value):
+        raise ValueError("no such number")
     lines = pieces[piece][1].split("\n")
     spans = tuple(Span(**span) for span in entry["spans"][:MOST_SPANS])
     for span in spans:

@@ -97,17 +97,18 @@ def own_place(program: LiveProgram, trace: TracebackType | None) -> tuple[int, S
     return program.files.index(code.co_filename), Span(line, column, last_line, end), entry.tb_frame
 
 
-def extreme(text: str, span: Span, frame: FrameType, kind: str) -> float:
-    """The largest number that goes into an exponential, NaN if it cannot be told."""
+def extreme(text: str, span: Span, frame: FrameType, kind: str) -> float | None:
+    """The largest number that goes into an exponential, None if it cannot be told."""
     part = text.split("\n")[span.line - 1].encode()[span.column : span.end].decode()
     try:
         node = ast.parse(part, mode="eval").body
         if kind == "overflow" and isinstance(node, ast.Call) and node.args:
             inner = compile(ast.Expression(node.args[0]), "<argument>", "eval")
-            return float(np.nanmax(np.asarray(eval(inner, frame.f_globals, frame.f_locals), float)))
+            largest = float(np.nanmax(np.asarray(eval(inner, frame.f_globals, frame.f_locals), float)))
+            return largest if np.isfinite(largest) else None
     except Exception:
         pass
-    return float("nan")
+    return None
 
 
 # ------------------------------------------------------------------------------------------------- arguments

@@ -3,7 +3,6 @@
 `shown_case` is about a case, `said` and `marked` are about a finding.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -127,11 +126,11 @@ class Marked:
 def said(finding: Finding) -> str:
     """The sentence about a finding."""
     value = ""
-    if finding.kind == "overflow" and math.isfinite(finding.value):
+    if finding.kind == "overflow" and finding.value is not None:
         value = f": a number as large as {finding.value:.4g} goes into it"
     several = "s" if len(finding.spans) > 1 else ""
     says = (WATCHES | IDLE | RIGHT | REPAIRS)[finding.kind].replace("{value}", value).replace("{s}", several)
-    if not finding.of_two or math.isfinite(finding.value):
+    if not finding.of_two or finding.value is not None:
         return says
     return "Two things are wrong. First: " + says.replace(": every case is right without it", "").replace(
         "Without the marked line every case is right", "The marked line does harm"

@@ -1,7 +1,6 @@
 """Findings as they come back from a worker: as they were written, and nothing else of what anybody may have written."""
 
 import json
-from dataclasses import asdict
 
 import pytest
 
@@ -17,9 +16,7 @@ def test_findings_come_back_as_they_were_written():
         Finding("overflow", 1, (Span(1, 0, 2, 18), Span(2, 4, 2, 10)), 1000.0),
         Finding("axis", 0, (Span(1, 0, 1, 0),), of_two=True),
     ]
-    again = read(write(findings), PIECES)
-    assert [asdict(f) for f in again[:1]] == [asdict(f) for f in findings[:1]] and again[1].spans == findings[1].spans
-    assert [finding.of_two for finding in again] == [False, True]
+    assert read(write(findings), PIECES) == findings
     assert len(read(write(findings * 9), PIECES)) == MOST_FINDINGS
 
 
@@ -30,7 +27,7 @@ def test_findings_come_back_as_they_were_written():
         *(json.dumps([GOOD | change]) for change in (
             {"kind": "riddle"}, {"kind": ["axis"]}, {"kind": None},
             {"piece": 2}, {"piece": -1}, {"piece": 1.0}, {"piece": True}, {"piece": "1"},
-            {"value": "<b>"}, {"value": None}, {"value": [1]},
+            {"value": "<b>"}, {"value": [1]}, {"value": float("nan")}, {"value": 10**400},
             {"spans": []}, {"spans": None}, {"spans": {}}, {"spans": "2"}, {"spans": [[2, 0, 2, 1]]}, {"spans": [{}]},
             *({"spans": [SPAN | wrong]} for wrong in (
                 {"line": 0}, {"line": 3}, {"last_line": 3}, {"line": 2, "last_line": 1}, {"line": 2.0}, {"line": True},
