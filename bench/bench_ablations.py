@@ -4,8 +4,8 @@ Each row is one short training: 300 steps of four windows for the branch of `une
 fresh weights, seed 3, on the scenes that `make train` makes (700 each of `any`, `clutter` and `messy`, 300 of `bin`).
 No paint: things keep the one texture that they are made with. No noise: depth and calibration are exact, and depth is
 nowhere bent or missing. One size: nothing is made larger or smaller. No heaps: the scenes of `any` alone, whose things
-stand apart. The photographs are those of `make bench ARGS=photographs`, each looked at in one size; clutter is 16 scenes
-that none was trained on. The shipped weights had more steps.
+stand apart. The photographs are those of `make bench ARGS=photographs`, each looked at in one size; clutter is 16
+scenes that none was trained on. The shipped weights had more steps.
 """
 
 import sys

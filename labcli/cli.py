@@ -51,6 +51,8 @@ def options(debug: Annotated[bool, typer.Option("--debug", help="Show the traceb
 
 def main() -> None:
     """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
+    # nbformat's validator would build grammars of internationalised addresses for a second, and notebooks have none.
+    sys.modules.setdefault("rfc3987_syntax", None)
     try:
         app(prog_name="labkit")
     except Exception as error:

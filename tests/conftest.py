@@ -22,6 +22,7 @@ import jaxtyping
 import pytest
 
 ROOT = Path(__file__).parent.parent
+sys.modules.setdefault("rfc3987_syntax", None)  # as `labcli.cli.main` does: a second of each process
 PACKAGES = ("labkit", "labgrader", "labcourse", "labcli", "data_gen")
 
 

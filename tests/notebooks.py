@@ -60,7 +60,7 @@ FEWER = {
 FEWER_IN_LABS = {
     "03_gradient": {"range(200)": "range(5)"},
     "05_class_weights": {"steps=400": "steps=5"},
-    "08_node": {"(600131, 600132, 600133)": "(600131,)"},
+    "08_node": {"(600131, 600132)": "(600131,)"},
     "09_other_stacks": {
         "(600011, 600002, 600006, 600007)": "(600011, 600002)",
         "plt.subplots(3, 4": "plt.subplots(3, 2",

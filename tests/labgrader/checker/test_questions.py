@@ -109,7 +109,7 @@ def grade(
         and any(judge(question, m.answer, seed).passed for seed in seeds)
     ]
     all_mutants = mutants(question.reference)
-    survivors = [m for m in all_mutants if any(passes(question, m.function, of_seed) for of_seed in cases)]
+    survivors = [m for m in all_mutants if any(passes(question, m.function, of_seed, seconds) for of_seed in cases)]
     drawn = [question.inputs(rng) for _ in range(count)] if survivors else []
     searched = [Case(args, trusted(question.reference, args), False) for args in drawn]
     accepted += [m.name for m in survivors if not passes(question, m.function, [*chain(*cases), *searched], seconds)]
