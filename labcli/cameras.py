@@ -116,7 +116,7 @@ def _camera(facts: dict) -> Intrinsics:
     lens = facts.get("coeffs", facts.get("distortion_coefficients", {}).get("data", ()))
     return Intrinsics(
         K,
-        depth_scale=None if scale is None else 0.001 * float(scale),
+        depth_scale=None if scale is None else 0.001 * float(scale),  # BOP says it in millimetres
         size=None if None in sides else tuple(map(int, sides)),
         distortion=tuple(map(float, lens)),
     )

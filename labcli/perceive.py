@@ -70,10 +70,10 @@ def read_pixel(text: str) -> tuple[float, float]:
 def read_mask(path, size: tuple[int, int], target: int | None = None, instances: bool = False, camera=None):
     """Read somebody's mask: labels, uint8 (H, W), the numbers of the objects or None, and what is to be said of it.
 
-    8 or 16 bit. 0 and one other value, such as 255 or 1, mean "target"; other values are the kit's own classes. size:
-    width and height that it must have. target: the value that means "target", whatever the others mean. instances: each
-    value above 0 is an object, and a target. camera: whose lens is undone, as `read_frame` does. Raises ValueError for
-    an image of another kind or size, and for values that no class has.
+    8 or 16 bit. If it holds 0 and one other value alone, such as 255 or 1, that value means "target"; else the values
+    are the kit's own classes. size: width and height that it must have. target: the value that means "target", whatever
+    the others mean. instances: each value above 0 is an object, and a target. camera: whose lens is undone, as
+    `read_frame` does. Raises ValueError for an image of another kind or size, and for values that no class has.
     """
     mask = read_image("mask", path, (np.uint8, np.uint16))
     require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
@@ -227,7 +227,7 @@ def describe(seen: Seen) -> str:
 
 
 def grasps_json(seen: Seen) -> dict:
-    """The grasps as plain data: poses in the base frame and in the camera's, metres; width, score, target."""
+    """The grasps as plain data: poses in the base frame and in the camera's, metres; width, score, target from 1."""
     T_cam_base = invert_transform(seen.frame.T_base_cam)
     p = seen.perception
     return {

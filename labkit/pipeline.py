@@ -39,14 +39,14 @@ EVERYWHERE = ((-20.0, 20.0), (-20.0, 20.0), (-0.02, 0.5))
 class Perception:
     """What a robot knows after one frame.
 
-    frame: what was looked at, with the table's height that counts. target_class: what was looked for. labels: uint8
-    (H, W). probabilities: (H, W, C) in 0..1, or None where labels came without. points: every pixel in the base frame,
-    (H, W, 3), metres, NaN without depth. pixels: the pixels of each target, indices v * W + u, the largest target
-    first. clouds: their points, an (N, 3) for each target. scene: all points of the workspace, (M, 3). certainty: for
-    each target the mean probability of its class over its pixels, or that of the thing if things were found, 1 without
-    either. plan: the grasps ranked by their score times that certainty, or the reason why there is none. seconds: time
-    spent by stage. left_out: what was labelled target and is none, and why, in sentences. tables: without a workspace,
-    the planes that could be the table, the likeliest first.
+    frame: what was looked at, with the table's height that counts. target_class: what was looked for. labels: uint8 (H,
+    W). probabilities: (H, W, C) in 0..1, or None where labels came without. points: every pixel in the base frame, (H,
+    W, 3), metres, NaN without depth. pixels: the pixels of each target, indices v * W + u, the largest target first.
+    clouds: their points, an (N, 3) for each target. scene: all points of the workspace, (M, 3). certainty: for each
+    target the mean probability of its class over its pixels, or that of the thing if things were found, 1 without
+    either. plan: the grasps, the best first, whose scores are multiplied by that certainty already, or the reason why
+    there is none. seconds: time spent by stage. left_out: what was labelled target and is none, and why, in sentences.
+    tables: without a workspace, the planes that could be the table, the likeliest first.
     """
 
     frame: RGBDFrame
@@ -79,7 +79,8 @@ class Labelled:
     """What is seen in a frame pixel by pixel: labels, and what they were chosen by, if anything.
 
     probabilities: (H, W, C), of a network; instances: numbers of objects, (H, W), 0 for none; certainty: of each of
-    these, number 1 first. nothing: why no target stands where one was asked for.
+    these, number 1 first. nothing: why no target stands where one was asked for. cleaned: whether the objects' pixels
+    are without outliers already.
     """
 
     labels: UInt8[np.ndarray, "H W"]
@@ -87,6 +88,7 @@ class Labelled:
     instances: Integer[np.ndarray, "H W"] | None = None
     certainty: tuple[float, ...] | None = None
     nothing: str = ""
+    cleaned: bool = False
 
 
 class Pipeline:
@@ -247,7 +249,7 @@ class Pipeline:
         with timed(seconds, "clouds"):
             if at is not None:
                 seen = self._only_at(at, seen, points, frame.table_z)
-            pixels, clouds, scene = self.targets(seen.labels, points, frame.table_z, seen.instances)
+            pixels, clouds, scene = self._targets(seen, points, frame.table_z)
             tables, left_out = (), ()
             if self.only_on_table and at is None:
                 tables, kept, left_out = _those_on_the_table(points, pixels, frame)
@@ -279,16 +281,20 @@ class Pipeline:
         if seen.certainty is not None:
             numbers = seen.instances.reshape(-1)
             return tuple(float(seen.certainty[numbers[chosen[0]] - 1]) for chosen in pixels)
-        if seen.probabilities is None or seen.instances is not None:
+        if seen.probabilities is None:
             return tuple(1.0 for _ in pixels)
         of_target = seen.probabilities[..., self.target_class].reshape(-1)
         return tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
 
     def _only_at(self, at: tuple[int, int], seen: Labelled, points, table_z: float) -> Labelled:
-        """Make the thing at a pixel (u, v) the only target; what else was one is an obstacle."""
+        """Make the thing at a pixel (u, v) the only target; what else was one is an obstacle.
+
+        Its certainty is its own, or that it is target or obstacle rather than anything else: it counts in any class.
+        """
         u, v = at
-        numbers = seen.instances
+        numbers, cleaned = seen.instances, seen.cleaned
         if numbers is None:
+            cleaned = True  # as `split` does
             numbers = np.zeros(seen.labels.shape, np.int32)
             pixels = np.flatnonzero(np.isin(seen.labels, (self.target_class, OBSTACLE)) & np.isfinite(points[..., 2]))
             for number, group in enumerate(self.split(points.reshape(-1, 3)[pixels]), start=1):
@@ -296,13 +302,20 @@ class Pipeline:
         labels = np.where(seen.labels == self.target_class, OBSTACLE, seen.labels).astype(np.uint8)
         number, height = int(numbers[v, u]), float(points[v, u, 2]) - table_z
         if number == 0:
-            there = "what has no depth" if np.isnan(height) else f"what lies {1000.0 * height:.0f} mm over it"
+            there = "what has no depth" if np.isnan(height) else f"what lies {1000.0 * height:.0f} mm over the table"
             there = "the table" if abs(height) < ON_TABLE else there
             said = f"no thing was found at ({u}, {v}): the pixel shows {there}"
             return replace(seen, labels=labels, instances=np.zeros_like(numbers), nothing=said)
-        labels[numbers == number] = self.target_class
-        certainty = (1.0,) if seen.certainty is None else (seen.certainty[number - 1],)
-        return replace(seen, labels=labels, instances=(numbers == number).astype(np.int32), certainty=certainty)
+        chosen = numbers == number
+        labels[chosen] = self.target_class
+        if seen.certainty is not None:
+            certainty = seen.certainty[number - 1]
+        elif seen.probabilities is not None:
+            classes = sorted({self.target_class, OBSTACLE})
+            certainty = float(seen.probabilities[chosen][:, classes].sum(axis=1).mean(dtype=np.float64))
+        else:
+            certainty = 1.0
+        return replace(seen, labels=labels, instances=chosen.astype(np.int32), certainty=(certainty,), cleaned=cleaned)
 
     def _why_none(self, seen: Labelled, points: Float[np.ndarray, "H W 3"], frame: RGBDFrame) -> str:
         """Say why no pixel that is labelled target became part of one."""
@@ -323,24 +336,23 @@ class Pipeline:
             return f"{NO_TARGET}: {count} of the {len(P)} labelled target lie {where} the workspace, {span}"
         return f"{NO_TARGET} that hang together: {len(P)} pixels are labelled target, {len(known)} of them have depth"
 
-    def targets(
-        self,
-        labels: UInt8[np.ndarray, "H W"],
-        points: Float[np.ndarray, "H W 3"],
-        table_z: float,
-        instances: Integer[np.ndarray, "H W"] | None = None,
+    def _targets(
+        self, seen: Labelled, points: Float[np.ndarray, "H W 3"], table_z: float
     ) -> tuple[list[Integer[np.ndarray, "_"]], list[Float[np.ndarray, "_ 3"]], Float[np.ndarray, "M 3"]]:
         """Find each target's pixels (indices v * W + u) and points, and all points of the workspace.
 
-        points: of the base frame, metres, NaN without depth. instances: as in `locate`.
+        points: of the base frame, metres, NaN without depth.
         """
         points = points.reshape(-1, 3)
         low, high = (self.workspace.T + np.outer([1.0, 1.0], [0.0, 0.0, table_z])).astype(points.dtype)
         inside = [(x > a) & (x < b) for x, a, b in zip(points.T, low, high, strict=True)]
         inside = np.logical_and.reduce(inside)  # NaN lies nowhere
-        pixels = np.flatnonzero(inside & (labels.ravel() == self.target_class))
+        pixels = np.flatnonzero(inside & (seen.labels.ravel() == self.target_class))
         P = points[pixels]
-        groups = self.split(P) if instances is None else separate_instances(P, instances.ravel()[pixels])
+        if seen.instances is None:
+            groups = self.split(P)
+        else:
+            groups = separate_instances(P, seen.instances.ravel()[pixels], clean=not seen.cleaned)
         each = [pixels[group] for group in groups]
         return each, [points[chosen] for chosen in each], points.compress(inside, axis=0)
 
@@ -364,7 +376,8 @@ ON_TABLE = 0.01  # metres over or under the table's height: what is there is the
 def anything(model=None, mirror: bool = True) -> Callable[[RGBDFrame], object]:
     """Make a function that finds things of any class, for `find_objects`: `labkit.learning.things.find_things`.
 
-    model: a network or an engine that tells things apart; None is the kit's own, unet_rgbd. mirror: as in `Pipeline`.
+    model: a network or an engine that tells things apart; None is the kit's own, unet_rgbd. mirror: as for
+    `find_things`.
     Raises ValueError for a network of classes alone. Topic 03.
     """
     from labkit.learning.network import load_model, weights_path
@@ -456,10 +469,10 @@ def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Integer[np.ndarray, "_
     return [kept[group] for group in cluster_indices(P[kept])]
 
 
-def separate_instances(P: Float[np.ndarray, "N 3"], numbers: Integer[np.ndarray, "N"]) -> list:
-    """Clean the points of each object: a list of indices into P for each number above 0, the most points first."""
+def separate_instances(P: Float[np.ndarray, "N 3"], numbers: Integer[np.ndarray, "N"], clean: bool = True) -> list:
+    """A list of indices into P for each object, a number above 0, without outliers; the most points first."""
     groups = [np.flatnonzero(numbers == number) for number in np.unique(numbers[numbers > 0])]
-    cleaned = [group[inliers(P[group])] for group in groups]
+    cleaned = [group[inliers(P[group])] for group in groups] if clean else groups
     return sorted(filter(len, cleaned), key=len, reverse=True)
 
 

@@ -38,7 +38,8 @@ def perceive(
         str, typer.Option(help='A pixel "U,V", column and row: the thing there is the target, whatever its class.')
     ] = "",
     target: Annotated[
-        int | None, typer.Option(help="The class to grasp, 2 if none is given; with --mask, its value that says so.")
+        int | None,
+        typer.Option(help="The class to grasp, 2 if none is given; with --mask, the value that means target."),
     ] = None,
     gripper: Annotated[
         str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON file.')

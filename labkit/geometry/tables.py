@@ -27,7 +27,7 @@ GAP = 0.02  # metres of empty space between two things, at least
 SHELF = 0.25  # metres: a wider plane over the table is no top of a thing
 HANGS = "hang into the picture from its border, as a robot does"
 BESIDE = "do not stand on the table, but beside it"
-ABOVE = "stand on another plane over the table"
+ABOVE = "stand well over the table, as on a shelf"
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +225,8 @@ def reasons_against(
 
     tables: all that were found, the table among them. things: the pixels of each, v * W + u. Three things speak against
     one: it hangs together with something that comes in from the picture's border high over the table, as a robot does;
-    two fifths of it lie beside the table's outline; or it stands on another plane over the table, such as a shelf.
+    two fifths of it lie beside the table's outline; or it stands on another plane over the table, such as a shelf, or
+    begins more than 35 cm over it.
     """
     hanging = _hanging(table, points).ravel()
     flat = points.reshape(-1, 3)

@@ -25,7 +25,7 @@ class Contact(NamedTuple):
 
 
 def measure_grips(grips, seen, rules, most, dropped):
-    """Measure grips of `search`, the best first, until `most` of them hold; `dropped` counts the others on.
+    """Measure grips of `search`, the best first, until `most` of them hold; `dropped` counts those that would slip.
 
     Returns those that hold, with a, opening and cost as measured.
     """

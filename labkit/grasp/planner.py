@@ -89,7 +89,8 @@ class Grasp:
 
     T_base_grasp: (4, 4), the grasp frame in the base frame: z = approach, y = the direction in which the jaws close,
     x = along the pads, origin = the point between the pads (the Panda's panda_grasptarget). width: metres between the
-    pads to come down with. score: 1 for a grip without a shortcoming, less for others. target: number of the cloud.
+    pads to come down with. score: 1 for a grip without a shortcoming, less for others; a `Pipeline` multiplies it by
+    its target's certainty. target: index of the cloud, from 0.
     """
 
     T_base_grasp: Float[np.ndarray, "4 4"]
@@ -181,9 +182,9 @@ def top_down_grasp(
 ) -> Grasp:
     """Give the best grasp of one cloud; where the planner finds none, the one of its principal axis, with score 0.
 
-    cloud, scene: points of the base frame, metres; scene: what else is there, default nothing. table_z: default the
-    cloud's lowest point. The other arguments are those of `plan_grasps`. Raises ValueError for an empty cloud, which
-    has no centroid. Topic 07.
+    cloud, scene: points of the base frame, metres; scene: all that was seen, the cloud's points among it; default the
+    cloud alone. table_z: default the cloud's lowest point. The other arguments are those of `plan_grasps`. Raises
+    ValueError for an empty cloud, which has no centroid. Topic 07.
 
     >>> stick = np.array([[0.5, 0.001 * i, 0.05] for i in range(100)])
     >>> T = top_down_grasp(stick, table_z=0.03).T_base_grasp

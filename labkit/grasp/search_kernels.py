@@ -45,12 +45,13 @@ class Shortcomings(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """The gripper as the kernels need it: metres, margins included. Heights count from the tips upwards.
+    """The gripper as the kernels need it, metres; a margin is in all but opening, pad and thickness.
 
-    cell: edge of a cell. columns, rows: size of a map. slot: how many empty cells a finger needs. pad, finger,
-    palm_half, body_half: half widths across the pads. underside: of a finger, one height per cell outwards from its
-    pad, float32. palm_reach: half the palm's length. spare, least: air beside the target that an open jaw should and
-    must leave.
+    Heights count from the tips upwards. opening: the widest between the pads. thickness: of a tip, along the closing
+    direction. palm, body: heights of their undersides. cell: edge of a cell. columns, rows: size of a map. slot: how
+    many empty cells a finger needs. pad, finger, palm_half, body_half: half widths across the pads. underside: of a
+    finger, one height per cell outwards from its pad, float32. palm_reach: half the palm's length. spare, least: air
+    beside the target that an open jaw should and must leave.
     """
 
     cell: float
@@ -81,7 +82,7 @@ class Rules(NamedTuple):
 
 
 class Maps(NamedTuple):
-    """Maps of one yaw, float32 (rows, columns): the target, the scene, what is hidden; highest: of the whole scene."""
+    """Maps of one yaw, float32 (rows, columns): target, scene, what is hidden; highest: of the scene near by."""
 
     target: np.ndarray
     scene: np.ndarray

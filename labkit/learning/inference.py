@@ -20,11 +20,8 @@ from labkit.learning.view import CanonicalView, canonical_view
 from labkit.support.validation import check_finite, check_rgb, check_shape, require
 
 VOTE_UNIT = 20.0  # pixels of the view that a network's output of 1 means in a vote
-THINGS = (
-    "foreground",
-    "du",
-    "dv",
-)  # what a network may give beside its classes: `labkit.learning.things` has the units
+# What a network may give beside its classes at each pixel: a logit, and a vote in units of VOTE_UNIT.
+THINGS = ("foreground", "du", "dv")
 
 
 @dataclass(frozen=True)

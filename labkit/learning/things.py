@@ -77,7 +77,8 @@ def look(engine, frame: RGBDFrame, mirror: bool = True, sizes: tuple[float, ...]
 
     sizes: foreground and votes are the mean of one look for each, as if all lengths were so many times as large. A
     large thing that comes apart in one size may be whole in another, and a small one is seen better enlarged. With
-    none, for a network that takes pictures as they are, and for a frame without any depth it is what `see` gives.
+    none, for a network that takes pictures as they are, and for a frame without any depth it is what `see` gives. The
+    probabilities are those of the true size: it is what a class may hang on.
     """
     probabilities, sight = engine.see(frame, mirror)
     if not sizes or sight.view is None:
@@ -86,7 +87,7 @@ def look(engine, frame: RGBDFrame, mirror: bool = True, sizes: tuple[float, ...]
     foreground, votes = np.zeros((h, w), np.float32), np.zeros((h, w, 2), np.float32)
     for factor in sizes:
         other = engine.see(resized(frame, factor), mirror)[1]
-        size = np.array(other.foreground.shape[::-1], np.float32)  # of the view, which shows what the other one does
+        size = np.array(other.foreground.shape[::-1], np.float32)  # of the other view, which shows the same
         foreground += cv2.resize(other.foreground, (w, h)) / len(sizes)
         votes += cv2.resize(other.votes, (w, h)) * ((w, h) / size) / len(sizes)
     return probabilities, Sight(np.clip(foreground, 0.0, 1.0), votes, sight.view)

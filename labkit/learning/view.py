@@ -114,16 +114,16 @@ def turned_upright(frame: RGBDFrame):
     return turns, A, c, R
 
 
-def table_pixel(depth: Float[np.ndarray, "H W"], A, c, down, height: float) -> float:
+def table_pixel(depth: Float[np.ndarray, "H W"], A, c, up, height: float) -> float:
     """Metres that the median pixel near the table covers: depth / f. The median is taken over some 50,000 pixels.
 
-    down: the part along base z of the camera's axes, (3,). height: of the camera over the table, metres.
+    up: the part along base z of each of the camera's axes, (3,). height: of the camera over the table, metres.
     """
     step = max(1, round(np.sqrt(depth.size / 50_000)))
     d = depth[step // 2 :: step, step // 2 :: step].astype(np.float64)
     v, u = (np.mgrid[: d.shape[0], : d.shape[1]] * step) + step // 2
-    slope = down[:2] @ np.linalg.inv(A)
-    z = height + d * (slope[0] * (u - c[0]) + slope[1] * (v - c[1]) + down[2])
+    slope = up[:2] @ np.linalg.inv(A)
+    z = height + d * (slope[0] * (u - c[0]) + slope[1] * (v - c[1]) + up[2])
     known = d > 0.0
     near = known & (np.abs(z) < NEAR_TABLE)
     chosen = d[near if near.any() else known]

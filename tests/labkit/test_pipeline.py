@@ -140,6 +140,24 @@ def test_clouds_carry_their_pixels_and_the_certainty_of_these(frame):
     assert Pipeline().locate(frame, frame.labels).certainty == (1.0, 1.0)
 
 
+def test_a_thing_at_a_pixel_has_the_cloud_that_it_has_as_a_target(frame):
+    """Of a network of classes: the target is cleaned once, and as sure as that it is target or obstacle."""
+    few = np.random.default_rng(0).random(frame.depth.shape) < 0.3  # a second cleaning would take some of what is left
+    frame = dataclasses.replace(frame, depth=np.where(few, frame.depth, 0.0).astype(np.float32))
+    probabilities = np.full((*frame.labels.shape, 4), 0.1)
+    np.put_along_axis(probabilities, np.minimum(frame.labels, 3)[..., None].astype(int), 0.7, axis=-1)
+    pipeline = Pipeline(lambda rgb: probabilities, crf=False)
+    whole = pipeline.run(frame)
+    assert len(whole.clouds) == 2 and whole.certainty == (pytest.approx(0.7),) * 2
+    for pixels, cloud in zip(whole.pixels, whole.clouds, strict=True):
+        v, u = divmod(int(pixels[len(pixels) // 2]), frame.size[0])
+        p = pipeline.run(frame, at=(u, v))
+        assert np.array_equal(p.clouds[0], cloud) and len(p.clouds) == 1
+        assert p.certainty == (pytest.approx(0.8),)
+    numbered = Pipeline().locate(frame, frame.labels, probabilities, (frame.labels == TARGET).astype(int))
+    assert numbered.certainty == (pytest.approx(0.7),)
+
+
 def moved(frame, x):
     T = frame.T_base_cam.copy()
     T[0, 3] += x
