@@ -46,8 +46,8 @@ class Shown:
         self.mark, self.lines = mark, lines
 
     def __repr__(self) -> str:
-        plain = [part for line in self.lines for part in (line.plain() if isinstance(line, Marked) else (line,))]
-        return "\n  ".join((f"{self.mark} {plain[0]}", *plain[1:]))
+        first, *rest = (part for line in self.lines for part in (line.plain() if isinstance(line, Marked) else (line,)))
+        return "\n  ".join((f"{self.mark} {first}", *rest))
 
     def _repr_html_(self) -> str:
         colour = COLOURS[self.mark]
@@ -74,7 +74,8 @@ def check(name: str, answer: object) -> Callable:
     """Check a student's answer, show the result, and return the function to go on with.
 
     name: of the question, "04_iou.iou". answer: the student's function. Returns the answer if it passes every case,
-    else the kit's own function, so that the cells below run. It raises nothing, but CheckFailed under LABKIT_STRICT=1.
+    else the kit's own function, so that the cells below run. Raises CheckFailed under LABKIT_STRICT=1, and ValueError
+    where no process for an answer can be started.
     """
     try:
         question = find(name)
@@ -142,8 +143,8 @@ def judged(
 def broken_cell(question: Question) -> Shown | None:
     """What is said if the last run of the answer's cell was an error of syntax: what ran before it is not checked."""
     head = re.compile(rf"^[ \t]*def[ \t]+{question.function}\b", re.MULTILINE)
-    ran = jupyter().history_manager.input_hist_raw if jupyter() is not None else []
-    last = next((source for source in reversed(ran) if head.search(source)), "")
+    sources = jupyter().history_manager.input_hist_raw if jupyter() is not None else []
+    last = next((source for source in reversed(sources) if head.search(source)), "")
     cell = parsed(Cell(last))
     if not cell.problem:
         return None
@@ -185,7 +186,7 @@ def program_of(question: Question, answer: Callable) -> Program:
     blanks, here = of_topic(question.topic), course()
     given = {other: q.source for other, q in blanks.items() if namespace.get(other, q.reference) is q.reference}
     cut = Program(refused="no cell defines it")
-    for cells in texts_of(answer, blanks):
+    for cells in places_of(answer, blanks):
         try:
             refuse_long(cells)
         except Unreadable as reason:
@@ -196,7 +197,7 @@ def program_of(question: Question, answer: Callable) -> Program:
     return Program(refused="there is no text that defines it alone: write it under its name, in a cell or in a file")
 
 
-def texts_of(answer: Callable, blanks: Collection[str]) -> Iterator[list[Cell]]:
+def places_of(answer: Callable, blanks: Collection[str]) -> Iterator[list[Cell]]:
     """The cells in which an answer may stand: a kernel's history, then its texts; in plain Python the answer's file.
 
     nbval keeps no history of what it runs, but Python has the text of each cell for its tracebacks.

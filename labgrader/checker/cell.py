@@ -184,11 +184,17 @@ def first_line(node: ast.stmt) -> int:
     return min([node.lineno, *(decorator.lineno for decorator in getattr(node, "decorator_list", []))])
 
 
+# CPython's DEF_COMP_ITER, which symtable has no method for: from 3.12 on a comprehension's variables stand in the table
+# of what is around it, too.
+OF_A_COMPREHENSION = 512
+
+
 def names_of(text: str) -> tuple[set[str], set[str]]:
     """The names that a text binds at its top, and those that it, or a function in it, reads from there."""
     top = symtable.symtable(text, "cell", "exec")
-    binds = {s.get_name() for s in top.get_symbols() if s.is_assigned() or s.is_imported() or s.is_namespace()}
-    needs = {s.get_name() for s in top.get_symbols() if s.is_referenced()}
+    own = [s for s in top.get_symbols() if not s._Symbol__flags & OF_A_COMPREHENSION]
+    binds = {s.get_name() for s in own if s.is_assigned() or s.is_imported() or s.is_namespace()}
+    needs = {s.get_name() for s in own if s.is_referenced()}
     inner = list(top.get_children())
     while inner:
         table = inner.pop()

@@ -29,8 +29,9 @@ class Verdict:
     """The result of all cases of a question.
 
     problem: None if the answer passes; case: the number of the case that has it, from 0, and `where` says it in words.
-    question, notes: what is no reason to fail, but should be said. cases, outputs: what it was made of. pieces: the
-    program, and findings: what instruments and repair know about it, once somebody has looked.
+    question: None where no case was judged, and there is no hint. notes: what else is wrong, arguments that it changes.
+    cases, outputs: what it was made of. pieces: the program, and findings: what instruments and repair know about it,
+    once somebody has looked.
     """
 
     problem: Problem | None
@@ -64,7 +65,7 @@ class Verdict:
 
     @property
     def hint(self) -> str | None:
-        """The same in words."""
+        """What `sentence` says, None if there is none."""
         return self.sentence.says if self.sentence else None
 
     @cached_property
@@ -100,7 +101,7 @@ def verdict(
 
 
 def stage(problem: Problem) -> int:
-    """How early a problem is told; what only a grader meets comes with the exceptions."""
+    """How early a problem is told; any kind that STAGES does not name comes with the exceptions."""
     return STAGES.index(problem.kind if problem.kind in STAGES else "exception")
 
 

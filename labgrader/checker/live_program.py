@@ -11,6 +11,7 @@ from types import TracebackType
 import numpy as np
 
 from labgrader.checker.comparison import same_argument
+from labgrader.checker.program import is_students
 
 
 class LiveProgram:
@@ -25,8 +26,8 @@ class LiveProgram:
 
     @property
     def files(self) -> list[str]:
-        """What the pieces are called in a traceback."""
-        return [f"<{label}>" for label, _ in self.pieces]
+        """What the student's pieces are called in a traceback; "" for the kit's."""
+        return [f"<{label}>" if is_students(label) else "" for label, _ in self.pieces]
 
     def run(self, label: str, text: str) -> None:
         """Run one more piece; raises what it raises."""
@@ -48,9 +49,8 @@ class LiveProgram:
         """The student's functions with the number of their piece; the answer first, and none of the kit's."""
         found = []
         for k, (label, text) in enumerate(self.pieces):
-            if label == "quiet" or label.endswith("the kit's"):
-                continue
-            found += [(k, node) for node in ast.parse(text).body if is_function(node)]
+            if is_students(label):
+                found += [(k, node) for node in ast.parse(text).body if is_function(node)]
         yield from sorted(found, key=lambda entry: defines(entry[1]) != self.name)
 
     def replace(self, statement: ast.stmt) -> None:

@@ -29,6 +29,7 @@ QUIET = {
     "clear_output": "lambda *things, **options: None",
 }
 QUIET_MODULES = ("tqdm", "IPython")
+SILENT, OF_THE_KIT = "quiet", ", the kit's"  # pieces of a program that no student wrote: a label, and how one ends
 WINDOWS = {"tkinter", "turtle"}  # of the standard library, and not there without a screen: editors import them unasked
 
 
@@ -88,6 +89,11 @@ def program(
     return replace(made, calls=tuple(dict.fromkeys((*made.calls, *late.calls))), late=late)
 
 
+def is_students(label: str) -> bool:
+    """Whether a piece of a program is the student's own."""
+    return label != SILENT and not label.endswith(OF_THE_KIT)
+
+
 def same_text(a: Program, b: Program) -> bool:
     """Whether two programs hold the same lines, in whichever cells."""
     return sorted(text.strip() for _, text in a.pieces) == sorted(text.strip() for _, text in b.pieces)
@@ -129,8 +135,8 @@ class Slice:
             self.follow()
         except Refused as reason:
             return Program(refused=str(reason))
-        pieces = [("quiet", "\n".join(f"{name} = {QUIET[name]}" for name in self.quiet))] if self.quiet else []
-        pieces += [(f"{blank}, the kit's", self.given[blank]) for blank in self.calls if blank in self.given]
+        pieces = [(SILENT, "\n".join(f"{name} = {QUIET[name]}" for name in self.quiet))] if self.quiet else []
+        pieces += [(f"{blank}{OF_THE_KIT}", self.given[blank]) for blank in self.calls if blank in self.given]
         for where in sorted(self.chosen):
             label = self.name if where == self.home else f"cell {where + 1}"
             pieces.append((label, hushed(self.cells[where].kept(self.chosen[where]))))

@@ -85,8 +85,8 @@ class Question:
 
     @property
     def source(self) -> str:
-        """The source of the reference, which is complete in itself but for `np`."""
-        return inspect.getsource(inspect.unwrap(self.reference))
+        """The reference as a piece of a program: its source, which needs nothing but the import before it."""
+        return f"import numpy as np\n{inspect.getsource(inspect.unwrap(self.reference))}"
 
 
 def wrong(hint: str, **variants: Sequence) -> Callable[[Callable], Callable]:

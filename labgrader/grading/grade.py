@@ -129,11 +129,7 @@ class Grading:
     def program(self, name: str, is_right: Callable[[str], bool]) -> Program:
         """The program of an answer, with the kit's answers in the place of wrong ones that it calls."""
         program, _ = self.cuts[name]
-        given = {
-            other: copied_code.reference_source(self.questions[other].reference)
-            for other in program.calls
-            if not is_right(other)
-        }
+        given = {other: self.questions[other].source for other in program.calls if not is_right(other)}
         return self.cut((name,), given)[0][0] if given else program
 
     def draft(self, name: str) -> Result:

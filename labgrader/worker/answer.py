@@ -5,6 +5,7 @@ Cases and what is expected stay in this process: a worker gets the arguments of 
 
 import functools
 import pickle
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
@@ -117,7 +118,11 @@ class Answer:
 
     def __enter__(self) -> "Answer":
         self.worker = self.starting.__enter__()
-        self.not_run = self.run_pieces()
+        try:
+            self.not_run = self.run_pieces()
+        except BaseException:  # as Ctrl-C: nobody would end the worker
+            self.__exit__(*sys.exc_info())
+            raise
         return self
 
     def __exit__(self, *exception) -> None:
@@ -158,7 +163,7 @@ class Answer:
         before = self.used_s
         for case in cases:
             if self.worker.closed:
-                outputs.append(outputs[-1] if outputs else self.not_run)
+                outputs.append(self.worker.stopped or (outputs[-1] if outputs else self.not_run))
                 continue
             output = self.ask("call", self.name, pickle.dumps(case.args))
             missing = isinstance(output, Problem) and output.kind == "missing"
@@ -188,11 +193,12 @@ class Answer:
         job = (*comparing_of(question), self.name, pieces, pairs(public_cases(question)), listed_mistakes(question))
         found: list[Finding] = []
         with suppress(WorkerLost):
-            for look in ("watch", "repair")[self.called_s > WATCH_S :]:  # a watch calls it on all cases, too
-                watch = Stopwatch(self.worker.pid)
+            looks = ("watch", "repair") if self.called_s <= WATCH_S else ("repair",)  # a watch calls it on all cases
+            for look in looks:
+                stopwatch = Stopwatch(self.worker.pid)
                 reply = self.worker.ask((look, *job), LOOK_S, MOST_FOUND)
                 if reply == MORE[1:].decode():
-                    reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S - watch.used(), MOST_FOUND)
+                    reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S - stopwatch.used(), MOST_FOUND)
                 found += read(reply, pieces) if isinstance(reply, str) else []
             if not found:
                 wrong = wrong_and_small(question, public_cases(question), self.worded)[:MOST_CASES]

@@ -155,6 +155,8 @@ class Worker:
             if self.memory is not None and memory_of(self.pid) > self.memory:
                 stopped = Problem("ended", f"it used more than {self.memory >> 20} MB of memory")
             left = limit_s - stopwatch.used()
+        if done.is_set():  # its reply came while its time was looked at
+            return
         self.stopped = stopped or Problem("time", "it did not return in time: does a loop never end?")
         self.end()
 

@@ -111,6 +111,12 @@ def test_a_builtin_is_the_builtin_unless_a_cell_above_replaces_it():
     assert function("max = min", answer)() == 1
 
 
+def test_a_variable_of_a_comprehension_is_no_name_of_its_cell():
+    """From Python 3.12 on the comprehension's table is a part of the cell's."""
+    assert function("n = 5", "q = [n for n in range(3)]", "def f():\n    return n")() == 5
+    assert function("n = 5", "n = [n for n in range(3)]", "def f():\n    return n")() == [0, 1, 2]
+
+
 # ------------------------------------------------------------------------------------ answers that call answers
 
 SETUP = "import numpy as np"
@@ -129,6 +135,13 @@ def test_and_the_kits_in_its_place_if_that_one_is_wrong():
     for first in (FIRST, ("def iou(n):\n    raise NotImplementedError", "iou"), ("def iou(:", "iou"), "pass"):
         found = program(cells(SETUP, first, SECOND), "mean_iou", BLANKS, given={"iou": kit})
         assert found.calls == ("iou",) and LiveProgram("mean_iou", found.pieces).answer(np.zeros((1, 2, 2))) == 0.5
+
+
+def test_and_the_kits_brings_the_import_that_it_needs():
+    """The student's own cells use NumPy nowhere."""
+    own = ("def mean_iou(n):\n    return sum(iou(n)) / len(n)", "mean_iou")
+    found = program(cells(own), "mean_iou", BLANKS, given={"iou": IOU.source})
+    assert LiveProgram("mean_iou", found.pieces).answer(np.eye(2)) == 1.0
 
 
 def test_a_check_does_not_redefine_what_it_checks():

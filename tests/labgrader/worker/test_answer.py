@@ -13,6 +13,7 @@ import numpy as np
 import psutil
 import pytest
 
+from labgrader.checker.comparison import Problem
 from labgrader.checker.finding import Span
 from labgrader.checker.program import Program
 from labgrader.course import find
@@ -186,6 +187,40 @@ def test_the_deepest_own_line_is_told_in_whichever_cell_it_stands():
     verdict, _, _ = judged("\ndef g(x):\n    return np.linalg.inv(x[9])", "def iou(x):\n    return g(x)")
     assert verdict.problem.lines == ((3, "return np.linalg.inv(x[9])"),)
     assert judged("table = [0][1]\ndef iou(n): return table")[0].where == "before it is called"
+
+
+def test_a_line_of_the_kits_is_not_told_as_the_students():
+    pieces = ("mean, the kit's", "def mean(x):\n    return x[99]"), ("iou", "def iou(n):\n    return mean(n)")
+    with Answer(IOU, Program(pieces), plain.fresh_worker, PATIENT) as answer:
+        assert answer.judged(public_cases(IOU))[0].problem.lines == ((2, "return mean(n)"),)
+
+
+def test_a_worker_that_is_killed_after_its_reply_gives_no_copies_of_it():
+    program = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + RIGHT)))
+    with Answer(IOU, program, plain.fresh_worker, PATIENT) as answer:
+        ask = answer.ask
+
+        def killed_after(*request):
+            reply = ask(*request)
+            answer.worker.stopped = Problem("ended", "it used more than 1024 MB of memory")
+            answer.worker.end()
+            return reply
+
+        answer.ask = killed_after
+        first, *others = answer.outputs(public_cases(IOU))
+    assert isinstance(first, np.ndarray) and {other.kind for other in others} == {"ended"}
+
+
+def test_an_interrupt_while_its_cells_run_ends_the_worker():
+    answer = Answer(IOU, Program((("iou", "while True: pass"),)), plain.fresh_worker, PATIENT)
+
+    def interrupted(*request):
+        raise KeyboardInterrupt
+
+    answer.ask = interrupted
+    with pytest.raises(KeyboardInterrupt), answer:
+        pass
+    assert answer.worker.closed
 
 
 def test_what_is_printed_comes_back_and_warnings_do_not():
