@@ -434,6 +434,22 @@ def test_what_can_not_be_read_any_more_loses_its_scores(graded):
         assert book.find_grade("check_iou", TOPIC, TOPIC, "ada").needs_manual_grade
 
 
+def test_what_an_instructor_settled_of_an_unreadable_submission_is_not_asked_again(graded):
+    folder = graded / "submitted" / "ada" / TOPIC
+    (folder / "timestamp.txt").write_text("2026-03-01 12:00:00 UTC")
+    grade(graded)
+    (folder / f"{TOPIC}.ipynb").write_text("{")
+    grade(graded)
+    with gradebook.opened(graded) as book:
+        assert book.find_submission(TOPIC, "ada").timestamp and book.find_submission(TOPIC, "ada").needs_manual_grade
+        for score in book.find_submission_notebook(TOPIC, TOPIC, "ada").grades:
+            score.needs_manual_grade = False
+        book.db.commit()
+    grade(graded)
+    with gradebook.opened(graded) as book:
+        assert not book.find_submission(TOPIC, "ada").needs_manual_grade
+
+
 def test_a_time_of_submission_is_kept(graded):
     course = graded
     folder = course / "submitted" / "ada" / TOPIC
