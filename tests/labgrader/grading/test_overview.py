@@ -13,10 +13,11 @@ from scipy.stats import pointbiserialr
 from typer.testing import CliRunner
 
 from labcli.cli import app
+from labgrader.checker.comparison import Problem
 from labgrader.course import of_topic
 from labgrader.grading import gradebook, run
 from labgrader.grading.batch import Record
-from labgrader.grading.grade import Result
+from labgrader.grading.grade import Result, behaviour_of
 from labgrader.grading.overview import discrimination
 from labgrader.grading.run import grade_course
 from labgrader.worker.answer import Limits
@@ -73,6 +74,11 @@ def test_wrong_answers_are_grouped_by_hint_and_else_by_what_they_give(course):
     not_run = [says for says in groups if "not Python" in says or "opens no file" in says]
     assert [groups.pop(says) for says in not_run] == [("1", "yes")] * 2
     assert sorted(students for students, _ in groups.values()) == ["1", "1", "2"] and ("2", "no") in groups.values()
+
+
+def test_an_exception_on_another_line_is_the_same_mistake():
+    third, fourth = ([Problem("exception", "it raises KeyError: 7", ((line, "0"),))] for line in (3, 4))
+    assert behaviour_of(third) == behaviour_of(fourth) != behaviour_of([Problem("exception", "it raises KeyError")])
 
 
 def test_time_outs_refused_and_syntax_errors_are_counted_as_what_they_are(course):
