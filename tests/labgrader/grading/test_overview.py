@@ -127,6 +127,7 @@ def test_a_second_look_shows_program_cases_and_replies_by_the_key_of_a_students_
     lines = CLASS[student]["iou"].splitlines()
     assert all(line in done.stdout for line in lines)
     replies = re.findall(r"^(public|secret) case \d+: ", done.stdout, re.MULTILINE)
+    assert ("numbered without blank ones" in done.stdout) == (student != "hal")
     assert says in done.stdout and {*replies} == (set() if student == "hal" else {"public", "secret"})
 
 
