@@ -147,8 +147,12 @@ def of_topic(topic: str) -> dict[str, Question]:
     if topic not in topics():
         raise ValueError(f"topic: expected one of {', '.join(topics())}, got {topic!r}")
     folder = f"{course().questions}.t{topic}"
-    language = os.environ.get(CHOSEN) or course().language
-    return {name: question_of(f"{folder}.{name}", language) for name in modules_in(folder)}
+    return {name: question_of(f"{folder}.{name}", chosen_language()) for name in modules_in(folder)}
+
+
+def chosen_language() -> str:
+    """The language of hints: that of the environment, else that of the course."""
+    return os.environ.get(CHOSEN) or course().language
 
 
 @functools.cache
@@ -181,10 +185,10 @@ def modules_in(package: str) -> list[str]:
     return [module.name for module in pkgutil.iter_modules(importlib.import_module(package).__path__)]
 
 
-def files_of(package: str) -> Iterator[tuple[str, Path]]:
-    """The Python files of an installed package, in order: name from the package on, and path."""
+def files_of(package: str, pattern: str = "*.py") -> Iterator[tuple[str, Path]]:
+    """The files of an installed package, Python's by default, in order: name from the package on, and path."""
     spec = importlib.util.find_spec(package)
     folders = [Path(place) for place in (spec.submodule_search_locations if spec else None) or ()]
     for folder in folders:
-        for path in sorted(folder.rglob("*.py")):
+        for path in sorted(folder.rglob(pattern)):
             yield f"{package}/{path.relative_to(folder).as_posix()}", path

@@ -1,8 +1,9 @@
 """Grading submissions: what changed is graded, by threads, and kept as it comes.
 
 Each finished submission is a record, a file of its own that is written at once; a run that was killed is taken up by
-the next one. The record's key tells what it depends on: the lab, the submission, the secret, the limits and this code.
-The secret belongs to a round of grading: late work is graded with the same one until a new round begins.
+the next one. The record's key tells what it depends on: the lab, the submission, the secret, the limits, this code, and
+the course's questions, settings and language. The secret belongs to a round of grading: late work is graded with the
+same one until a new round begins.
 """
 
 import hashlib
@@ -17,7 +18,7 @@ from pathlib import Path
 from tqdm.auto import tqdm
 
 from labgrader import checker, grading, worker
-from labgrader.course import course, files_of
+from labgrader.course import chosen_language, course, files_of
 from labgrader.grading import sandbox
 from labgrader.grading.diagnose_outputs import diagnosers
 from labgrader.grading.grade import Grading, Result
@@ -142,10 +143,14 @@ def key_of(batch: Batch, submission: Submission, code: str) -> str:
 
 
 def code_digest() -> str:
-    """Name the questions and the grader by the bytes of their files."""
-    packages = (checker.__name__, course().questions, grading.__name__, worker.__name__)
+    """Name the questions, in the language that is chosen, the grader, and the settings that it reads of the course."""
+    here, language = course(), chosen_language()
+    packages = (checker.__name__, here.questions, grading.__name__, worker.__name__)
     files = [path for package in packages for _, path in files_of(package)]
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
+    files += [path for _, path in files_of(here.questions, f"*.{language}.toml")]
+    settings = (here.packages, here.kit, here.copied, here.ignored, language)
+    content = (repr(settings).encode(), *(path.read_bytes() for path in files))
+    return hashlib.sha256(b"\0".join(content)).hexdigest()
 
 
 def record_path(out: Path, student: str) -> Path:

@@ -2,13 +2,11 @@
 
 import functools
 import inspect
-import threading
 from collections.abc import Callable, Iterable
 
 from labgrader.checker.ast_fingerprint import fingerprints
 from labgrader.course import course, files_of
-
-parsing = threading.Lock()  # Python 3.11's parser fails when two threads make syntax trees at a time
+from labgrader.worker.answer import drawing
 
 
 def of_the_kit(prints: Iterable[str], reference: Callable) -> list[str]:
@@ -19,7 +17,7 @@ def of_the_kit(prints: Iterable[str], reference: Callable) -> list[str]:
 
 def known_functions() -> dict[str, str]:
     """The names of the library's functions that are long enough to be known by their fingerprint."""
-    with parsing:
+    with drawing:
         return _known_functions()
 
 
@@ -35,7 +33,7 @@ def _known_functions() -> dict[str, str]:
 @functools.cache
 def fingerprints_of(reference: Callable) -> dict[str, str]:
     """The fingerprints of a question's reference; not of the wrong answers beside it."""
-    with parsing:
+    with drawing:
         return fingerprints(reference_source(reference))
 
 

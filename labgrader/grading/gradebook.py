@@ -74,7 +74,7 @@ def write_gradebook(
             there = kept.get(record.student)
             try:
                 if record.reason:
-                    if there is not None and any(there.values()):
+                    if there is not None and any(score for name, score in there.items() if name != "timestamp"):
                         write_nothing(gradebook, lab, record)
                 else:
                     name_student(gradebook, record.student, person_of(roster, record.student))

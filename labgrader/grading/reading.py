@@ -1,9 +1,10 @@
 """Reading a released lab, which is the instructor's, and submissions of it, which are anybody's.
 
 A submission is bytes of a stranger: its place is looked at before it is opened, its size before it is read, how many
-values it holds before it is parsed, and all that is taken from it is the source of the cells that carry one of the
-lab's grade ids. Its tests, its points, its outputs and the order of its cells are not looked at. Each file is read
-once, so that what is graded is what is shown, whatever happens to the file meanwhile.
+values it holds before it is parsed, and all that is taken from it is the source of its code cells, in their order, and
+of the cells that carry one of the lab's grade ids, what it says of its release, and nbgrader's two texts beside it. Its
+tests decide nothing, its points and its outputs are not looked at. Each file is read once, so that what is graded is
+what is shown, whatever happens to the file meanwhile.
 """
 
 import hashlib

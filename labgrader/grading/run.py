@@ -123,9 +123,9 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
         close_to_others(course, out)
         kept_out = keep_out_of_git(course)
     late = {name: f"{final.late}, so {final.score:g} in all" for name, final in finals.items() if final.late.days}
-    known = {record.student for record in records} | roster.keys()
+    students = {record.student for record in records} | roster.keys()
     files = {submission.student: submission.file for submission in read if submission.file}
-    odd = strangers(deadline, known)
+    odd = strangers(deadline, students)
     return Graded(lab, records, graded_now, failures, late, odd, renamed, gone, files, new_gradebook, kept_out, alike)
 
 

@@ -17,6 +17,7 @@ from labgrader.grading.batch import SECRET_FILE, read_record, record_path
 from labgrader.grading.diagnose_outputs import diagnosers
 from labgrader.grading.grade import Grading, Result
 from labgrader.grading.outputs import key_of
+from labgrader.grading.overview import NOT_RUN
 from labgrader.grading.reading import read_lab, read_submissions
 from labgrader.worker.answer import public_cases
 from labgrader.worker.channel import Changed
@@ -49,11 +50,12 @@ def second_look(
 
 
 def about(result: Result) -> Iterator[str]:
-    """The points, what was said of an answer, and its program."""
+    """The points, what was said of an answer, and its program: what was said counts the lines of the student's cell."""
     yield f"{result.points:g} of {result.max_points:g} points: {result.says}"
     yield from [f"Hint: {result.hint}"] if result.hint else []
     yield from [f"To look at: {result.flag}"] if result.flag else []
     yield ""
+    yield "Its cell:" if result.kind in NOT_RUN else "Its program, its lines numbered without blank ones:"
     for number, line in enumerate(result.program.split("\n"), start=1):
         yield f"{number:4}  {line.expandtabs(4)}"
 

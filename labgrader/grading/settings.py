@@ -1,4 +1,4 @@
-"""course.toml beside labs/: what an instructor decided, in blocks that a person writes and this package only reads."""
+"""course.toml beside labs/: what an instructor decided, in blocks; of this package only `forget` writes there."""
 
 import datetime
 import tomllib

@@ -41,20 +41,20 @@ def rename_students(
         if record is not None and found[record.digest] == left[record.digest] == 1:
             if are_two(roster, record.student, names[record.digest]):
                 continue
-            moved[record.student] = names[record.digest]
-            write_record(out, replace(record, student=names[record.digest]))
+            moved[record.student] = replace(record, student=names[record.digest])
     if moved:
         with opened(course) as gradebook:
-            for old, name in moved.items():
-                gradebook.update_or_create_student(name)
+            for old, record in moved.items():
+                gradebook.update_or_create_student(record.student)
                 with suppress(MissingEntry):
-                    gradebook.find_submission(topic, old).student = gradebook.find_student(name)
+                    gradebook.find_submission(topic, old).student = gradebook.find_student(record.student)
             gradebook.db.commit()
-    for old, name in moved.items():
+    for old, record in moved.items():
         for step in ("autograded", "feedback"):
-            move(course / step / old / topic, course / step / name / topic)
+            move(course / step / old / topic, course / step / record.student / topic)
+        write_record(out, record)  # from here on the new name is known; a run that ended before is made again
         remove_pages(course, out, topic, old)
-    return moved
+    return {old: record.student for old, record in moved.items()}
 
 
 def are_two(roster: Mapping[str, Person], old: str, new: str) -> bool:

@@ -29,7 +29,9 @@ from labgrader.worker.process import MORE
 from labgrader.worker.stopwatch import Stopwatch
 
 LOOK_S = 5.0  # for a look: its own limits come before, but where a compiled function does not come back
-drawing = threading.Lock()  # references are called with Python's warnings off, which no thread has for itself
+# References are called with Python's warnings off, which no thread has for itself; and Python 3.11's parser fails when
+# two threads use it at a time.
+drawing = threading.Lock()
 
 
 @dataclass(frozen=True)

@@ -203,7 +203,7 @@ def decode(reply: bytes, text: bool = False, own: bool = False) -> object:
         return decode_values(rest)
     if letter == b"J" and text:
         return Text(rest.decode("utf-8", "replace"))
-    if letter == b"C" and rest and rest[rest[0] + 1 : rest[0] + 2] == b"V":
+    if letter == b"C" and rest and rest[0] > 0 and rest[rest[0] + 1 : rest[0] + 2] == b"V":
         return Changed(tuple(rest[1 : rest[0] + 1]), decode_values(rest[rest[0] + 2 :]))
     if letter == b"E" and len(rest) >= 5:
         line, piece = struct.unpack("<IB", rest[:5])

@@ -20,8 +20,9 @@ from typer.testing import CliRunner
 
 from labcli.cli import app
 from labgrader.checker.program import Program
+from labgrader.course import course as the_course
 from labgrader.course import find
-from labgrader.grading import bwrap, gradebook, reading, run
+from labgrader.grading import batch, bwrap, gradebook, reading, run
 from labgrader.grading import grade as grading
 from labgrader.grading.batch import read_record, record_path, secret_for
 from labgrader.grading.grade import secret_cases
@@ -197,6 +198,35 @@ def test_a_new_round_or_lab_grades_everything_again_and_late_work_joins_the_roun
     assert grade(course, seed=None).graded_now == 1
     kit.write_lab(course, TOPIC, setup="import numpy as np  # and nothing else")
     assert grade(course, seed=None).graded_now == 4
+
+
+@pytest.mark.parametrize(
+    "settings", [{"packages": ("numpy",)}, {"kit": ()}, {"copied": ()}, {"ignored": 7}, {"language": "de"}], ids=str
+)
+def test_results_depend_on_the_settings_of_the_course(monkeypatch, settings):
+    before = batch.code_digest()
+    here = replace(the_course(), **settings)
+    monkeypatch.setattr("labgrader.course.course_of", lambda folder: here)
+    assert batch.code_digest() != before
+
+
+def test_results_depend_on_the_hints_of_the_language_that_is_chosen(tmp_path, monkeypatch):
+    (tmp_path / "questions_of_mine").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    here = replace(the_course(), questions="questions_of_mine")
+    monkeypatch.setattr("labgrader.course.course_of", lambda folder: here)
+
+    def digests() -> dict[str, str]:
+        found = {}
+        for language in ("de", "fr"):
+            monkeypatch.setenv("LABGRADER_LANGUAGE", language)
+            found[language] = batch.code_digest()
+        return found
+
+    before = digests()
+    (tmp_path / "questions_of_mine" / "iou.de.toml").write_text("[hints]")
+    after = digests()
+    assert after["de"] not in before.values() and after["fr"] == before["fr"] != before["de"]
 
 
 def test_what_appears_or_changes_while_a_run_grades_waits_for_the_next(graded, monkeypatch):
@@ -402,6 +432,22 @@ def test_what_can_not_be_read_any_more_loses_its_scores(graded):
     with gradebook.opened(course) as book:
         assert book.find_submission(TOPIC, "ada").score == 0.0
         assert book.find_grade("check_iou", TOPIC, TOPIC, "ada").needs_manual_grade
+
+
+def test_what_an_instructor_settled_of_an_unreadable_submission_is_not_asked_again(graded):
+    folder = graded / "submitted" / "ada" / TOPIC
+    (folder / "timestamp.txt").write_text("2026-03-01 12:00:00 UTC")
+    grade(graded)
+    (folder / f"{TOPIC}.ipynb").write_text("{")
+    grade(graded)
+    with gradebook.opened(graded) as book:
+        assert book.find_submission(TOPIC, "ada").timestamp and book.find_submission(TOPIC, "ada").needs_manual_grade
+        for score in book.find_submission_notebook(TOPIC, TOPIC, "ada").grades:
+            score.needs_manual_grade = False
+        book.db.commit()
+    grade(graded)
+    with gradebook.opened(graded) as book:
+        assert not book.find_submission(TOPIC, "ada").needs_manual_grade
 
 
 def test_a_time_of_submission_is_kept(graded):

@@ -13,10 +13,11 @@ from scipy.stats import pointbiserialr
 from typer.testing import CliRunner
 
 from labcli.cli import app
+from labgrader.checker.comparison import Problem
 from labgrader.course import of_topic
 from labgrader.grading import gradebook, run
 from labgrader.grading.batch import Record
-from labgrader.grading.grade import Result
+from labgrader.grading.grade import Result, behaviour_of
 from labgrader.grading.overview import discrimination
 from labgrader.grading.run import grade_course
 from labgrader.worker.answer import Limits
@@ -75,6 +76,11 @@ def test_wrong_answers_are_grouped_by_hint_and_else_by_what_they_give(course):
     assert sorted(students for students, _ in groups.values()) == ["1", "1", "2"] and ("2", "no") in groups.values()
 
 
+def test_an_exception_on_another_line_is_the_same_mistake():
+    third, fourth = ([Problem("exception", "it raises KeyError: 7", ((line, "0"),))] for line in (3, 4))
+    assert behaviour_of(third) == behaviour_of(fourth) != behaviour_of([Problem("exception", "it raises KeyError")])
+
+
 def test_time_outs_refused_and_syntax_errors_are_counted_as_what_they_are(course):
     (iou,) = [row for row in rows(course) if row["question"] == "iou" and not row["group"]]
     assert [iou[kind] for kind in ("time", "refused", "syntax")] == ["1", "1", "1"]
@@ -121,6 +127,7 @@ def test_a_second_look_shows_program_cases_and_replies_by_the_key_of_a_students_
     lines = CLASS[student]["iou"].splitlines()
     assert all(line in done.stdout for line in lines)
     replies = re.findall(r"^(public|secret) case \d+: ", done.stdout, re.MULTILINE)
+    assert ("numbered without blank ones" in done.stdout) == (student != "hal")
     assert says in done.stdout and {*replies} == (set() if student == "hal" else {"public", "secret"})
 
 

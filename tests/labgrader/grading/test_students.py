@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from labcli.cli import app
 from labgrader.course import of_topic
+from labgrader.grading import students
 from labgrader.grading.gradebook import opened
 from labgrader.grading.reading import name_of
 from labgrader.grading.run import grade_course
@@ -81,6 +82,19 @@ def test_a_renamed_student_keeps_grades_and_pages(course):
     with opened(course) as book:
         assert book.find_grade("explain", TOPIC, TOPIC, "Ada Lovelace").manual_score == 3.0
         assert {submission.student.id for submission in book.assignment_submissions(TOPIC)} == {"Ada Lovelace", "ben"}
+
+
+def test_a_rename_that_meets_a_locked_gradebook_is_made_in_the_next_run(course, monkeypatch):
+    def locked(course):
+        raise ValueError("another program is writing it")
+
+    grade(course)
+    (course / "submitted/ada").rename(course / "submitted/Ada Lovelace")
+    with monkeypatch.context() as patched, pytest.raises(ValueError, match="another program is writing it"):
+        patched.setattr(students, "opened", locked)
+        grade(course)
+    graded = grade(course)
+    assert graded.renamed == {"ada": "Ada Lovelace"} and not graded.gone and left_of(course, "ada") == []
 
 
 def test_who_is_gone_is_listed_and_removed_when_that_is_asked_for(course):

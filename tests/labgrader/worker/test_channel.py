@@ -97,6 +97,7 @@ def test_a_reply_with_a_byte_more_or_less_is_refused(array, data):
         b"V",
         b"",
         b"X",
+        b"C\0V\xff" + struct.pack("<BB", 1, 0) + bytes(1),  # changes its arguments at no position
         b"Oh",
         b"E\0",
     ],
