@@ -60,7 +60,9 @@ def write_autograder(course: Path, topic: str) -> Path:
     needed = [f"{name}=={metadata.version(name).partition('+')[0]}\n" for name in (*kit.packages, "packaging", "tqdm")]
     texts = {"setup.sh": SETUP, "run_autograder": RUN.format(topic=topic), "requirements.txt": "".join(needed)}
     rooms = dict.fromkeys(("labgrader", kit.questions.partition(".")[0], *kit.copied))
-    files = {name: path for room in rooms for name, path in files_of(room)} | {PROJECT: kit.file}
+    kinds = ("*.py", "*.toml")  # a question's hints in another language stand beside it
+    files = {name: path for room in rooms for kind in kinds for name, path in files_of(room, kind)}
+    files |= {PROJECT: kit.file}
     files |= {f"labs/{topic}/{topic}.ipynb": course / "labs" / topic / f"{topic}.ipynb"}
     files |= {name: course / name for name in (FILE, CHANGES)}
     files |= {name: out / name for name in (SECRET_FILE, COMMENTS_FILE)}

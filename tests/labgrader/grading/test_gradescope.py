@@ -112,6 +112,7 @@ def test_grades_are_those_of_labkit_grade(tmp_path):
     with zipfile.ZipFile(gradescope.write_autograder(course, TOPIC)) as archive:
         modes = {info.filename: stat.S_IMODE(info.external_attr >> 16) for info in archive.infolist()}
         archive.extractall(place / "source")
+    assert "labcourse/questions/t04_iou/iou.de.toml" in modes
     assert modes["secret_seed"] == 0o600 and modes["setup.sh"] == modes["run_autograder"] == 0o700
     (place / "source/run_autograder").chmod(0o700)
     (place / "submission").mkdir()
