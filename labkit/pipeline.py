@@ -302,17 +302,15 @@ class Pipeline:
         labels = np.where(seen.labels == self.target_class, OBSTACLE, seen.labels).astype(np.uint8)
         number, height = int(numbers[v, u]), float(points[v, u, 2]) - table_z
         if number == 0:
-            there = "what has no depth" if np.isnan(height) else f"what lies {1000.0 * height:.0f} mm over the table"
-            there = "the table" if abs(height) < ON_TABLE else there
-            said = f"no thing was found at ({u}, {v}): the pixel shows {there}"
+            said = f"no thing was found at ({u}, {v}): the pixel shows {_shown_at(height)}"
             return replace(seen, labels=labels, instances=np.zeros_like(numbers), nothing=said)
         chosen = numbers == number
         labels[chosen] = self.target_class
         if seen.certainty is not None:
             certainty = seen.certainty[number - 1]
         elif seen.probabilities is not None:
-            classes = sorted({self.target_class, OBSTACLE})
-            certainty = float(seen.probabilities[chosen][:, classes].sum(axis=1).mean(dtype=np.float64))
+            of_classes = seen.probabilities[chosen].mean(axis=0, dtype=np.float64)
+            certainty = float(sum(of_classes[c] for c in {self.target_class, OBSTACLE} if c < len(of_classes)))
         else:
             certainty = 1.0
         return replace(seen, labels=labels, instances=chosen.astype(np.int32), certainty=(certainty,), cleaned=cleaned)
@@ -371,6 +369,15 @@ class Pipeline:
 
 NO_TARGET = "no target points"  # as the planner says
 ON_TABLE = 0.01  # metres over or under the table's height: what is there is the table
+
+
+def _shown_at(height: float) -> str:
+    """What a pixel shows that lies so many metres over the table, NaN without depth."""
+    if np.isnan(height):
+        return "what has no depth"
+    if abs(height) < ON_TABLE:
+        return "the table"
+    return f"what lies {1000.0 * abs(height):.0f} mm {'over' if height > 0.0 else 'under'} the table"
 
 
 def anything(model=None, mirror: bool = True) -> Callable[[RGBDFrame], object]:

@@ -154,6 +154,9 @@ def test_a_thing_at_a_pixel_has_the_cloud_that_it_has_as_a_target(frame):
         p = pipeline.run(frame, at=(u, v))
         assert np.array_equal(p.clouds[0], cloud) and len(p.clouds) == 1
         assert p.certainty == (pytest.approx(0.8),)
+    two = np.stack([0.4 + 0.0 * frame.depth, 0.6 + 0.0 * frame.depth], axis=-1)  # a network of two classes
+    there = Pipeline(target_class=1).locate(frame, (frame.labels == TARGET).astype(np.uint8), two, at=(u, v))
+    assert there.certainty == (pytest.approx(0.6),)
     numbered = Pipeline().locate(frame, frame.labels, probabilities, (frame.labels == TARGET).astype(int))
     assert numbered.certainty == (pytest.approx(0.7),)
 
