@@ -5,6 +5,7 @@ label fields, logits = 2 snr onehot + 0.75 white + 0.45 correlated noise, RGB in
 easy: snr 0.55 (two classes: 0.45), lam 1.2; hard: snr 0.22 (0.15), lam 3 (4). "From the image" counts everything from
 image and unary costs to labels; the peers get their weights from NumPy and take them as they are (GCO, cut) or rounded
 to 1/1000 (PyMaxflow's expansion, which starts from the cheapest classes). Energies are labkit's over the peer's.
+The dense CRF's lattice is a page of NumPy and sparse matrices, which can be read; the peer's is C++.
 """
 
 import os
