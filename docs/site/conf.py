@@ -337,10 +337,19 @@ def no_edit_of_what_is_made(app, page, template, context, doctree) -> None:
         context["page_source_suffix"] = ""
 
 
+def name_arrows(folder: Path) -> None:
+    """Give the theme's arrows, which open a section of the contents, a name that is read out."""
+    arrow = '<span class="toctree-toggle"'
+    for page in folder.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(text.replace(f"<summary>{arrow}", f'<summary aria-label="its pages">{arrow}'), encoding="utf-8")
+
+
 def finish(app, error) -> None:
     """The first page is index.html; plotly and the explorers' pictures stand beside the pages once."""
     shutil.rmtree(REFERENCE, ignore_errors=True)
     if error is None:
+        name_arrows(Path(app.outdir))
         static = Path(app.outdir) / "_static"
         for folder in explorers.OUT.glob("*/*/"):
             shutil.copytree(folder, static / "explorers" / folder.name, dirs_exist_ok=True)
