@@ -16,7 +16,6 @@ from pathlib import Path
 
 from labgrader.course import of_topic
 from labgrader.grading.batch import Record, read_record
-from labgrader.grading.copied_code import reference_source
 from labgrader.grading.read_programs import Read, read
 from labgrader.grading.reading import Lab, grade_id, source_of
 from labgrader.grading.roster import keys_of
@@ -108,7 +107,7 @@ def released_shapes(lab: Lab) -> set[str]:
 
 def models_of(course: Path, lab: Lab) -> dict[str, list[Hand]]:
     """By question the kit's own answers: its reference, and the model solution in course/solutions if that is there."""
-    references = {name: reference_source(question.reference) for name, question in of_topic(lab.topic).items()}
+    references = {name: question.source for name, question in of_topic(lab.topic).items()}
     found = {name: [Hand("the kit's reference", text, read(text).shapes)] for name, text in references.items()}
     path = Path(course) / "solutions" / lab.topic / f"{lab.topic}.ipynb"
     for cell in json.loads(path.read_bytes())["cells"] if path.is_file() else ():

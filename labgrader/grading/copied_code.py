@@ -1,17 +1,17 @@
 """Copies of the kit's own code among answers: each student has the references, since `check` needs them."""
 
 import functools
-import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from labgrader.checker.ast_fingerprint import fingerprints
+from labgrader.checker.question import Question
 from labgrader.course import course, files_of
 from labgrader.worker.answer import drawing
 
 
-def of_the_kit(prints: Iterable[str], reference: Callable) -> list[str]:
+def of_the_kit(prints: Iterable[str], question: Question) -> list[str]:
     """Say of which functions of the kit there are copies: `prints` are the fingerprints of an answer's functions."""
-    known = known_functions() | fingerprints_of(reference)
+    known = known_functions() | fingerprints_of(question)
     return [f"has a copy of the kit's {known[found]}" for found in prints if found in known]
 
 
@@ -31,14 +31,7 @@ def _known_functions() -> dict[str, str]:
 
 
 @functools.cache
-def fingerprints_of(reference: Callable) -> dict[str, str]:
+def fingerprints_of(question: Question) -> dict[str, str]:
     """The fingerprints of a question's reference; not of the wrong answers beside it."""
     with drawing:
-        return fingerprints(reference_source(reference))
-
-
-@functools.cache
-def reference_source(reference: Callable) -> str:
-    """A question's reference as a student would write it; it is complete in itself but for NumPy."""
-    source = inspect.getsource(inspect.unwrap(reference))
-    return "\n".join(["import numpy as np", *filter(str.strip, source.splitlines())]) + "\n"
+        return fingerprints(question.source)

@@ -160,7 +160,7 @@ class Grading:
         if program.refused and program.late is None:
             refused = not_gradable(self.lab, name, program.refused)
             return replace(refused, program=self.submission.cells.get(name, ""))
-        flags = copied_code.of_the_kit(self.cuts[name][1], question.reference)
+        flags = copied_code.of_the_kit(self.cuts[name][1], question)
         flags += [f"uses the kit's {other}, a later task, of which its own is wrong" for other in self.later(name)]
         first, late = program, program.late
         program = late if first.refused else first

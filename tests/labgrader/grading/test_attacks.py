@@ -231,6 +231,4 @@ def test_copies_of_the_kits_code_are_flagged_whatever_their_names_and_layout(tmp
     assert "labkit.metrics.boundary_counts" in flags["trimap_band"] and not flags["iou"]
     for question in of_topic(TOPIC).values():
         for answer in kit.alternatives(question):
-            assert (
-                copied_code.of_the_kit(fingerprints(kit.as_cell(answer, question.function)), question.reference) == []
-            )
+            assert copied_code.of_the_kit(fingerprints(kit.as_cell(answer, question.function)), question) == []
