@@ -37,7 +37,7 @@ PACKAGES = {
     "labkit": {"labkit"},
     "labgrader": {"labgrader"},
     "labcourse": {"labcourse", "labkit", "data_gen", "labgrader.checker.question"},
-    "labcourse.questions": {"labcourse.questions", "labkit", "labgrader.checker.question"},
+    "labcourse.questions": {"labcourse.questions", "labkit", "labcourse.kinds", "labgrader.checker.question"},
     "data_gen": {"data_gen", "labkit"},
     "labcli": {"labcli", "labkit", "labgrader", "labcourse", "data_gen"},
 }

@@ -51,7 +51,7 @@ class Case:
 def expected_cases(question: Question, seed: int) -> list[Case]:
     """Give the cases by hand, then the random ones that belong to the seed (any that numpy's default_rng takes)."""
     rng = np.random.default_rng(seed)
-    drawn = [question.inputs(rng) for _ in range(question.random_cases)]
+    drawn = question.draws(rng, question.random_cases)
     by_hand = len(question.by_hand)
     return [
         Case(args, trusted(question.reference, args), i < by_hand) for i, args in enumerate((*question.by_hand, *drawn))

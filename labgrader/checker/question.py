@@ -1,7 +1,7 @@
 """What a question is: a reference, its inputs, and the wrong answers that have a hint of their own."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -35,20 +35,20 @@ class Question:
     """One blank of a lab: a function of arrays to an array, a number, or a tuple of these.
 
     reference: the right answer, short and complete in itself. name: "04_iou.iou", the topic and the function's name,
-    which is the grade id of its cell; by default where the reference stands, questions.t04_iou.iou. inputs:
-    function of a numpy Generator to the arguments of one random case, asymmetric so that swaps show. by_hand: arguments
-    of cases small enough to do by hand; each is always tried. random_cases: how many cases are drawn. rtol, atol: which
-    fractions count as equal; integers and truth values are compared exactly. same_dtype: whether the dtype is asked
-    for, too. points: what the blank is worth. properties: what the check may say about a wrong output that nothing else
-    explains, filled by `holds`; misconceptions, by `wrong`. canonical: maps an output to the one form of those that are
-    equally right (the sign of an axis, say). wide: function of a Generator to the arguments of a case from all that the
-    statement allows, where that is wider than `inputs`: what is said of a wrong answer holds there, too. outputs: names
+    which is the grade id of its cell; by default where the reference stands, questions.t04_iou.iou. inputs: function of
+    a numpy Generator to the arguments of one random case, asymmetric so that swaps show; or several, which take turns,
+    so that each edge is in some case. kinds: what the statement allows for each argument, as the course says it;
+    nothing in labgrader reads it. by_hand: arguments of cases small enough to do by hand; each is always tried.
+    random_cases: how many cases are drawn. rtol, atol: which fractions count as equal; integers and truth values are
+    compared exactly. same_dtype: whether the dtype is asked for, too. points: what the blank is worth. properties: what
+    the check may say about a wrong output that nothing else explains, filled by `holds`; misconceptions, by `wrong`.
+    canonical: maps an output to the one form of those that are equally right (the sign of an axis, say). outputs: names
     of the reference's outputs, where each is worth something without the others, so that an instructor may let it count
     on its own. forbidden: modules that would do the work; they do not exist where answers are graded.
     """
 
     reference: Callable
-    inputs: Callable[[np.random.Generator], tuple]
+    inputs: Callable[[np.random.Generator], tuple] | tuple[Callable[[np.random.Generator], tuple], ...]
     name: str = ""
     by_hand: tuple[tuple, ...] = ()
     random_cases: int = 4
@@ -59,9 +59,9 @@ class Question:
     properties: list[Property] = field(default_factory=list)
     misconceptions: list[Misconception] = field(default_factory=list)
     canonical: Callable = lambda output: output
-    wide: Callable[[np.random.Generator], tuple] | None = None
     outputs: tuple[str, ...] = ()
     forbidden: tuple[str, ...] = ()
+    kinds: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self):
         if not self.name:
@@ -82,6 +82,11 @@ class Question:
     def parameters(self) -> tuple[str, ...]:
         """The names of its arguments."""
         return tuple(inspect.signature(self.reference).parameters)
+
+    def draws(self, rng: np.random.Generator, count: int) -> list[tuple]:
+        """The arguments of so many random cases; where `inputs` are several, they take turns."""
+        inputs = self.inputs if isinstance(self.inputs, tuple) else (self.inputs,)
+        return [inputs[k % len(inputs)](rng) for k in range(count)]
 
     @property
     def source(self) -> str:

@@ -23,7 +23,7 @@ from labgrader.checker.question import PUBLIC_SEED, Question
 from labgrader.checker.repair import Listed, repairs
 
 MOST_REPAIRS = 4  # that are told of
-FRESH = 50  # cases of a kind, beside those that a check shows
+FRESH = 50  # cases beside those that a check shows
 COMPARING = ("name", "rtol", "atol", "same_dtype")  # the fields of a Question by which outputs are compared
 
 Pairs = Sequence[tuple[tuple, object]]  # the arguments of cases, and what is expected
@@ -85,10 +85,9 @@ def comparing_of(question: Question) -> tuple[dict, str]:
 
 
 def fresh_cases(question: Question, seed: int = PUBLIC_SEED) -> list[Case]:
-    """Random cases of another public seed, on which a repair is tried: FRESH of `inputs`, and as many of `wide`."""
+    """Random cases of another public seed, on which a repair is tried."""
     rng = np.random.default_rng(seed + 1)
-    draws = (question.inputs, question.wide) if question.wide else (question.inputs,)
-    drawn = [draw(rng) for draw in draws for _ in range(FRESH)]
+    drawn = question.draws(rng, FRESH)
     return [Case(args, trusted(question.reference, args), by_hand=False) for args in drawn]
 
 

@@ -94,7 +94,7 @@ def test_a_wrong_answer_that_knows_the_public_cases_passes_in_a_draw_of_a_hundre
     """Each secret case is drawn alone: what is right in a share p of them is right in all n by chance p ** n."""
     question, rng, drawn = find(name), np.random.default_rng(1), 400
     table = {pickle.dumps(case.args) for case in public_cases(question)}
-    cases = [(args, trusted(question.reference, args)) for args in (question.inputs(rng) for _ in range(drawn))]
+    cases = [(args, trusted(question.reference, args)) for args in question.draws(rng, drawn)]
     new = [case for case in cases if pickle.dumps(case[0]) not in table]
     n = len(secret_cases(question, "secret", "student"))
     often = {}

@@ -110,7 +110,7 @@ def grade(
     ]
     all_mutants = mutants(question.reference)
     survivors = [m for m in all_mutants if any(passes(question, m.function, of_seed, seconds) for of_seed in cases)]
-    drawn = [question.inputs(rng) for _ in range(count)] if survivors else []
+    drawn = question.draws(rng, count) if survivors else []
     searched = [Case(args, trusted(question.reference, args), False) for args in drawn]
     accepted += [m.name for m in survivors if not passes(question, m.function, [*chain(*cases), *searched], seconds)]
     equivalent = [m.name for m in survivors if m.name not in accepted]
