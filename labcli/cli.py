@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from labcli.commands import new, node
+from labcli.commands.calibrate import calibrate
 from labcli.commands.check import check
 from labcli.commands.compare import compare
 from labcli.commands.demo import demo
@@ -25,6 +26,7 @@ from labcli.commands.grades import grades
 from labcli.commands.perceive import perceive
 from labcli.commands.release import release
 from labcli.commands.renumber import renumber
+from labcli.commands.sheet import sheet
 from labcli.commands.study import study
 from labcli.commands.texts import texts
 from labcli.commands.train import train
@@ -36,7 +38,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (doctor, check, train, evaluate, export, compare, study, demo, perceive):
+for command in (doctor, check, train, evaluate, export, compare, study, demo, perceive, sheet, calibrate):
     app.command()(command)
 for command in (release, renumber, grade, texts, grades, forget, exam):
     app.command()(command)

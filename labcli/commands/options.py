@@ -10,6 +10,10 @@ Refine = Annotated[bool | None, typer.Option("--crf/--no-crf", help="Refine a ne
 Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 Dask = Annotated[str | None, typer.Option(help="Run on the workers of this Dask scheduler, tcp://host:8786.")]
 
+MeasuredMm = Annotated[
+    float, typer.Option(help="How long the sheet's line of 150 mm is as printed, millimetres.", min=30.0, max=750.0)
+]
+
 
 def of_course(folder: Path) -> Path:
     """Take the settings of the course that a command is told, before anything asks for the course."""
