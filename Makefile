@@ -74,14 +74,14 @@ release: .venv/installed
 	$(BIN)/labkit release $(ARGS)
 
 stacks: .venv/installed
-	$(BIN)/python -m pytest -q tests/labkit/stacks/test_programs.py $(ARGS)
+	$(BIN)/python -m pytest -q tests/labcourse/stacks/test_programs.py $(ARGS)
 
 ros2: .venv-ros2/installed
 	.venv-ros2/bin/labkit node ros --sim $(ARGS)
 
 test-ros2: export OMP_NUM_THREADS := 1
 test-ros2: .venv-ros2/installed
-	.venv-ros2/bin/python -m pytest tests/labkit/node/test_ros2.py $(ARGS)
+	.venv-ros2/bin/python -m pytest tests/labros/test_ros2.py $(ARGS)
 
 bench: .venv-bench/installed
 	.venv-bench/bin/python -m bench.run $(ARGS)

@@ -23,10 +23,10 @@ from bench.measure import table
 from labcli.evaluate_folder import TrueThings, judge
 from labkit.frame import RGBDFrame
 from labkit.instance_metrics import pool, score_instances
-from labkit.learning import augment_depth
 from labkit.learning.network import load_model, weights_path, with_things
 from labkit.learning.things import find_things
-from labkit.learning.training import THINGS_RECIPE, train
+from labtrain import augment_depth
+from labtrain.training import THINGS_RECIPE, train
 
 SCENES = {"any": 700, "clutter": 700, "bin": 300, "messy": 700}
 UNSEEN = range(800_000, 800_016)

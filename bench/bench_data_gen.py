@@ -12,7 +12,7 @@ import data_gen
 from bench.measure import table
 from data_gen.dataset import write_frame
 from labkit.sim.client import Client
-from labkit.support.executors import as_they_come, executor_for
+from labtrain.executors import as_they_come, executor_for
 
 SCENES = 40
 FRAMES = 1000  # for the memory

@@ -21,11 +21,11 @@ from bench.measure import table
 from data_gen import generate, load
 from labcli.trials import in_order
 from labkit.labels import CLASSES, TARGET
-from labkit.learning import augment_depth
 from labkit.learning.network import TorchEngine, UNetRGBD, load_model
-from labkit.learning.training import RECIPES, fresh_model, train
 from labkit.metrics import confusion_matrix, iou
-from labkit.support.executors import executor_for
+from labtrain import augment_depth
+from labtrain.executors import executor_for
+from labtrain.training import RECIPES, fresh_model, train
 
 FOLDER = Path("data/bench_depth")
 SCENES = {"train": range(3000), "test": range(900_000, 900_300), "hard": range(900_000, 900_300)}

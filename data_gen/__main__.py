@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from labkit.support.executors import executor_for
+from labtrain.executors import executor_for
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 

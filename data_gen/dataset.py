@@ -26,12 +26,12 @@ from data_gen.scenes import CONFIGS, sample_scene
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import CLASSES
-from labkit.learning.paint import painted
 from labkit.sim.spec import SceneSpec
 from labkit.sim.world import World
-from labkit.support.executors import as_they_come
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
+from labtrain.executors import as_they_come
+from labtrain.paint import painted
 
 VERSION = 1
 DEPTH_UNIT_MM = 0.1  # one step of the 16-bit files: finer than any sensor, and 6.5 m still fit

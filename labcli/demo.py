@@ -16,6 +16,7 @@ from PIL import Image
 
 from labcli import report as pages
 from labcli.evaluation import lift
+from labcourse.views import fingers
 from labkit.frame import RGBDFrame
 from labkit.geometry import centroid_and_covariance
 from labkit.grasp import Grasp, Gripper
@@ -25,7 +26,6 @@ from labkit.pipeline import Perception, Pipeline, timed
 from labkit.sim.panda import LiftResult
 from labkit.sim.spec import Camera, SceneSpec
 from labkit.sim.world import TIME_STEP, World
-from labkit.views import fingers
 
 FILM_SIZE = (640, 400)
 COMPILING = "compiling, once on this machine: about twenty seconds"

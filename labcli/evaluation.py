@@ -219,7 +219,7 @@ def run_trials(
     progress: bool = True,
     dask: str | None = None,
 ) -> list[Trial]:
-    """Run a trial of each scene, in the order of `specs`, where `labkit.support.executors.executor_for` says.
+    """Run a trial of each scene, in the order of `specs`, where `labtrain.executors.executor_for` says.
 
     The other options are those of `run_trial`. Away from this process give `model` as the path of its weights: each
     worker loads them once.

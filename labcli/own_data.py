@@ -14,8 +14,8 @@ from labcli.perceive import on_table, read_frame, taken_for_target
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import back_project_to_base
 from labkit.labels import BACKGROUND, CLASSES, IGNORE, SURFACE, TARGET
-from labkit.learning import ranks
 from labkit.notices import notices
+from labtrain import ranks
 
 FLAT = 0.010  # metres: what is nearer to the table's plane is table
 

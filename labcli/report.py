@@ -12,12 +12,12 @@ from jaxtyping import UInt8
 from matplotlib.colors import to_hex
 
 from labcli.perceive import Seen, describe, grasps_json
+from labcourse.views import View, fingers
 from labkit.frame import RGBDFrame
 from labkit.geometry import invert_transform, project, transform_points
 from labkit.grasp import Gripper
 from labkit.labels import PALETTE, SURFACE, TARGET, overlay
 from labkit.support.files import write_atomically
-from labkit.views import View, fingers
 
 TABLE_MARGIN, ROOM = 0.02, 0.5  # metres under the table that noise may reach, and over it that matter for a grasp
 MOST_POINTS = 9000  # of the report's view: more make the page heavy, and the eye sees no difference

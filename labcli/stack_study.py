@@ -13,13 +13,13 @@ from jaxtyping import UInt8
 
 from labcli.evaluation import lift_anew
 from labcli.trials import SIZE, Study
+from labcourse.stacks import regions
+from labcourse.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
 from labkit.frame import RGBDFrame
 from labkit.labels import CLASSES, SURFACE, TARGET
 from labkit.learning.engines import open_engine, segment_like_cpp
 from labkit.metrics import confusion_matrix, wilson_interval
 from labkit.pipeline import Pipeline, segment_rgb_image
-from labkit.stacks import regions
-from labkit.stacks.threshold import HSVRange, fit_hsv, hsv_mask, things_on_table
 
 TRAINING_SEEDS = range(630_000, 630_024)  # what the classical methods are fitted to, and the small FCN is trained on
 STEPS = 1000  # of the small FCN's training
@@ -78,7 +78,7 @@ def methods(frames: Sequence[RGBDFrame], unet) -> dict[str, Method]:
     Only "HSV, this table" reads the true labels of the frame that it is to label: nearly the best that a range of
     colours could do.
     """
-    from labkit.stacks.small_fcn import train_small_fcn
+    from labcourse.stacks.small_fcn import train_small_fcn
 
     images, labels = [frame.rgb for frame in frames], [frame.labels for frame in frames]
     anywhere = fit_hsv(images, [y == SURFACE for y in labels])

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from tqdm.auto import tqdm
 
-from labkit.support.executors import executor_for
 from labkit.support.files import write_atomically
+from labtrain.executors import executor_for
 
 SIZE = (320, 240)  # of the pictures that studies look at
 

@@ -11,8 +11,8 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from labkit.metrics import paired_difference
-from labkit.support.executors import executor_for
 from labkit.support.files import write_atomically
+from labtrain.executors import executor_for
 
 
 class Attempts:

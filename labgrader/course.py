@@ -191,4 +191,4 @@ def files_of(package: str, pattern: str = "*.py") -> Iterator[tuple[str, Path]]:
     folders = [Path(place) for place in (spec.submodule_search_locations if spec else None) or ()]
     for folder in folders:
         for path in sorted(folder.rglob(pattern)):
-            yield f"{package}/{path.relative_to(folder).as_posix()}", path
+            yield f"{package.replace('.', '/')}/{path.relative_to(folder).as_posix()}", path

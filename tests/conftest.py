@@ -23,7 +23,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 sys.modules.setdefault("rfc3987_syntax", None)  # as `labcli.cli.main` does: a second of each process
-PACKAGES = ("labkit", "labgrader", "labcourse", "labcli", "data_gen")
+PACKAGES = ("labkit", "labtrain", "labros", "labgrader", "labcourse", "labcli", "data_gen")
 
 
 def annotated_modules() -> list[str]:
@@ -84,7 +84,7 @@ NOT_EVERYWHERE = {
     "tests/labgrader/grading/": ("linux", "`labkit grade` needs Linux"),
     "tests/test_repository.py": ("linux", "needs GNU make 4 and bash"),
     "tests/data_gen/test_data_gen.py::test_the_command_says_a_full_disk": ("linux darwin", "needs a limit on files"),
-    "tests/labkit/test_scale.py": ("linux darwin", "Windows has no signal that kills"),
+    "tests/labtrain/test_scale.py": ("linux darwin", "Windows has no signal that kills"),
     "tests/labcli/test_cli.py::test_ctrl_c": ("linux darwin", "Windows sends no Ctrl-C to one process"),
 }
 

@@ -190,7 +190,7 @@ def define(function: Callable, name: str, cell: str, done: dict[int, tuple[str, 
     return name
 
 
-OURS = ("labkit", "labcourse", "alternatives")  # packages whose functions are written out
+OURS = ("labkit", "labtrain", "labros", "labcourse", "alternatives")  # packages whose functions are written out
 
 
 class Renamed(ast.NodeTransformer):

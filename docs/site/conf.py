@@ -23,6 +23,9 @@ from pathlib import Path
 import plotly
 
 import labkit
+import labros
+import labtrain
+from labcourse import stacks, views
 from labgrader import course
 from labgrader.publishing import unpublished
 from labkit import losses  # noqa: F401  torch first: its threads must not meet those of other libraries half loaded
@@ -120,10 +123,15 @@ def written(folder: str, end: str) -> list[str]:
 
 
 def modules() -> list[str]:
-    """Every module of labkit that says what it is and that a reader of the reference may want."""
-    found = [info.name for info in pkgutil.walk_packages(labkit.__path__, "labkit.")]
-    hidden = re.compile(r"_kernels$|labkit\.course\.(checker|topics|grading|explorers|jupyter)\b|\.ros2_types$|\._")
-    return ["data_gen", *(name for name in sorted(found) if not hidden.search(name))]
+    """Every module that says what it is and that a reader of the reference may want."""
+    rooms = [labkit, labtrain, labros, stacks, views]
+    found = [room.__name__ for room in rooms if room is not labkit]
+    found += [
+        info.name
+        for room in rooms
+        for info in pkgutil.walk_packages(getattr(room, "__path__", []), f"{room.__name__}.")
+    ]
+    return ["data_gen", *(name for name in sorted(found) if not re.search(r"_kernels$|\.ros2_types$|\._", name))]
 
 
 def lesson_of(number: str) -> str | None:

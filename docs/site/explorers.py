@@ -23,7 +23,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("labkit", "labcourse", "data_gen")  # what draws an explorer's picture
+ROOMS = ("labkit", "labtrain", "labcourse", "data_gen")  # what draws an explorer's picture
 OUT = ROOT / "out" / "explorers"
 LIMIT = 60  # states per explorer
 DOTS = 120  # per inch of a picture; a page shows it with 80

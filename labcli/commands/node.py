@@ -183,7 +183,7 @@ def bag(
     ] = False,
 ) -> None:
     """Answer the frames of a bag of ROS 1 or ROS 2, and write another; exit status 1 if no frame was answered."""
-    from labkit.node.bags import process
+    from labros.bags import process
 
     options = settings.node()
     counts = process(source, out, settings.pipeline(), probabilities=probabilities, storage=storage, **options)
@@ -208,7 +208,7 @@ def ros(
     seed: Seed = 0,
 ) -> None:
     """Run the node on ROS 2, or ROS 1, until SIGINT."""
-    from labkit.node.ros import require, run
+    from labros.ros import require, run
 
     if (lifecycle or settings.on_demand) and ros1:
         raise ValueError("node: expected --lifecycle and --on-demand without --ros1, for they are ROS 2's")

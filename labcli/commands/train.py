@@ -40,8 +40,8 @@ def train(
 
     import data_gen
     from labcli.own_data import PictureFolder
-    from labkit.learning import ranks, training
     from labkit.learning.network import architecture_of, load_model, weights_path, with_things
+    from labtrain import ranks, training
 
     network = None if init is None else load_model(weights_path(init))
     model = model or ("unet" if network is None else architecture_of(network))

@@ -7,7 +7,7 @@ from labcourse.questions.t09_other_stacks.choose_region import choose_region
 from labcourse.questions.t09_other_stacks.hsv_mask import hsv_mask
 from labcourse.questions.t09_other_stacks.make_blob import make_blob
 from labcourse.questions.t09_other_stacks.measure_pieces import measure_pieces
-from labkit.stacks.regions import components
+from labcourse.stacks.regions import components
 
 
 @question(points=3, minutes=4)

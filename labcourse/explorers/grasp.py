@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from labcourse.explorers.explorer import Explorer
+from labcourse.views import fingers
 from labkit.geometry import backproject_to_base
 from labkit.grasp import Grasp, Gripper
 from labkit.labels import PALETTE, TARGET
 from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
-from labkit.views import fingers
 
 ORANGE = tuple((PALETTE[TARGET] / 255).tolist())
 AIR = 0.02  # metres between the pads beyond what stands there, both sides together

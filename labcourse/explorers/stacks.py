@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from labcourse.explorers.explorer import Explorer, show
+from labcourse.stacks.threshold import HSVRange, hsv_mask
 from labkit.labels import CLASSES, PALETTE, overlay
 from labkit.metrics import confusion_matrix, iou
-from labkit.stacks.threshold import HSVRange, hsv_mask
 
 
 def wipe(

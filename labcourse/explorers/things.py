@@ -8,12 +8,12 @@ from matplotlib.patches import Polygon
 
 from labcourse.explorers.explorer import Explorer, show
 from labcourse.plots import numbered
+from labcourse.views import fingers
 from labkit.frame import RGBDFrame
 from labkit.geometry import invert_transform, project, transform_points
 from labkit.labels import overlay
 from labkit.learning.things import CELL, group, histogram, peaks_of, vote_targets
 from labkit.pipeline import Pipeline
-from labkit.views import fingers
 
 SIDES, ERRORS = (10, 50), (0.0, 20.0)  # pixels: of a square, and the standard deviation of a vote's error
 

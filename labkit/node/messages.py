@@ -1,7 +1,7 @@
 """What travels between nodes: plain dataclasses with the fields of ROS's messages of the same names.
 
 A stamp is a whole number of nanoseconds, because a float cannot hold today's time to the nanosecond. Nothing here knows
-ROS: `labkit.node.ros` and `labkit.node.bags` translate at their edges.
+ROS: `labros.ros` and `labros.bags` translate at their edges.
 """
 
 from dataclasses import dataclass, field

@@ -11,9 +11,9 @@ import data_gen
 from labcli.commands.node import RosSettings, Settings, warm_up
 from labkit.grasp import GraspPlan
 from labkit.node.actors import Camera
-from labkit.node.bags import BagWriter
 from labkit.node.messages import DEFAULT_TOPICS, Image
 from labkit.pipeline import Pipeline
+from labros.bags import BagWriter
 
 
 def test_sim_goes_from_camera_topic_to_lift_in_one_line():

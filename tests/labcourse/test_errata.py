@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 
+from labcourse.stacks.small_fcn import SmallFCN
 from labkit.crf import PottsCRF, solve
 from labkit.geometry import back_projection_jacobian, backproject_to_base
 from labkit.labels import TARGET
@@ -19,7 +20,6 @@ from labkit.learning.network import SmallSegNet, load_model
 from labkit.losses import segmentation_loss, softmax, weighted_optimum
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.pipeline import segment_rgb_image
-from labkit.stacks.small_fcn import SmallFCN
 
 PAGE = (Path(__file__).parents[2] / "lessons" / "errata.md").read_text()
 

@@ -128,7 +128,7 @@ def test_it_is_released_checked_and_graded_without_the_course_that_came_with_the
     assert points == {"copied": [0, 2], "right": [2, 2], "wrong": [0, 0]}
     assert says["wrong"] == [TOTAL["hint"], RUNNING["hint"]]
     assert says["copied"][0] == "an answer does not use sums; take what you need from the arguments"
-    assert not {"labkit", "labcourse", "labcli", "data_gen"} & set(packages)
+    assert not {"labkit", "labtrain", "labros", "labcourse", "labcli", "data_gen"} & set(packages)
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from labcourse.stacks import regions, threshold
 from labkit import crf, geometry, instance_metrics, labels, losses, metrics
 from labkit.crf.exact import grid_max_flow
 from labkit.crf.mean_field import mean_field_marginals
-from labkit.stacks import regions, threshold
 
 pytestmark = [pytest.mark.nightly, pytest.mark.bad_input]
 

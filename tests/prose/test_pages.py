@@ -66,7 +66,9 @@ def resolve(dotted: str) -> None:
 @each([*LESSONS, *SOLUTIONS, *LABS])
 def test_every_symbol_that_prose_names_exists(path):
     """Those that code names exist: nbval runs it."""
-    for name in sorted(set(re.findall(r"`((?:labkit|labgrader|labcourse|labcli|data_gen)(?:\.\w+)+)", prose(path)))):
+    for name in sorted(
+        set(re.findall(r"`((?:labkit|labtrain|labros|labgrader|labcourse|labcli|data_gen)(?:\.\w+)+)", prose(path)))
+    ):
         resolve(name)
 
 

@@ -5,10 +5,10 @@ import pytest
 from scenes import random_frame
 
 from labcourse.explorers import stacks
+from labcourse.stacks.threshold import HSVRange, hsv_mask
 from labgrader.course import find
 from labkit.labels import overlay
 from labkit.learning.engines import labels_of_scores
-from labkit.stacks.threshold import HSVRange, hsv_mask
 
 
 @pytest.fixture

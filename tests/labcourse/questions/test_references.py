@@ -12,6 +12,7 @@ import pytest
 from notebooks import ROOT, notebook
 
 from labcourse.questions.t07_grasp import cloud
+from labcourse.stacks import regions
 from labgrader.checker.judge import judge
 from labgrader.course import find
 from labkit import geometry, grasp, labels, losses, metrics
@@ -19,7 +20,6 @@ from labkit.crf import PottsCRF
 from labkit.grasp.planner import HAND_MARGIN, TIP_CLEARANCE
 from labkit.node import convert
 from labkit.node.messages import Header, Image
-from labkit.stacks import regions
 
 
 def pair_weights(image, *settings):

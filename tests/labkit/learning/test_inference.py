@@ -14,9 +14,9 @@ from labkit.learning.channels import CHANNELS, geometry_channels
 from labkit.learning.engines import ENGINES, open_engine
 from labkit.learning.inference import NetworkInput
 from labkit.learning.network import SmallSegNet, TorchEngine, UNet, UNetRGBD, evaluating
-from labkit.learning.training import ImagesInMemory, evaluate
 from labkit.learning.view import PIXEL, canonical_view
 from labkit.pipeline import Pipeline
+from labtrain.training import ImagesInMemory, evaluate
 
 
 def tensor(rgb: np.ndarray, mean=0.0, std=255.0) -> torch.Tensor:

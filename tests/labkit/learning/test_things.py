@@ -13,15 +13,15 @@ import data_gen
 from labkit.frame import RGBDFrame
 from labkit.instance_metrics import score_instances
 from labkit.labels import IGNORE
-from labkit.learning.augment_depth import bent, exposed, without_depth
 from labkit.learning.engines import open_engine
-from labkit.learning.images import ImagesInMemory
 from labkit.learning.inference import THINGS, VOTE_UNIT, Engine, NetworkInput
 from labkit.learning.network import TorchEngine, UNetRGBD, load_model, save_model, weights_path, with_things
-from labkit.learning.paint import painted
 from labkit.learning.things import CELL, LEAST, SPREAD, find_things, group, histogram, look, things_loss, vote_targets
-from labkit.learning.training import THINGS_RECIPE, Trainer, train
 from labkit.learning.view import canonical_view
+from labtrain.augment_depth import bent, exposed, without_depth
+from labtrain.images import ImagesInMemory
+from labtrain.paint import painted
+from labtrain.training import THINGS_RECIPE, Trainer, train
 
 
 @pytest.fixture(scope="module")
@@ -282,7 +282,7 @@ def test_batches_made_ahead_by_other_processes_are_the_same():
         import torch, data_gen
         from dataclasses import replace
         from labkit.learning.network import UNetRGBD
-        from labkit.learning.training import THINGS_RECIPE, ImagesInMemory, Trainer
+        from labtrain.training import THINGS_RECIPE, ImagesInMemory, Trainer
         frames = [data_gen.render(data_gen.sample_scene(4, "clutter"), (80, 60))] * 4
         data = ImagesInMemory(frames, depth=True, instances=True, progress=False)
         config = replace(THINGS_RECIPE, steps=3, batch=2, crop=(32, 48))

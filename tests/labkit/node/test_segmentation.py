@@ -18,9 +18,9 @@ from labkit.node.bus import Bus
 from labkit.node.messages import CompressedImage, Detections, Header, Image, Point, Topics
 from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import SegmentationNode
-from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
+from labros.wire import TYPES, Wire
 
 TOPICS = Topics()
 SCENE = dataclasses.replace(scene(box("block", 0.5, 0.05)), seed=5)

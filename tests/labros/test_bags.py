@@ -12,10 +12,10 @@ import data_gen
 from labkit.labels import SURFACE, one_hot
 from labkit.node import convert
 from labkit.node.actors import Camera
-from labkit.node.bags import BagWriter, process
 from labkit.node.messages import CameraInfo, Header, Image, Pose, Topics, Transform, Transforms
-from labkit.node.wire import Wire
 from labkit.pipeline import Pipeline
+from labros.bags import BagWriter, process
+from labros.wire import Wire
 
 TOPICS = Topics()
 NAMES = ["in.bag", "in_ros2"]

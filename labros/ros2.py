@@ -13,11 +13,11 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from labkit.node import ros2_types
 from labkit.node.bus import Transport
 from labkit.node.messages import Message, Point, Transforms
-from labkit.node.wire import TYPES, Wire
 from labkit.support.validation import require
+from labros import ros2_types
+from labros.wire import TYPES, Wire
 
 logger = logging.getLogger(__name__)
 STATIC = "tf_static"  # the last part of the topic whose messages a late listener must get, too
@@ -268,7 +268,7 @@ class Ros2Transport(Transport):
 class Managed:
     """The segmentation node as a lifecycle node: whoever configures it has it built, and it answers while it is active.
 
-    transport: a Ros2Transport made with lifecycle=True. build: as in `labkit.node.ros.run`; what it raises is logged,
+    transport: a Ros2Transport made with lifecycle=True. build: as in `labros.ros.run`; what it raises is logged,
     and the node stays unconfigured. Cleaning up takes everything back that configuring made.
     """
 

@@ -13,8 +13,12 @@ from torch import nn
 
 import data_gen
 from labkit.frame import RGBDFrame
-from labkit.learning import ranks
-from labkit.learning.augment import (
+from labkit.learning.engines import open_engine
+from labkit.learning.inference import NetworkInput
+from labkit.learning.network import SmallSegNet, load_model
+from labkit.losses import class_weights, segmentation_loss
+from labtrain import ranks
+from labtrain.augment import (
     Draws,
     augment,
     random_colour,
@@ -23,11 +27,8 @@ from labkit.learning.augment import (
     random_noise,
     random_sharpness,
 )
-from labkit.learning.engines import open_engine
-from labkit.learning.images import table_height
-from labkit.learning.inference import NetworkInput
-from labkit.learning.network import SmallSegNet, load_model
-from labkit.learning.training import (
+from labtrain.images import table_height
+from labtrain.training import (
     ImagesInMemory,
     TrainConfig,
     Trainer,
@@ -37,7 +38,6 @@ from labkit.learning.training import (
     train,
     undo_weights,
 )
-from labkit.losses import class_weights, segmentation_loss
 
 CONFIG = TrainConfig(model="smallsegnet", epochs=3, batch=2, lr=3e-3, crop=(12, 16))
 

@@ -19,9 +19,9 @@ from labkit.node.diagnostics import Counts
 from labkit.node.messages import DEFAULT_TOPICS, Message, Topics, Transforms
 from labkit.node.segmentation import SegmentationNode
 from labkit.node.transforms import TransformTree
-from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline
 from labkit.support.validation import require
+from labros.wire import TYPES, Wire
 
 STORAGES = {"mcap": rosbag2.StoragePlugin.MCAP, "sqlite3": rosbag2.StoragePlugin.SQLITE3}
 FOREVER = QosTime(0, 0)

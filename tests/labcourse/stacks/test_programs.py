@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from data_gen import render, sample_scene
+from labcourse.stacks.matlab import montage, semanticseg
+from labcourse.stacks.threshold import fit_hsv, hsv_mask
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import backproject_to_base
 from labkit.labels import SURFACE, TARGET
 from labkit.learning.engines import export, open_engine, segment_like_cpp
 from labkit.learning.network import load_model, weights_path
-from labkit.stacks.matlab import montage, semanticseg
-from labkit.stacks.threshold import fit_hsv, hsv_mask
 
 HERE = Path(__file__).parent
 BLOB = (320, 240)  # the C++ listing squeezes any image to this

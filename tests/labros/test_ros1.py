@@ -19,11 +19,11 @@ from peers import MESSAGES, MS, PATIENCE, Peer, process, small, variables, wait_
 
 import data_gen
 from labkit.labels import CLASSES
-from labkit.node import ros1
 from labkit.node.actors import Arm
 from labkit.node.messages import ROS_TOPICS, Header, Image
-from labkit.node.wire import TYPES, Wire
 from labkit.sim.world import World
+from labros import ros1
+from labros.wire import TYPES, Wire
 
 pytestmark = pytest.mark.debian("python3-rospy", "python3-rosmaster")
 NODE = ("-m", "labcli.cli", "node", "ros", "--ros1", "--model", "smallsegnet", "--no-crf")
@@ -41,7 +41,7 @@ import sys, time
 import numpy as np
 from labkit.frame import RGBDFrame
 from labkit.node.actors import Camera
-from labkit.node.ros1 import Ros1Transport
+from labros.ros1 import Ros1Transport
 name, first, last = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 frame = RGBDFrame(np.zeros((24, 32, 3), np.uint8), np.ones((24, 32), np.float32), np.diag([30.0, 30.0, 1.0]), np.eye(4))
 with Ros1Transport(name) as transport:
@@ -205,7 +205,7 @@ def test_from_camera_topic_to_lift_over_ros(tester, new_master):
     """Topic 08's diagram over a real master: camera and arm here, the text's run_ros_node in another process."""
     spec = data_gen.sample_scene(0, "test")
     code = (
-        "from labkit.learning.network import weights_path; from labkit.node.ros import run_ros_node\n"
+        "from labkit.learning.network import weights_path; from labros.ros import run_ros_node\n"
         f"run_ros_node(weights_path('unet'), 4, 2, table_z={spec.table.z}, version=1)"
     )
     with World(spec) as world:

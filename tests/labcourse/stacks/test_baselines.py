@@ -9,13 +9,13 @@ from scipy import ndimage
 from sklearn.cluster import KMeans
 
 import data_gen
+from labcourse.stacks import regions
+from labcourse.stacks.matlab import montage, semanticseg
+from labcourse.stacks.small_fcn import SmallFCN, train_small_fcn
+from labcourse.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, things_on_table
 from labkit.labels import OBSTACLE, SURFACE, TARGET
 from labkit.learning.engines import open_engine, shipped
 from labkit.pipeline import Pipeline
-from labkit.stacks import regions
-from labkit.stacks.matlab import montage, semanticseg
-from labkit.stacks.small_fcn import SmallFCN, train_small_fcn
-from labkit.stacks.threshold import BROWN, HSVRange, fit_hsv, hsv_mask, things_on_table
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from labcourse.views import PLOTLY, View
 from labkit.grasp import Grasp, Gripper
-from labkit.views import PLOTLY, View
 
 
 def test_jaws_stand_as_far_apart_as_the_grasp_says_and_reach_from_palm_to_tips():

@@ -16,10 +16,10 @@ from scipy.spatial.transform import Rotation
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import IGNORE, OBSTACLE, TARGET
-from labkit.learning.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
 from labkit.learning.channels import geometry_channels, mirrored
-from labkit.learning.paint import BANDS, painted
 from labkit.learning.view import resized, rolled_camera
+from labtrain.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
+from labtrain.paint import BANDS, painted
 
 SIZES = 0.8, 1.7  # of a world, to that which was rendered, where things shall be told apart
 
@@ -210,7 +210,7 @@ def augment_frames(
 
     One frame in four keeps its depth and calibration: a simulated camera is exact in both. Instances are 255 wherever
     nobody knows them.
-    first, whole: as for `labkit.learning.augment.augment`.
+    first, whole: as for `labtrain.augment.augment`.
     """
     seed = int(torch.randint(2**62, (), generator=generator))
     rgb, geometry, y, instances = [], [], [], []

@@ -3,7 +3,7 @@
 A run is a function of its configuration and its data. Step s of it draws its randomness from (seed, s) and the order of
 epoch e from (seed, e), so that nothing has to be replayed: weights, optimiser and the number of steps done are all
 that a checkpoint holds, and a resumed run ends where an undisturbed one does. Processes that torchrun started share
-each step's batch (`labkit.learning.ranks`), and go through the same losses as one process.
+each step's batch (`labtrain.ranks`), and go through the same losses as one process.
 """
 
 import copy
@@ -26,16 +26,16 @@ from torch.utils.data import DataLoader
 from tqdm.auto import tqdm
 
 from labkit.labels import CLASSES, IGNORE
-from labkit.learning import ranks
-from labkit.learning.augment import augment
-from labkit.learning.augment_depth import augment_frames, varied_things
-from labkit.learning.images import ImagesInMemory
 from labkit.learning.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
 from labkit.learning.things import things_loss
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
 from labkit.support.files import write_atomically
 from labkit.support.validation import require
+from labtrain import ranks
+from labtrain.augment import augment
+from labtrain.augment_depth import augment_frames, varied_things
+from labtrain.images import ImagesInMemory
 
 
 @dataclass(frozen=True)

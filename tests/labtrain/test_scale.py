@@ -13,7 +13,7 @@ import pytest
 import data_gen
 from labcli import mask_study
 from labcli.evaluation import run_trials
-from labkit.support.executors import executor_for
+from labtrain.executors import executor_for
 
 pytest.importorskip("distributed")
 ROOT = Path(__file__).parents[2]
@@ -110,7 +110,9 @@ def test_scores_and_tables_are_those_of_one_process(one_worker, tmp_path):
 def test_a_worker_with_another_kit_is_refused_in_a_line(cluster, tmp_path):
     """Another version: the same package with one more line."""
     client, worker = cluster
-    subprocess.run(["cp", "-r", str(ROOT / "labkit"), str(ROOT / "data_gen"), str(tmp_path)], check=True)
+    subprocess.run(
+        ["cp", "-r", *(str(ROOT / room) for room in ("labkit", "labtrain", "data_gen")), str(tmp_path)], check=True
+    )
     with (tmp_path / "labkit" / "losses.py").open("a") as file:
         file.write("# newer\n")
     before = len(client.scheduler_info()["workers"])
@@ -137,7 +139,7 @@ def test_no_scheduler_is_said(monkeypatch):
 PROGRAM = """
 import os
 import numpy, threadpoolctl
-from labkit.support.executors import executor_for
+from labtrain.executors import executor_for
 if __name__ == "__main__":
     before = dict(os.environ)
     with executor_for(2) as executor:

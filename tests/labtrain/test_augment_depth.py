@@ -6,7 +6,9 @@ import torch
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base
-from labkit.learning.augment_depth import (
+from labkit.learning.channels import CHANNELS
+from labkit.sim.spec import Camera
+from labtrain.augment_depth import (
     augment_frames,
     correlated_noise,
     flying_pixels,
@@ -16,8 +18,6 @@ from labkit.learning.augment_depth import (
     random_view,
     stereo_shadow,
 )
-from labkit.learning.channels import CHANNELS
-from labkit.sim.spec import Camera
 
 SIZE = (96, 128)
 K = np.array([[260.0, 0.0, 80.0], [0.0, 260.0, 59.0], [0.0, 0.0, 1.0]])

@@ -21,14 +21,14 @@ from ruamel.yaml import YAML
 import data_gen
 from labkit.labels import CLASSES, SURFACE, one_hot
 from labkit.learning.network import load_model, weights_path
-from labkit.node import ros2, ros2_types
 from labkit.node.actors import Arm
 from labkit.node.convert import decode_image, encode_pose
 from labkit.node.messages import ROS_TOPICS, CameraInfo, CompressedImage, Header, Image, Transform, Transforms
 from labkit.node.segmentation import SegmentationNode
-from labkit.node.wire import TYPES, Wire
 from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.sim.world import World
+from labros import ros2, ros2_types
+from labros.wire import TYPES, Wire
 
 if importlib.util.find_spec("rclpy") is None:
     pytest.skip("needs ROS 2: make test-ros2, or a sourced ROS 2", allow_module_level=True)
@@ -460,13 +460,13 @@ def test_from_camera_topic_to_lift_over_ros(peer):
     """Topic 08's diagram: camera, node (the text's run_ros_node) and this listener and arm, three processes."""
     spec = data_gen.sample_scene(0, "test")
     node = (
-        "from labkit.learning.network import weights_path; from labkit.node.ros import run_ros_node\n"
+        "from labkit.learning.network import weights_path; from labros.ros import run_ros_node\n"
         f"run_ros_node(weights_path('unet'), 4, 2, table_z={spec.table.z})"
     )
     camera = (
         "import threading, itertools, data_gen\n"
         "from labkit.node.actors import Camera; from labkit.node.messages import ROS_TOPICS\n"
-        "from labkit.node.ros2 import Ros2Transport\n"
+        "from labros.ros2 import Ros2Transport\n"
         "frame = data_gen.render(data_gen.sample_scene(0, 'test'), (320, 240))\n"
         "with Ros2Transport('camera') as transport:\n"
         "    Camera(transport, topics=ROS_TOPICS).run(itertools.repeat(frame), 2.0)\n"
@@ -504,7 +504,7 @@ def test_forty_lines_of_a_real_node(peer, frame):
 
 def test_the_launch_file_starts_the_node(peer, frame):
     """Its command with its defaults, as `ros2 launch` would put it together; and with the simulated camera."""
-    file = ElementTree.parse(ROOT / "labkit/node/share/segmentation.launch.xml").getroot()
+    file = ElementTree.parse(ROOT / "labros/share/segmentation.launch.xml").getroot()
     given = {argument.get("name"): argument.get("default") for argument in file.iter("arg")}
     given |= {"model": "smallsegnet", "qos_inputs": "reliable", "namespace": "robot", "options": "--sim"}
     asked = file.find("executable").get("cmd")
@@ -522,7 +522,7 @@ def test_the_launch_file_starts_the_node(peer, frame):
 
 def test_rviz_is_told_topics_that_there_are():
     """Its displays listen with a quality of service that the node, with its defaults, satisfies."""
-    view = YAML(typ="safe").load(ROOT / "labkit/node/share/segmentation.rviz")["Visualization Manager"]
+    view = YAML(typ="safe").load(ROOT / "labros/share/segmentation.rviz")["Visualization Manager"]
     shown = [display["Topic"] for display in view["Displays"] if "Topic" in display]
     assert view["Global Options"]["Fixed Frame"] == "base_link"
     assert {topic["Value"] for topic in shown} <= {f"/{topic}" for topic in vars(ROS_TOPICS).values()}

@@ -3,9 +3,9 @@
 import pytest
 
 from labkit.learning.network import ARCHITECTURES, save_model, weights_path
-from labkit.node import ros
 from labkit.node.bus import Bus
 from labkit.node.messages import ROS_TOPICS
+from labros import ros
 
 
 @pytest.fixture

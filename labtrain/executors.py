@@ -11,6 +11,7 @@ from itertools import starmap
 from pathlib import Path
 
 import labkit
+import labtrain
 
 # Workers share the cores among themselves: NumPy and PyTorch read these when they are loaded. A second thread of
 # OpenBLAS gains nothing with small matrices, but keeps a core busy while it waits for more.
@@ -93,7 +94,7 @@ def one_thread() -> None:
 
 def kit_version() -> str:
     """Name this installation of the kit: its version, and a digest of its code."""
-    files = sorted(Path(labkit.__file__).parent.rglob("*.py"))
+    files = [path for kit in (labkit, labtrain) for path in sorted(Path(kit.__file__).parent.rglob("*.py"))]
     return f"{labkit.__version__}, code {sha256(b''.join(path.read_bytes() for path in files)).hexdigest()[:8]}"
 
 

@@ -6,12 +6,12 @@ import threading
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from labkit.node import ros1, ros2
 from labkit.node.bus import Transport
 from labkit.node.diagnostics import Counts
 from labkit.node.messages import ROS_TOPICS
 from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline
+from labros import ros1, ros2
 
 logger = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ def run(
 
     build: function of the transport, and of an event that is set at the end, to the node. version: of ROS, 1 or 2.
     arguments: ROS's own, such as those behind --ros-args. Returns what became of the frames, or None if a signal came
-    before ROS did. lifecycle: of ROS 2, as `labkit.node.ros2.Managed` says.
+    before ROS did. lifecycle: of ROS 2, as `labros.ros2.Managed` says.
     """
     edge = ros1.Ros1Transport if version == 1 else ros2.Ros2Transport
     with stopped_by_signals() as stop:

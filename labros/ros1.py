@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 from labkit.node.bus import Transport
 from labkit.node.messages import Message
-from labkit.node.wire import TYPES, Wire
+from labros.wire import TYPES, Wire
 
 logger = logging.getLogger(__name__)
 DIST_PACKAGES = "/usr/lib/python3/dist-packages"

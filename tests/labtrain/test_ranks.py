@@ -12,12 +12,12 @@ import pytest
 import torch
 
 import data_gen
-from labkit.learning import training
-from labkit.learning.augment import augment
 from labkit.losses import segmentation_loss
-from tests.labkit.learning.test_training import CONFIG, batch, focal, frames, scenes
+from labtrain import training
+from labtrain.augment import augment
+from tests.labtrain.test_training import CONFIG, batch, focal, frames, scenes
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 # As each rank has: sums of two threads are rounded otherwise, and Adam's first steps magnify that.
 pytestmark = pytest.mark.usefixtures("one_thread")
 # Loopback by its number: on some machines the own name leads nowhere, and ranks would wait for it.

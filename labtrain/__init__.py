@@ -1,0 +1,1 @@
+"""Training at scale: what makes weights for `labkit`, on one machine or several (topics 03 and 05)."""
