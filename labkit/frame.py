@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
 from labkit.labels import IGNORE
+from labkit.support.images import image_size
 from labkit.support.validation import (
     check_depth,
     check_height,
@@ -99,17 +100,43 @@ class RGBDFrame:
 def read_image(name: str, path, dtype, colour: bool = False) -> np.ndarray:
     """Read an image file as RGB (H, W, 3) if `colour`, else as one channel (H, W), without any conversion of values.
 
-    `name` is the argument that the errors speak of. dtype: the file's, or a tuple of those that will do. Raises
-    FileNotFoundError, or ValueError if the file is damaged or holds another kind of image.
+    `name` is the argument that the errors speak of. dtype: the file's, or a tuple of those that will do. Colours of 16
+    bits are brought to 8 if they fill them. What a phone notes of how it was held turns nothing: depth would not turn
+    with it. Raises FileNotFoundError, or ValueError if the file is damaged, holds another kind of image, or claims
+    more pixels than any camera has.
     """
-    data = np.frombuffer(Path(path).read_bytes(), np.uint8)
-    how = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH if colour else cv2.IMREAD_UNCHANGED  # else it squeezes 16 bits into 8
-    image = cv2.imdecode(data, how) if data.size else None
-    if image is None:
-        raise ValueError(f"{name}: {path} is not an image that can be read (damaged or truncated?)")
-    channels, hint = (3, "; are colour and depth swapped?") if colour else (1, "")
+    image = decode_image_file(name, Path(path).read_bytes(), path, colour)
     dtypes = dtype if isinstance(dtype, tuple) else (dtype,)
+    if colour and image.ndim == 3 and image.dtype == np.uint16 and np.uint8 in dtypes:
+        image = _of_8_bits(name, image, path)
+    channels, hint = (3, "; are colour and depth swapped?") if colour else (1, "")
     expected = f"{' or '.join(np.dtype(kind).name for kind in dtypes)} with {channels} channel(s) in {path}"
     fits = image.dtype in dtypes and (colour or image.ndim == 2)
     require(name, fits, expected, f"{image.dtype} with shape {image.shape}{hint}")
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if colour else image
+    if not colour:
+        return image
+    return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB if image.ndim == 2 else cv2.COLOR_BGR2RGB)
+
+
+def decode_image_file(name: str, data: bytes, path, colour: bool = False) -> np.ndarray:
+    """Decode an image file's bytes as they are: (H, W), or in OpenCV's order BGR; `colour` leaves transparency out.
+
+    The header is read first, so that nothing large is made of a small file. Raises ValueError as `read_image`.
+    """
+    image_size(name, data, str(path))
+    how = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION if colour else cv2.IMREAD_UNCHANGED
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), how)
+    except cv2.error:
+        image = None
+    if image is None:
+        raise ValueError(f"{name}: {path} is not an image that can be read (damaged or truncated?)")
+    return image
+
+
+def _of_8_bits(name: str, image: np.ndarray, path) -> np.ndarray:
+    """Colours of 16 bits in 8, 65535 as 255; refused if they fill only the lower bits, as raw ones of 10 or 12 do."""
+    most = int(image.max())
+    raw = "bits of 10 or 12 in 16 are raw: save colours of 8 bits"
+    require(name, most >= 0x2000, f"16-bit colours up to 65535 in {path}", f"none above {most}; {raw}")
+    return ((image.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)

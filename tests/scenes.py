@@ -1,5 +1,8 @@
 """What tests share: boxes on a table, seen by a camera in front of it; random poses, images, frames."""
 
+import struct
+import zlib
+
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -29,6 +32,17 @@ def pose(seed: int) -> np.ndarray:
 def random_image(height: int, width: int) -> np.ndarray:
     """Colours without any order."""
     return np.random.default_rng(0).integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+def png_that_claims(width: int, height: int) -> bytes:
+    """A PNG of some 70 bytes whose header states a size."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    parts = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"0")) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + parts
 
 
 def random_frame(seed: int, shape: tuple[int, int] = (24, 32)) -> RGBDFrame:

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int, Num
 from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.special import softmax
 
-from labkit.crf.energy import check_channels
+from labkit.crf.energy import check_channels, check_units
 from labkit.support.validation import MAX_ITERATIONS, check_finite, check_number, check_shape, check_whole, require
 
 MAX_COST = 1e30  # of unary and weights: with it all sums stay within float32
@@ -57,6 +57,7 @@ def dense_crf(
     spans = (("theta_alpha", theta_alpha, max(H, W)), ("theta_beta", theta_beta, span))
     for name, scale, values in (*spans, ("theta_gamma", theta_gamma, max(H, W))):
         check_number(name, scale, max(values / MAX_STEPS, 1e-30), 1e30)
+    check_units(colours, "theta_beta", theta_beta)
     colours = colours.astype(np.float32)
     v, u = np.indices((H, W), np.float32)
     appearance = np.dstack([u / theta_alpha, v / theta_alpha, colours / theta_beta])

@@ -95,7 +95,8 @@ class PottsCRF:
         """Build the contrast-sensitive Potts model over an image (topic 02).
 
         image: (H, W) or (H, W, channels), any real dtype; sigma_I is in its own units (0 to 255 for uint8). lam >= 0,
-        sigma_p in pixels (with 4 neighbours it only rescales lam, all pairs being one pixel apart). extra: pairs
+        sigma_p in pixels (with 4 neighbours it only rescales lam, all pairs being one pixel apart). Floats in 0..1 want
+        a sigma_I of their size: one above 2 is refused. extra: pairs
         (channels, sigma) such as a depth image and its scale in metres; each adds its own -|d|^2 / (2 sigma^2) to the
         exponent, and NaN there (no reading) adds nothing. Raises ValueError naming the argument that does not fit.
 
@@ -110,6 +111,7 @@ class PottsCRF:
         require("connectivity", connectivity in OFFSETS, "4 or 8 neighbours", connectivity)
         unary = check_unary(unary)
         image = check_channels("image", check_finite("image", image), unary)
+        check_units(image, "sigma_I", sigma_I)
         scaled = [check_channels("extra", channels, unary).astype(np.float64) / sigma for channels, sigma in extra]
         model = object.__new__(cls)  # what is built here needs no second check
         model._put(unary, contrast_weights(image, scaled, lam, sigma_I, sigma_p, connectivity))
@@ -198,6 +200,24 @@ def check_channels(name: str, image: Num[np.ndarray, "H W *channels"], unary: np
         raise ValueError(f"{name}: expected real numbers (H, W) or (H, W, k), got {image.dtype} {image.shape}")
     check_same_size("unary", unary, name, image)
     return image.reshape(*image.shape[:2], -1)
+
+
+SMALL_SCALE = 2.0  # of differences between colours in 0..1: with more, no edge weighs anything
+
+
+def check_units(image: Num[np.ndarray, "H W k"], name: str, scale: float) -> None:
+    """Raise a ValueError if an image of floats in 0..1 stands beside a scale of colours in 0..255.
+
+    >>> check_units(np.full((1, 1, 1), 0.5), "sigma_I", 30.0)
+    Traceback (most recent call last):
+    ...
+    ValueError: image: expected 0..255 beside sigma_I = 30, got floats up to 0.5; multiply it, or divide sigma_I, by 255
+    """
+    if image.dtype.kind == "f" and scale > SMALL_SCALE and 0.0 < image.max(initial=0.0) <= 1.0:
+        raise ValueError(
+            f"image: expected 0..255 beside {name} = {scale:g}, got floats up to {image.max():.3g}; "
+            f"multiply it, or divide {name}, by 255"
+        )
 
 
 def contrast_weights(

@@ -24,6 +24,7 @@ from labkit.geometry.projection import (
     back_projection_noise,
     backproject_to_base,
     invert_transform,
+    nearest_rotation,
     pixel_rays,
     project,
     transform_points,

@@ -204,6 +204,26 @@ def invert_transform(T: Real[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
     return inverse
 
 
+def nearest_rotation(R: Real[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    """Find the rotation nearest to a matrix that is one but for rounding: U V^T of its singular value decomposition.
+
+    Nearest in the sum of squared differences (Schoenemann 1966). Raises ValueError for a mirror image or a matrix of a
+    rank below 3, whose nearest rotation would be a guess. Topic 06.
+
+    >>> nearest_rotation(np.array([[0.0, -1.002, 0.0],
+    ...                            [1.002, 0.0, 0.0],
+    ...                            [0.0, 0.0, 0.998]])).round(6) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    R = check_finite("R", check_shape("R", R, (3, 3))).astype(np.float64)
+    U, sizes, Vt = np.linalg.svd(R)
+    mirrored = np.linalg.det(U @ Vt) < 0.0
+    require("R", sizes[2] > 1e-6 * sizes[0] > 0.0 and not mirrored, "nearly a rotation", R.tolist)
+    return U @ Vt
+
+
 # ---------------------------------------------------------------------------------------------------- inside
 
 

@@ -293,6 +293,8 @@ def load_model(path, num_classes: int = len(CLASSES), model: nn.Module | None = 
     state = checkpoint.get("state_dict", checkpoint)
     if not isinstance(state, dict) or not all(isinstance(value, torch.Tensor) for value in state.values()):
         raise ValueError(f"path: expected weights by name in {path}, got other things")
+    odd = [name for name, w in state.items() if w.layout != torch.strided or w.is_quantized or w.is_meta]
+    require("path", not odd, f"dense arrays in {path}", lambda: f"sparse or quantised ones: {', '.join(odd[:3])}")
     kit_s_own = model is None
     if kit_s_own:
         architecture = checkpoint.get("architecture") or told_by_weights(state)

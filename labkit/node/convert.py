@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.node.messages import Buffer, CameraInfo, CompressedImage, Header, Image, PointCloud2, PointField, Pose
+from labkit.support.images import image_size
 from labkit.support.validation import check_K, check_shape, check_T, require
 
 # Encoding: type of a number, numbers a pixel.
@@ -162,15 +163,18 @@ def check_compressed(message: CompressedImage, depth: bool) -> CompressedImage:
     return message
 
 
-def decompress(message: CompressedImage) -> Image:
+def decompress(message: CompressedImage, size: tuple[int, int]) -> Image:
     """Read a message of image_transport's topics "compressed" and "compressedDepth" as the image that it was.
 
-    Colour becomes bgr8 or rgb8, depth what its format says. Float depth travels as whole numbers q with A / (q - B)
-    metres, 0 for no reading. Raises ValueError for bytes that hold no such picture.
+    size: (height, width) that it must have, its CameraInfo's; no pixel of another is read. Colour becomes bgr8 or rgb8,
+    depth what its format says. Float depth travels as whole numbers q with A / (q - B) metres, 0 for no reading. Raises
+    ValueError for bytes that hold no such picture.
     """
     before, _, how = message.format.partition(";")
     depth = "compressedDepth" in how
     data = np.frombuffer(message.data, np.uint8)[QUANTISED.size if depth else 0 :]
+    width, height = image_size("data", data.tobytes(), f"a picture of {message.format!r}")
+    require("data", (height, width) == size, f"the size of info, {size}", (height, width))
     flags = cv2.IMREAD_UNCHANGED if depth else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         pixels = cv2.imdecode(data, flags)

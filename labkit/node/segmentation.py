@@ -255,7 +255,8 @@ class SegmentationNode:
         T_base_cam = self._base_transform(together["rgb"].header)
         for stream in ("rgb", "depth"):
             if isinstance(together[stream], CompressedImage):
-                together[stream] = convert.decompress(together[stream])
+                size = together["info"].height, together["info"].width
+                together[stream] = convert.decompress(together[stream], size)
         frame = convert.to_frame(**together, T_base_cam=T_base_cam, depth_scale=self.depth_scale)
         click = self._clicked
         if click is None:

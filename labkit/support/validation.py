@@ -143,9 +143,12 @@ def check_K(name: str, K) -> np.ndarray:
     K = check_finite(name, check_shape(name, K, (3, 3))).astype(np.float64)
     if K[1, 0] or K[2, 0] or K[2, 1]:
         raise ValueError(f"{name}: expected an upper triangular intrinsic matrix, got {K.tolist()}; is it transposed?")
-    require(name, K[2, 2] == 1.0, "its last row to be 0 0 1", K[2].tolist)
     if not (K[0, 0] > 1e-9 and K[1, 1] > 1e-9):  # pixels; below, its inverse has no numbers
-        raise ValueError(f"{name}: expected positive focal lengths (else it is singular), got {K[0, 0]} and {K[1, 1]}")
+        unknown = "" if K.any() else "; a K of zeros is an uncalibrated camera's"
+        raise ValueError(
+            f"{name}: expected positive focal lengths (else it is singular), got {K[0, 0]} and {K[1, 1]}{unknown}"
+        )
+    require(name, K[2, 2] == 1.0, "its last row to be 0 0 1", K[2].tolist)
     return K
 
 

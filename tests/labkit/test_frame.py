@@ -1,8 +1,10 @@
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
+from scenes import png_that_claims, random_image
 
-from labkit.frame import RGBDFrame
+from labkit.frame import RGBDFrame, read_image
 
 K = np.array([[100.0, 0.0, 4.0], [0.0, 110.0, 3.0], [0.0, 0.0, 1.0]])
 GOOD = {
@@ -45,6 +47,7 @@ def test_a_good_frame_keeps_its_values_in_the_kits_types():
         ("K", changed(K, (0, 0), 0.0), "singular"),
         ("K", changed(K, (0, 0), np.nan), "finite"),
         ("K", np.eye(4), "shape"),
+        ("K", np.zeros((3, 3)), "positive focal lengths .* got 0.0 and 0.0; a K of zeros is an uncalibrated camera's"),
         ("T_base_cam", 2.0 * np.eye(4), "0 0 0 1"),
         ("T_base_cam", changed(np.eye(4), (0, 0), 1.1), "orthonormal"),
         ("T_base_cam", changed(np.eye(4), (0, 0), -1.0), "right-handed"),
@@ -109,3 +112,55 @@ def test_files_that_do_not_fit_are_named(files, tmp_path):
     for change, error, says in cases:
         with pytest.raises(error, match=says):
             RGBDFrame.from_files(**(paths | {"K": K, "T_base_cam": np.eye(4)} | change))
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("end", ["png", "tif", "ppm", "pfm"])
+def test_a_picture_of_more_pixels_than_any_camera_has_is_refused_before_one_is_read(end, tmp_path, monkeypatch):
+    """A PNG of 0.9 MB can hold 20000 x 16000 pixels, which are a gigabyte."""
+    claims = {
+        "png": png_that_claims(20000, 16000),
+        "tif": tiff_that_claims(20000, 16000),
+        "ppm": b"P6 20000 16000 255 ",
+        "pfm": b"Pf\n20000 16000\n-1.0\n",
+    }
+    (tmp_path / f"large.{end}").write_bytes(claims[end])
+    monkeypatch.setattr(cv2, "imdecode", None)  # whoever calls it fails
+    for colour in (True, False):
+        with pytest.raises(
+            ValueError, match=rf"^color: expected at most 64 million pixels, got 320 million in .*{end}"
+        ):
+            read_image("color", tmp_path / f"large.{end}", np.uint8, colour)
+
+
+def tiff_that_claims(width: int, height: int) -> bytes:
+    file = cv2.imencode(".tiff", np.zeros((1234, 321), np.float64))[1].tobytes()
+    assert file.count((1234).to_bytes(4, "little")) and file[:2] == b"II"
+    for tag, value in ((256, width), (257, height)):
+        at = file.index(tag.to_bytes(2, "little"), int.from_bytes(file[4:8], "little"))
+        file = (
+            file[: at + 2]
+            + (4).to_bytes(2, "little")
+            + file[at + 4 : at + 8]
+            + value.to_bytes(4, "little")
+            + file[at + 12 :]
+        )
+    return file
+
+
+def test_colours_of_16_bits_are_brought_to_8_or_refused_with_a_sentence_of_their_own(tmp_path):
+    path, rgb = str(tmp_path / "deep.png"), random_image(12, 16)
+    for ours in (rgb, rgb // 2):
+        cv2.imwrite(path, ours[..., ::-1].astype(np.uint16) * 257)
+        assert np.array_equal(read_image("color", path, np.uint8, colour=True), ours)
+    cv2.imwrite(path, rgb.astype(np.uint16) * 4)  # 10 bits in the lower bits
+    with pytest.raises(ValueError, match=r"^color: expected 16-bit colours up to 65535 .* got none above 1020; .* raw"):
+        read_image("color", path, np.uint8, colour=True)
+
+
+def test_how_a_phone_was_held_turns_no_picture(tmp_path):
+    """Its note stands in the colour file alone: turned over, the colours would lie upside down on depth."""
+    rgb, note = np.repeat(np.arange(64, dtype=np.uint8)[:, None] * 4, 64, axis=1), Image.Exif()
+    note[0x0112] = 3  # turned over
+    Image.fromarray(rgb).save(tmp_path / "held.jpg", exif=note, quality=95)
+    assert np.abs(read_image("color", tmp_path / "held.jpg", np.uint8, colour=True)[..., 0] - rgb.astype(int)).max() < 8

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_crf import as_crf, random_crf
 
-from labkit.crf import PottsCRF, refine, solve, unary_from_probabilities
+from labkit.crf import PottsCRF, dense_crf, refine, solve, unary_from_probabilities
 from labkit.crf.integers import quantise
 
 
@@ -143,3 +143,21 @@ OUTSIDE = np.ones((2, 2, 3))
 def test_bad_input_names_the_argument(name, call):
     with pytest.raises(ValueError, match=name):
         call()
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
+def test_colours_in_0_to_1_beside_a_scale_of_0_to_255_are_refused_with_both_remedies(dtype):
+    """Their contrast would be 255 times too small, and no edge would show."""
+    rgb = np.random.default_rng(0).integers(0, 256, (4, 5, 3), dtype=np.uint8)
+    p, unit = np.full((4, 5, 2), 0.5), (rgb / 255.0).astype(dtype)
+    for of_image in (
+        lambda image, scale: PottsCRF.from_image(p, image, 1.0, scale).weights,
+        lambda image, scale: refine(p, image, sigma_I=scale).labels,
+        lambda image, scale: dense_crf(p, image, theta_beta=scale),
+    ):
+        with pytest.raises(ValueError, match=r"^image: .*multiply it, or divide (sigma_I|theta_beta), by 255"):
+            of_image(unit, 30.0)
+        assert np.allclose(of_image(unit, 30.0 / 255.0), of_image(rgb, 30.0), atol=2e-2)
+        of_image(np.zeros((4, 5, 3), dtype), 30.0)  # black is black in any unit
+    of_image(unit, 0.5)  # as lesson 02 has it

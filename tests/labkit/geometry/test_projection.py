@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import pose
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from labkit.geometry import (
     back_project,
@@ -16,6 +16,7 @@ from labkit.geometry import (
     back_projection_noise,
     backproject_to_base,
     invert_transform,
+    nearest_rotation,
     pixel_rays,
     project,
     transform_points,
@@ -236,3 +237,25 @@ def test_bad_input_is_an_error_that_names_the_argument(case):
     name, function, *arguments = case
     with pytest.raises(ValueError, match=rf"^{name}: expected "):
         function(*arguments)
+
+
+@pytest.mark.parametrize("decimals", [3, 4, 6])
+def test_the_nearest_rotation_is_the_nearest_of_many(decimals):
+    """SciPy's own, and no small turn of it lies nearer to the matrix."""
+    rng = np.random.default_rng(decimals)
+    for R in Rotation.random(20, rng=rng).as_matrix():
+        rounded = R.round(decimals)
+        ours = nearest_rotation(rounded)
+        assert np.allclose(ours @ ours.T, np.eye(3), atol=1e-12) and np.linalg.det(ours) > 0.0
+        assert np.allclose(ours, Rotation.from_matrix(rounded, assume_valid=False).as_matrix(), atol=1e-9)
+        off = np.linalg.norm(ours - rounded)
+        for turn in Rotation.from_rotvec(1e-4 * rng.standard_normal((50, 3))).as_matrix():
+            assert np.linalg.norm(ours @ turn - rounded) >= off
+        assert off <= np.linalg.norm(R - rounded) + 1e-12
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("R", [np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3)), np.diag([1.0, 1.0, 0.0]), np.eye(4)])
+def test_what_is_near_to_no_rotation_is_refused(R):
+    with pytest.raises(ValueError, match=r"^R: "):
+        nearest_rotation(R)

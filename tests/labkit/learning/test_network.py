@@ -201,3 +201,17 @@ def test_lesson_03_says_how_few_pixels_of_a_whole_frame_train_mode_changes():
         with torch.no_grad():
             right, wrong = (load_model(weights_path("unet")).train(mode)(x).argmax(1) for mode in (False, True))
         assert 0 < (right != wrong).float().mean() < 1 / 20
+
+
+@pytest.mark.parametrize("odd", ["sparse", "meta"])
+def test_arrays_that_are_not_dense_are_refused_in_words(odd, tmp_path):
+    weights = {name: w.clone() for name, w in SmallSegNet().state_dict().items()}
+    name, w = next(iter(weights.items()))
+    ways = {
+        "sparse": lambda: w.to_sparse(),
+        "meta": lambda: w.to("meta"),
+    }
+    weights[name] = ways[odd]()
+    torch.save(weights, tmp_path / "odd.pt")
+    with pytest.raises(ValueError, match=r"^path: "):
+        load_model(tmp_path / "odd.pt")

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scenes import png_that_claims
 from scipy.spatial.transform import Rotation
 
 from labkit.node import convert
@@ -126,14 +127,15 @@ def test_compressed_colour_keeps_its_channels(format, in_file):
     red = np.full((16, 24, 3), (250, 20, 30), np.uint8)
     file = cv2.imencode(".jpg" if "jpeg" in format else ".png", red[..., ::-1] if in_file == "bgr" else red)[1]
     message = convert.check_compressed(CompressedImage(H, format, file.tobytes()), depth=False)
-    found = convert.rgb_image(convert.decompress(message)).astype(int)
+    found = convert.rgb_image(convert.decompress(message, (16, 24))).astype(int)
     assert found.shape == red.shape and np.abs(found - red).max() <= 4
 
 
 def test_compressed_depth_is_what_it_was():
     units = np.array([[0, 512, 65535]], np.uint16)
     file = bytes(12) + cv2.imencode(".png", units)[1].tobytes()
-    image = convert.decompress(convert.check_compressed(CompressedImage(H, "16UC1; compressedDepth", file), depth=True))
+    message = convert.check_compressed(CompressedImage(H, "16UC1; compressedDepth", file), depth=True)
+    image = convert.decompress(message, (1, 3))
     assert image.encoding == "16UC1" and np.array_equal(convert.decode_image(image), units) and image.header == H
 
     quantum, furthest = 100.0, 10.0  # image_transport's defaults
@@ -142,8 +144,19 @@ def test_compressed_depth_is_what_it_was():
     metres = np.array([[0.3, 1.0, 9.0]], np.float32)
     q = np.append(np.round(A / metres + B), [[0]], axis=1).astype(np.uint16)
     file = struct.pack("<iff", 0, A, B) + cv2.imencode(".png", q)[1].tobytes()
-    found = convert.depth_image(convert.decompress(CompressedImage(H, "32FC1; compressedDepth png", file)))
+    found = convert.depth_image(convert.decompress(CompressedImage(H, "32FC1; compressedDepth png", file), (1, 4)))
     assert np.allclose(found[0, :3], metres, atol=0.005) and np.isnan(found[0, 3])
+
+
+@pytest.mark.parametrize("format", ["rgb8; png compressed bgr8", "16UC1; compressedDepth png"])
+@pytest.mark.parametrize("claimed", [(20000, 16000), (100_000, 100_000), (640, 481)])
+def test_a_picture_of_another_size_than_its_calibration_is_refused_before_a_pixel_is_read(format, claimed, monkeypatch):
+    monkeypatch.setattr(cv2, "imdecode", None)  # whoever calls it fails
+    file = bytes(12) * ("Depth" in format) + png_that_claims(*claimed)
+    with pytest.raises(
+        ValueError, match=r"^data: expected (at most 64 million pixels|the size of info, \(480, 640\)), got"
+    ):
+        convert.decompress(CompressedImage(H, format, file), (480, 640))
 
 
 def test_clouds_are_read_wherever_their_fields_stand():
@@ -214,9 +227,9 @@ def image(**changes) -> Image:
         (lambda: convert.check_compressed(CompressedImage(H, "jpeg", b""), depth=True), "format"),
         (lambda: convert.check_compressed(CompressedImage(H, "16UC1; compressedDepth rvl", b""), depth=True), "format"),
         (lambda: convert.check_compressed(CompressedImage(H, "bayer_rggb8; jpeg", b""), depth=False), "format"),
-        (lambda: convert.decompress(CompressedImage(H, "jpeg", b"")), "data"),
-        (lambda: convert.decompress(CompressedImage(H, "jpeg", b"no picture")), "data"),
-        (lambda: convert.decompress(CompressedImage(H, "32FC1; compressedDepth", bytes(11))), "data"),
+        (lambda: convert.decompress(CompressedImage(H, "jpeg", b""), (2, 3)), "data"),
+        (lambda: convert.decompress(CompressedImage(H, "jpeg", b"no picture"), (2, 3)), "data"),
+        (lambda: convert.decompress(CompressedImage(H, "32FC1; compressedDepth", bytes(11)), (2, 3)), "data"),
         (lambda: convert.encode_cloud(np.zeros((2, 3)), H, score=np.zeros(3)), "score"),
         (lambda: convert.encode_image(np.zeros((2, 3)), "mono8", H), "array"),
         (lambda: convert.encode_image(np.zeros((2, 3), np.uint8), "rgb8", H), "array"),
