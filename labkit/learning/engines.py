@@ -20,6 +20,7 @@ from jaxtyping import Float, UInt8
 import labkit
 from labkit.learning.channels import CHANNELS
 from labkit.learning.inference import THINGS, Engine, FunctionEngine, NetworkInput
+from labkit.learning.onnx_file import check_onnx, parsed
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_rgb, check_shape, require
 
@@ -206,21 +207,23 @@ def _outputs(things: bool) -> list[str]:
 
 
 def _facts(onnx_file: bytes) -> tuple[NetworkInput, int, bool]:
-    """What the metadata of an ONNX file says: what the network takes, its number of classes, and if it tells things."""
-    import onnx
+    """What the metadata of an ONNX file says: what the network takes, its number of classes, and if it tells things.
 
-    try:
-        facts = {entry.key: entry.value for entry in onnx.load_model_from_string(onnx_file).metadata_props}
-    except Exception as error:  # protobuf's own kind of error, and protobuf is not ours to import
-        raise ValueError("model: expected an ONNX file, got one that is damaged or of another kind") from error
+    The file is checked first, whichever engine then runs it.
+    """
+    if importlib.util.find_spec("onnx") is None:
+        raise ModuleNotFoundError('an ONNX file is checked first, by the package onnx: pip install "onnx"')
+    facts = {entry.key: entry.value for entry in parsed(onnx_file).metadata_props}
     try:
         mean, std, divisor = (json.loads(facts[name]) for name in ("mean", "std", "divisor"))
         arrays, classes = tuple(json.loads(facts["arrays"])), json.loads(facts["classes"])
-    except (KeyError, ValueError) as error:
+    except (KeyError, ValueError, TypeError, RecursionError) as error:
         raise ValueError(f"model: expected a file of `labkit export`, got one that states {sorted(facts)}") from error
     mean, std = (tuple(x) if isinstance(x, list) else x for x in (mean, std))
     takes = NetworkInput(arrays, mean, std, divisor, json.loads(facts.get("pixel", "null")))
-    return takes, classes, json.loads(facts.get("things", "false"))
+    things = json.loads(facts.get("things", "false"))
+    check_onnx(onnx_file, arrays, _outputs(things))
+    return takes, classes, things
 
 
 # ------------------------------------------------------------------------------------ the C++ listing

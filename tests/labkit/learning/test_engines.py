@@ -1,5 +1,6 @@
 """One network, three engines, one answer; and the C++ listing's flow, with its mistake beside it."""
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -202,3 +203,66 @@ def test_a_file_that_is_no_export(name, tmp_path):
 def test_what_does_not_fit_is_named(says, call, unet):
     with pytest.raises(ValueError, match=says):
         call(open_engine(unet))
+
+
+def spoilt(how: str, network) -> None:
+    """Damage a network as files from elsewhere are damaged."""
+    weights = network.graph.initializer[0]
+    if how == "a NaN weight":
+        values = onnx.numpy_helper.to_array(weights).copy()
+        values.flat[0] = np.nan
+        weights.CopyFrom(onnx.numpy_helper.from_array(values, weights.name))
+    elif how == "an infinite number in a node":
+        value = onnx.numpy_helper.from_array(np.array([np.inf], np.float32))
+        network.graph.node.insert(0, onnx.helper.make_node("Constant", [], ["unused"], value=value))
+    elif how == "weights cut short":
+        weights.raw_data = weights.raw_data[:-4]
+    elif how == "data in another file":
+        weights.ClearField("raw_data")
+        weights.data_location = onnx.TensorProto.EXTERNAL
+        weights.external_data.add(key="location", value="weights.bin")
+    elif how == "a weight that is missing":
+        del network.graph.initializer[0]
+    elif how == "an input that is missing":
+        del network.graph.input[0]
+    elif how == "an input too many":
+        network.graph.input.add().CopyFrom(network.graph.input[0])
+        network.graph.input[-1].name = "depth"
+    elif how == "another output":
+        network.graph.output[0].name = "scores"
+    elif how == "sparse weights":
+        network.graph.sparse_initializer.add().dims.append(3)
+
+
+SPOILT = {
+    "a NaN weight": "expected finite weights, got 1 NaN or infinite of 864 in",
+    "an infinite number in a node": "expected finite weights, got 1 NaN or infinite of 1 in value of Constant",
+    "weights cut short": r"expected 864 numbers of .*, \[32, 3, 3, 3\], got others: is it cut short",
+    "data in another file": "expected one file that holds all weights, got .* in another file; save it as one",
+    "a weight that is missing": "expected a whole network, got one in which ",
+    "an input that is missing": "expected the inputs image, got none",
+    "an input too many": "expected the inputs image, got image, depth",
+    "another output": "expected the outputs logits, got scores",
+    "sparse weights": "expected dense weights, got sparse ones",
+}
+
+
+@pytest.mark.parametrize("how", SPOILT)
+@pytest.mark.parametrize("engine", ["opencv", "onnxruntime"])
+def test_a_damaged_file_is_refused_in_words_before_an_engine_sees_it(how, engine, tmp_path, monkeypatch):
+    """Of a NaN OpenCV made other labels for most pixels without a word, and of a short weight it died."""
+    monkeypatch.setattr(cv2.dnn, "readNetFromONNX", None)
+    monkeypatch.setattr("onnxruntime.InferenceSession", None)
+    network = onnx.load_model(weights_path("smallsegnet").with_suffix(".onnx"))
+    spoilt(how, network)
+    (tmp_path / "spoilt.onnx").write_bytes(network.SerializeToString())
+    with pytest.raises(ValueError, match=f"^model: {SPOILT[how]}"):
+        open_engine(tmp_path / "spoilt.onnx", engine)
+
+
+@pytest.mark.parametrize("engine", ["opencv", "onnxruntime"])
+def test_without_the_package_that_checks_files_a_sentence_names_it(engine, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "onnx" else find(name))
+    with pytest.raises(ModuleNotFoundError, match="an ONNX file is checked first, by the package onnx"):
+        open_engine(weights_path("smallsegnet").with_suffix(".onnx"), engine)
