@@ -7,9 +7,9 @@ c.CourseDirectory.source_directory = "solutions"
 c.CourseDirectory.release_directory = "labs"
 c.CourseDirectory.ignore = [".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"]
 # Whose a file is in a zip of Moodle's or Canvas's: downloaded/TOPIC/archive/ANY.zip, then `nbgrader zip_collect TOPIC`.
-c.ZipCollectApp.extractor_plugin = "labgrader.grading.collect.LmsExtractor"
-c.ZipCollectApp.collector_plugin = "labgrader.grading.collect.LmsCollector"
+c.ZipCollectApp.extractor_plugin = "labgrader.handin.collect.LmsExtractor"
+c.ZipCollectApp.collector_plugin = "labgrader.handin.collect.LmsCollector"
 # `nbgrader autograde` and formgrader's Autograde refuse: `labkit grade` grades.
-c.Autograde.exporter_class = "labgrader.grading.nbgrader_plugins.GradedByLabkit"
+c.Autograde.exporter_class = "labgrader.grade.nbgrader_plugins.GradedByLabkit"
 # Copies have rubrics for formgrader; nbgrader's feedback leaves them out.
-c.GenerateFeedback.exporter_class = "labgrader.grading.nbgrader_plugins.FeedbackPages"
+c.GenerateFeedback.exporter_class = "labgrader.grade.nbgrader_plugins.FeedbackPages"

@@ -16,11 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.measure import in_turns, resident_mb, table
-from labgrader.checker.cell import Cell
 from labgrader.course import of_topic, topics
-from labgrader.grading import grade, reading, sandbox
-from labgrader.grading.gradebook import opened
-from labgrader.grading.run import grade_course
+from labgrader.grade import grade
+from labgrader.grade.gradebook import opened
+from labgrader.grade_course import grade_course
+from labgrader.handin import reading
+from labgrader.program.cell import Cell
+from labgrader.sandbox import sandbox
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -91,7 +93,7 @@ def beside_nbgrader(course: Path) -> str:
 
 
 def classes(folder: Path) -> str:
-    """A class of 100 a lab, as tests/labgrader/grading builds them, one worker: seconds and wrong verdicts."""
+    """A class of 100 a lab, as tests/grading_course.py builds them, one worker: seconds and wrong verdicts."""
     rows = []
     for topic in filter(of_topic, topics()):  # those that have questions
         course = folder / topic

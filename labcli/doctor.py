@@ -157,7 +157,7 @@ def check_gpu() -> list[Finding]:
 
 def check_sandbox() -> list[Finding]:
     """The sandbox that `labkit grade` runs submissions in; students need none."""
-    from labgrader.grading import bwrap
+    from labgrader.sandbox import bwrap
 
     try:
         path = bwrap.executable()

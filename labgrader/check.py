@@ -18,17 +18,17 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from labgrader.checker.cell import Cell, parsed
-from labgrader.checker.comparison import Problem
-from labgrader.checker.judge import Verdict
-from labgrader.checker.messages import Marked
-from labgrader.checker.program import Program, program
-from labgrader.checker.question import Question
+from labgrader.comparison import Problem
 from labgrader.course import course, find, of_topic
-from labgrader.notebook import LARGEST_NOTEBOOK, Unreadable, refuse_large, refuse_long
-from labgrader.worker import plain
-from labgrader.worker.answer import Answer, Budget, Limits, Start, public_cases
-from labgrader.worker.process import MOST_PRINTED
+from labgrader.program.cell import Cell, parsed
+from labgrader.program.notebook import LARGEST_NOTEBOOK, Unreadable, refuse_large, refuse_long
+from labgrader.program.slice import Program, program
+from labgrader.question import Question
+from labgrader.reply.judge import Verdict
+from labgrader.reply.messages import Marked
+from labgrader.run import plain
+from labgrader.run.process import MOST_PRINTED
+from labgrader.run.run import Answer, Budget, Limits, Start, public_cases
 
 LIMITS = Limits()  # the grader's, so that a tick here is a tick there
 LOOKING = "Looking for the place in your program: a moment ..."

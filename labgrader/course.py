@@ -25,8 +25,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labgrader.checker.question import Question
 from labgrader.languages import CHOSEN, ENGLISH, translated
+from labgrader.question import Question
 
 FILE = "pyproject.toml"
 NAMED = "LABGRADER_COURSE"  # the environment variable that `use` sets, so that processes started later know it, too
@@ -44,8 +44,8 @@ class Course:
     holds in a released lab. language: of hints, "de", where they were translated (`labgrader.languages`). dropped:
     topics that are there and not taught: no lab is released, no page or bundle has them. metadata: the key of a
     released notebook's metadata that says the version. project and repository: its name and its address, of [project];
-    wheel: what installs it elsewhere (`labgrader.publishing`), and extras: what of its optional dependencies a topic
-    needs there.
+    wheel: what installs it elsewhere (`labgrader.release.publishing`), and extras: what of its optional dependencies a
+    topic needs there.
     """
 
     root: Path

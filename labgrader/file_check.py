@@ -1,6 +1,6 @@
 """`check LAB.ipynb`: a lab, as it is saved or on Colab's page, checked as the grader will, but on the public cases.
 
-The answers are cut out of the file (`labgrader.checker.program`), each runs in a worker of its own that has the
+The answers are cut out of the file (`labgrader.program.slice`), each runs in a worker of its own that has the
 packages of the grader and nothing of the kit, and other answers that one calls are the kit's where they are wrong. In
 a notebook that is a plain process, since it is one's own; the command `check` has a sandbox where there is one. What is
 ticked here is right with the grader.
@@ -14,26 +14,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from labgrader.check import LIMITS, describe, judged, jupyter
-from labgrader.checker.cell import Cell, Parsed, cells_of
-from labgrader.checker.comparison import Problem
-from labgrader.checker.judge import Verdict
-from labgrader.checker.program import program
-from labgrader.checker.question import Question
+from labgrader.comparison import Problem
 from labgrader.course import asked, course, of_topic, topics
-from labgrader.grading.reading import released_by
-from labgrader.notebook import Unreadable, code_of, parse
-from labgrader.running import live_notebook, running_file
+from labgrader.handin.reading import released_by
+from labgrader.program.cell import Cell, Parsed, cells_of
+from labgrader.program.notebook import Unreadable, code_of, parse
+from labgrader.program.open_notebook import live_notebook, running_file
+from labgrader.program.slice import program
+from labgrader.question import Question
+from labgrader.reply.judge import Verdict
+from labgrader.run import plain
+from labgrader.run.run import Budget, Start
 from labgrader.support import counted
-from labgrader.worker import plain
-from labgrader.worker.answer import Budget, Start
 
 
 def check_file(path: Path | str | None = None, start: Start = plain.fresh_worker) -> bool:
     """Check every answer in a lab, print the results, and tell whether all are right.
 
     Of the texts that a person grades it says which are still empty; a lab of texts alone is right if none is.
-    path: of a notebook file; if it is not given, the notebook that runs (`labgrader.running`). On Colab, which keeps
-    the notebook elsewhere, it is the one on the page. start: gives a worker, with a sandbox or without. Raises
+    path: of a notebook file; if it is not given, the notebook that runs (`program.open_notebook`). On Colab, which
+    keeps the notebook elsewhere, it is the one on the page. start: gives a worker, with a sandbox or without. Raises
     ValueError if it is no lab of the course.
     """
     is_here = path is not None and Path(path).is_file()

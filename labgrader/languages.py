@@ -15,7 +15,7 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
-from labgrader.checker.question import Question
+from labgrader.question import Question
 
 CHOSEN = "LABGRADER_LANGUAGE"
 ENGLISH = "en"

@@ -12,9 +12,13 @@ MOVED = {
     "topics": "labcourse.questions",
     "checking": "labgrader.check",
     "checking_file": "labgrader.file_check",
-    **{name: f"labgrader.{name}" for name in ("checker", "grading", "release", "scaffold")},
+    "checker": "labgrader.reply",
+    "grading": "labgrader.grade",
+    "release": "labgrader.release.release",
+    "scaffold": "labgrader.release.scaffold",
     **{name: f"labcourse.{name}" for name in ("attempts", "explorers", "kernel", "plots")},
-    "grading.refusal": "labgrader.grading.nbgrader_plugins",  # what nbgrader_config.py names
+    "grading.refusal": "labgrader.grade.nbgrader_plugins",
+    "grading.collect": "labgrader.handin.collect",  # what nbgrader_config.py names
 }
 
 

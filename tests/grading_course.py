@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from alternatives import alternatives
 
-from labgrader.checker.question import Question
 from labgrader.course import of_topic
-from labgrader.grading.gradebook import opened
+from labgrader.grade.gradebook import opened
+from labgrader.question import Question
 
 
 def code_cell(source: str, grade_id: str | None = None, **mark) -> dict:

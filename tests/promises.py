@@ -18,8 +18,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from labcourse.kinds import LARGE, LONG, Kind
-from labgrader.checker.comparison import Problem, alike, quiet, trusted
-from labgrader.checker.question import Question
+from labgrader.comparison import Problem, alike, quiet, trusted
+from labgrader.question import Question
 
 MISSED = 0.001
 FEW = 16  # entries of an array that are simplified one by one; of larger ones the first and the last of each axis

@@ -39,8 +39,8 @@ PACKAGES = {
     "labtrain": {"labtrain", "labkit"},
     "labros": {"labros", "labkit"},
     "data_gen": {"data_gen", "labkit", "labtrain"},
-    "labcourse": {"labcourse", "labkit", "labtrain", "data_gen", "labgrader.checker.question"},
-    "labcourse.questions": {"labcourse.questions", "labkit", "labcourse.kinds", "labgrader.checker.question"},
+    "labcourse": {"labcourse", "labkit", "labtrain", "data_gen", "labgrader.question"},
+    "labcourse.questions": {"labcourse.questions", "labkit", "labcourse.kinds", "labgrader.question"},
     "labcourse.stacks": {"labcourse.stacks", "labkit"},
     "labcli": {"labcli", "labkit", "labtrain", "labros", "labgrader", "labcourse", "data_gen"},
 }

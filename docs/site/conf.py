@@ -27,7 +27,7 @@ import labros
 import labtrain
 from labcourse import stacks, views
 from labgrader import course
-from labgrader.publishing import unpublished
+from labgrader.release.publishing import unpublished
 from labkit import losses  # noqa: F401  torch first: its threads must not meet those of other libraries half loaded
 
 ROOT = Path(__file__).parents[2]

@@ -16,7 +16,7 @@ def check(lab: Annotated[Path, typer.Argument(help="A saved lab, a notebook file
     from labgrader.file_check import LIMITS, check_file
 
     try:
-        from labgrader.grading import sandbox
+        from labgrader.sandbox import sandbox
 
         sandbox.probe(("numpy",), LIMITS)
     except (ImportError, OSError, ValueError) as reason:

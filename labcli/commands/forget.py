@@ -15,8 +15,8 @@ def forget(
     ] = Path("."),
 ) -> None:
     """Remove a student from submissions, grades, gradebook, roster and extensions, and say where that was."""
-    from labgrader.grading.forget import forget as forget_student
-    from labgrader.grading.run import private
+    from labgrader.grade_course import private
+    from labgrader.report.forget import forget as forget_student
 
     with private():
         done = forget_student(course, student)

@@ -51,10 +51,10 @@ def grade(
 
     if sys.platform != "linux":
         raise ValueError(f"labkit grade needs Linux, this is {sys.platform}: grade on Linux, in WSL or in a container")
-    from labgrader.grading.changes import change_of
-    from labgrader.grading.run import grade_course
-    from labgrader.grading.sandbox import NO_SANDBOX
-    from labgrader.grading.second_look import second_look
+    from labgrader.grade.changes import change_of
+    from labgrader.grade_course import grade_course
+    from labgrader.report.second_look import second_look
+    from labgrader.sandbox.sandbox import NO_SANDBOX
 
     if look is not None:
         for line in second_look(topic, course, look, submissions, out, unsafe):
@@ -73,8 +73,8 @@ def grade(
 
 def tell(graded, folder: Path, tidy: bool) -> None:
     """Print the table of a grading, `run.Graded`, what an instructor should know of it, and where its files are."""
-    from labgrader.grading.alike_page import told
-    from labgrader.grading.outputs import terminal_table
+    from labgrader.report.alike_page import told
+    from labgrader.report.outputs import terminal_table
     from labgrader.support import counted
 
     topic = graded.lab.topic

@@ -21,10 +21,10 @@ def grades(
 
     Exit status 1 if somebody is still to be graded by hand; it says in what.
     """
-    from labgrader.grading.course_page import FOLDER, write_course
-    from labgrader.grading.gradescope import write_autograder
-    from labgrader.grading.platforms import write_grades
-    from labgrader.grading.run import private
+    from labgrader.grade_course import private
+    from labgrader.report.course_page import FOLDER, write_course
+    from labgrader.report.gradescope import write_autograder
+    from labgrader.report.platforms import write_grades
 
     if moodle + canvas + gradescope > 1:
         raise ValueError("expected one of --moodle, --canvas and --gradescope, got more")

@@ -18,7 +18,7 @@ def new_question(
     course: Checkout = Path("."),
 ) -> None:
     """Write a question that works, right answers and wrong ones, and its cells in the topic's solution."""
-    from labgrader import scaffold
+    from labgrader.release import scaffold
 
     tell_written(scaffold.new_question(course, name, points))
 
@@ -29,6 +29,6 @@ def new_lab(
     course: Checkout = Path("."),
 ) -> None:
     """Write a lab without questions: a topic, its solution, and a row in README."""
-    from labgrader import scaffold
+    from labgrader.release import scaffold
 
     tell_written(scaffold.new_lab(course, topic))

@@ -22,8 +22,8 @@ def release(
     ] = Path("."),
 ) -> None:
     """Generate labs/ from solutions/ with nbgrader, and tidy the notebooks of solutions/ and lessons/."""
-    from labgrader import bundle as bundling
-    from labgrader import release as releasing
+    from labgrader.release import bundle as bundling
+    from labgrader.release import release as releasing
 
     if week is not None:
         topics = [*(topics or []), *bundling.topics_of_week(week)]

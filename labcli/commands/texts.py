@@ -16,9 +16,9 @@ def texts(
     port: Annotated[int, typer.Option(help="Port of the page; a free one if not given.", min=0, max=65535)] = 0,
 ) -> None:
     """Grade answers in words in a browser, all students' answers to a question on one page, without names."""
-    from labgrader.grading.reading import read_lab
-    from labgrader.grading.run import private
-    from labgrader.grading.texts_server import TextsServer
+    from labgrader.grade_course import private
+    from labgrader.handin.reading import read_lab
+    from labgrader.report.texts_server import TextsServer
 
     with private(), TextsServer(course, read_lab(course, topic), port) as server:
         typer.echo(f"open {server.url}\nCtrl-C ends it; then `labkit grades {topic}` brings pages and files up to date")

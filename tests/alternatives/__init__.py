@@ -12,8 +12,8 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from labgrader.checker.live_program import LiveProgram
-from labgrader.checker.question import Question
+from labgrader.program.live import LiveProgram
+from labgrader.question import Question
 
 RIGHT = json.loads((Path(__file__).parents[1] / "data/right.json").read_text())
 

@@ -15,9 +15,9 @@ import pytest
 from notebooks import FEWER, FEWER_IN_LABS, LABS, LESSONS, ROOT, SOLUTIONS, code, is_compared, notebook, prose
 
 from labgrader.check import describe
-from labgrader.checker.judge import judge
 from labgrader.course import asked
-from labgrader.release import mistakes
+from labgrader.release.release import mistakes
+from labgrader.reply.judge import judge
 
 
 def each(paths):

@@ -14,9 +14,9 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from labgrader import check as checking
 from labgrader.check import CheckFailed, Shown
-from labgrader.checker.finding import WATCHES
-from labgrader.checker.messages import Marked
-from labgrader.checker.question import Misconception, Property, Question
+from labgrader.question import Misconception, Property, Question
+from labgrader.reply.finding import WATCHES
+from labgrader.reply.messages import Marked
 from labkit import check
 
 SECRET = 0.7312684519  # a number that only the reference knows
@@ -218,7 +218,7 @@ def executed(cells, folder):
 def test_the_counterexample_comes_at_once_and_the_marked_line_joins_it(tmp_path):
     cells = [
         "import numpy as np\nfrom labkit import check\nfrom labgrader import check as checking\n"
-        "from labgrader.worker import answer\nanswer.LOOK_S = 200.0\n"
+        "from labgrader.run import run\nrun.LOOK_S = 200.0\n"
         "checking.LIMITS = answer.Limits(case_s=200.0, question_s=200.0)\n"
         "seen, show = [], checking.Page.show\n"
         "checking.Page.show = lambda page, shown: (seen.append(repr(shown)), show(page, shown))",

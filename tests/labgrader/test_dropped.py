@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from labgrader import bundle, course, release
+from labgrader import course
+from labgrader.release import bundle, release
 
 
 @pytest.fixture

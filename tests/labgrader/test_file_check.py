@@ -9,10 +9,10 @@ import pytest
 from grading_course import lab_notebook, right_answers
 
 from labgrader.check import why_its_file_is_not_graded
-from labgrader.checker.cell import Cell
 from labgrader.course import asked, of_topic, topics
 from labgrader.file_check import check_file, is_lab, topic_of
-from labgrader.running import running_file
+from labgrader.program.cell import Cell
+from labgrader.program.open_notebook import running_file
 
 TOPIC = "04_iou"
 ANSWERS = len(of_topic(TOPIC))

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from labgrader import course
-from labgrader.checker.judge import judge
 from labgrader.languages import translated
+from labgrader.reply.judge import judge
 
 QUESTIONS = Path(__file__).parents[2] / "labcourse" / "questions"
 FILES = sorted(QUESTIONS.rglob("*.de.toml"))

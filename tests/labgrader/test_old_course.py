@@ -21,10 +21,10 @@ from labcourse import plots
 from labcourse.explorers import iou
 from labgrader.course import asked, find, of_topic
 from labgrader.file_check import check_file
-from labgrader.grading.grade import Grading
-from labgrader.grading.gradebook import opened
-from labgrader.grading.reading import read_lab, read_submission
-from labgrader.grading.run import grade_course
+from labgrader.grade.grade import Grading
+from labgrader.grade.gradebook import opened
+from labgrader.grade_course import grade_course
+from labgrader.handin.reading import read_lab, read_submission
 from labkit.course import MOVED
 
 TOPIC, WRITTEN = "04_iou", "accuracy_and_iou"
@@ -78,7 +78,7 @@ def test_nbgraders_configuration_of_then_names_classes_that_are_there(old):
     }.items():
         written = config[application][trait]
         assert written == f"labkit.course.grading.{name}"
-        assert import_item(written).__module__.startswith("labgrader.grading.")
+        assert import_item(written).__module__.startswith("labgrader.")
 
 
 def test_what_notebooks_of_then_import_is_the_same_as_at_its_new_address():

@@ -26,7 +26,7 @@ metadata = "sums"
 QUESTION = '''
 import numpy as np
 
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def {name}(values):
@@ -53,7 +53,7 @@ from pathlib import Path
 
 from sums import check
 from labgrader.file_check import check_file
-from labgrader.grading.run import grade_course
+from labgrader.grade_course import grade_course
 from labgrader.release import release
 
 topic, course = "01_adding", Path(".")

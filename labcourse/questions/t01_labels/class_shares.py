@@ -6,7 +6,7 @@ import numpy as np
 
 from labcourse.kinds import LONG, MOST_CLASSES, count, labels
 from labcourse.questions.t01_labels import images_and_classes
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def class_shares(y, C):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t01_labels import images_and_classes
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def one_hot(y, C):

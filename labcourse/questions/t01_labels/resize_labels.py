@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def resize_labels(y, height, width):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t02_crf import PAIRS, disagreeing, labelled_model, unary_part
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def energy(y, psi, weights):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t02_crf import PAIRS, labelled_model
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def icm_costs(y, psi, weights, v, u):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t02_crf import PAIRS
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def pair_weights(image, lam, sigma_I, sigma_p):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t02_crf import model
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def terminal_capacities(psi, known, large):

@@ -11,7 +11,7 @@ from labcourse.questions.t03_gradient import (
     softmax_over_classes,
     targets,
 )
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def cross_entropy(z, y, s):

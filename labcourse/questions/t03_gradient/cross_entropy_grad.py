@@ -10,7 +10,7 @@ from labcourse.questions.t03_gradient import (
     softmax_over_pixels,
     targets,
 )
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def cross_entropy_grad(z, y, s):

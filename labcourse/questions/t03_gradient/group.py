@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t03_gradient import grouped, pointing, random_places
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def group(foreground, votes, cell, least):

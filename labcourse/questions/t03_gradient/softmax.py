@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t03_gradient import SURE, TOY, random_possible_classes, softmax_over_classes
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def softmax(z, possible):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t03_gradient import TOUCHING, random_votes, scored
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def votes_loss(votes, instances, beta):

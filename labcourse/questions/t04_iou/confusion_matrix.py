@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def confusion_matrix(y_true, y_pred, num_classes, ignore):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t04_iou import SMALL_COUNTS, counts, divide, iou_of, parts
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def iou(n):

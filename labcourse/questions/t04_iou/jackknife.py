@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t04_iou import counts_of_frames, divide, iou_of, parts
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def jackknife(n_frames):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t05_class_weights import SURE, TOY, draw_shares, some_labels, some_logits
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def adjusted_grad(z, y, shares, tau):

@@ -4,7 +4,7 @@ import numpy as np
 
 from labcourse.questions.t03_gradient import EPSILONS
 from labcourse.questions.t05_class_weights import draw_shares, draw_weights, some_logits
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def change_prior(z, w, shares, new_shares):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t05_class_weights import SURE, draw_shares, draw_weights, some_logits
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def find_shares(z, w, shares, rounds):

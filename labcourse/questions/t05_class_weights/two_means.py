@@ -4,7 +4,7 @@ import numpy as np
 
 from labcourse.questions.t03_gradient import EPSILONS
 from labcourse.questions.t05_class_weights import SURE, TOY, draw_pixels
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def two_means(z, y, w):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t06_back_projection import K_SMALL, K_of, camera
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def back_project(depth, K, along_ray):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t06_back_projection import camera
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def cropped_intrinsics(K, left, top, scale):

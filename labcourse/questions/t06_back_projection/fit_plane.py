@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t06_back_projection import pose
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def fit_plane(P, sigma):

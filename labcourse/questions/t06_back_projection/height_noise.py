@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t06_back_projection import K_SMALL, columns, pixel, pose, straight_ahead
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t07_grasp import cloud
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def grasp_height(P, table_z, palm, tips, clearance):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t07_grasp import FACING_X, leaning_grasp
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def slip_across(T_base_grasp, middle):

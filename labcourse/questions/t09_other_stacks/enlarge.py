@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.questions.t01_labels.resize_labels import copied, labels_and_sizes
-from labgrader.checker.question import Question, holds, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def enlarge(labels, size):

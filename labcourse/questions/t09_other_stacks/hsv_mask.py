@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labgrader.checker.question import Question, wrong
+from labgrader.question import Question, wrong
 
 
 def hsv_mask(hsv, lower, upper):

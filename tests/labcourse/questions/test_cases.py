@@ -14,14 +14,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from labgrader.checker.comparison import Problem, compare, expected_cases, trusted
-from labgrader.checker.judge import judge, output_of
-from labgrader.checker.live_program import LiveProgram
-from labgrader.checker.program import Program
+from labgrader.comparison import Problem, compare, expected_cases, trusted
 from labgrader.course import find, of_topic, topics
-from labgrader.grading.grade import secret_cases
-from labgrader.worker import plain
-from labgrader.worker.answer import Answer, Limits, public_cases
+from labgrader.grade.grade import secret_cases
+from labgrader.program.live import LiveProgram
+from labgrader.program.slice import Program
+from labgrader.reply.judge import judge, output_of
+from labgrader.run import plain
+from labgrader.run.run import Answer, Limits, public_cases
 
 pytestmark = pytest.mark.bad_input  # as outside the suite
 DATA = Path(__file__).parents[2] / "data"

@@ -15,8 +15,8 @@ from notebooks import ROOT, code
 from promises import Trial, examples, is_a_case, unsaid
 
 from labcourse import kinds
-from labgrader.checker.question import Question
 from labgrader.course import course, find, of_topic, topics
+from labgrader.question import Question
 
 pytestmark = pytest.mark.bad_input  # as outside the suite
 

@@ -13,8 +13,8 @@ from notebooks import ROOT, notebook
 
 from labcourse.questions.t07_grasp import cloud
 from labcourse.stacks import regions
-from labgrader.checker.judge import judge
 from labgrader.course import find
+from labgrader.reply.judge import judge
 from labkit import geometry, grasp, labels, losses, metrics
 from labkit.crf import PottsCRF
 from labkit.grasp.planner import HAND_MARGIN, TIP_CLEARANCE

@@ -1,0 +1,123 @@
+"""Who is late, and what it costs: deadlines and extensions in course.toml.
+
+    [[deadline]]
+    lab = "04_iou"
+    due = 2026-10-05T23:59:00    # local time, if no offset follows; a date alone means its end
+    grace_minutes = 15
+    penalty_per_day = 10         # percent of the points that were earned, for each day that was begun
+
+    [[extension]]
+    lab = "04_iou"
+    student = "Ada Lovelace_1234567"    # or the number alone
+    due = 2026-10-12T23:59:00           # or late_days = 0: so many days, whatever the clock says
+    reason = "ill"
+
+A platform that says only that somebody is late (Canvas) is believed, and one day is counted.
+"""
+
+import datetime
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from labgrader.grade.settings import fault_of_fields, read_blocks
+from labgrader.handin.roster import keys_of
+from labgrader.support import counted
+
+DAY_S = 86400.0
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """How late work is, and what it costs. guessed: whether nobody knows more than that it is late.
+
+    free: days that cost nothing, of those that a student has in the whole course.
+    """
+
+    days: int = 0
+    percent: float = 0.0
+    guessed: bool = False
+    free: int = 0
+
+    def __str__(self) -> str:
+        if not self.days:
+            return ""
+        guessed = ", as its platform marks it late and does not say by how much" if self.guessed else ""
+        free = f", {self.free} of the free days" if self.free else ""
+        return f"{counted(self.days, 'day')} late{free}, {self.percent:g} % less{guessed}"
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """The deadline of a lab, and extensions by student. due: in UTC, without a zone, as nbgrader has it."""
+
+    due: datetime.datetime
+    grace_minutes: float = 0.0
+    penalty_per_day: float = 0.0
+    extensions: dict[str, dict] = field(default_factory=dict)
+
+    def due_for(self, student: str) -> datetime.datetime:
+        """When a student's work is due."""
+        return self.extension(student).get("due", self.due)
+
+    def extension(self, student: str) -> dict:
+        """A student's extension, {} for none."""
+        return next((self.extensions[key] for key in keys_of(student) if key in self.extensions), {})
+
+    def lateness(self, student: str, handed_in: datetime.datetime | None, marked: bool = False) -> Lateness:
+        """How late a student is; handed_in: in UTC, None if unknown; marked: whether the platform calls it late."""
+        extension = self.extension(student)
+        if "late_days" in extension:
+            days, guessed = math.ceil(extension["late_days"]), False
+        elif handed_in is not None:
+            seconds, guessed = (handed_in - self.due_for(student)).total_seconds(), False
+            days = math.ceil(seconds / DAY_S) if seconds > 60.0 * self.grace_minutes else 0
+        else:
+            days, guessed = int(marked), marked
+        return Lateness(days, min(100.0, days * self.penalty_per_day), guessed)
+
+    def with_free(self, late: Lateness, free: int) -> Lateness:
+        """The same lateness when some of its days are free."""
+        return replace(late, free=free, percent=min(100.0, (late.days - free) * self.penalty_per_day))
+
+
+def read_deadline(course: Path, topic: str) -> Deadline | None:
+    """The deadline of a lab in course.toml, None if there is none; ValueError, with its line, for what cannot be."""
+    extensions: dict[str, dict] = {}
+    for where, data in read_blocks(course, "extension"):
+        needed = {"lab": str, "student": str, "reason": str}
+        fault = fault_of_fields(data, needed, {"due": datetime.date, "late_days": float})
+        if not fault and ("due" in data) == ("late_days" in data):
+            fault = "expected one of due = DATE and late_days = NUMBER in this block"
+        if not fault and data["lab"] == topic and data["student"] in extensions:
+            fault = f"student: {data['student']} has an extension above"
+        if fault:
+            raise ValueError(f"{where}: {fault}")
+        if data["lab"] == topic:
+            extensions[data["student"]] = data | ({"due": in_utc(data["due"])} if "due" in data else {})
+    found = None
+    for where, data in read_blocks(course, "deadline"):
+        needed = {"lab": str, "due": datetime.date}
+        fault = fault_of_fields(data, needed, {"grace_minutes": float, "penalty_per_day": float})
+        if not fault and data["lab"] == topic and found is not None:
+            fault = f"lab: {topic} has a deadline above"
+        if fault:
+            raise ValueError(f"{where}: {fault}")
+        if data["lab"] == topic:
+            numbers = {name: float(value) for name, value in data.items() if name not in needed}
+            found = Deadline(in_utc(data["due"]), **numbers, extensions=extensions)
+    return found
+
+
+def in_utc(when: datetime.date) -> datetime.datetime:
+    """A date or time of TOML, local where it names no offset, in UTC and without a zone."""
+    if not isinstance(when, datetime.datetime):
+        when = datetime.datetime.combine(when, datetime.time(23, 59, 59))
+    return when.astimezone(datetime.UTC).replace(tzinfo=None)
+
+
+def strangers(deadline: Deadline | None, students: Collection[str]) -> list[str]:
+    """The names in extensions that none of the students has."""
+    known = {key for student in students for key in keys_of(student)}
+    return sorted(set(deadline.extensions) - known) if deadline else []

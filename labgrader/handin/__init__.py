@@ -1,0 +1,7 @@
+"""What comes in: zips, an exchange, a roster, notebooks of strangers.
+
+collect   whose a file is in the zip of a learning platform
+exchange  what `nbgrader collect` takes from a hub's exchange
+reading   a released lab and the submissions of it, read as data of strangers
+roster    names and emails
+"""

@@ -1,0 +1,287 @@
+"""Reading a released lab, which is the instructor's, and submissions of it, which are anybody's.
+
+A submission is bytes of a stranger: its place is looked at before it is opened, its size before it is read, how many
+values it holds before it is parsed, and all that is taken from it is the source of its code cells, in their order, and
+of the cells that carry one of the lab's grade ids, what it says of its release, and nbgrader's two texts beside it. Its
+tests decide nothing, its points and its outputs are not looked at. Each file is read once, so that what is graded is
+what is shown, whatever happens to the file meanwhile.
+"""
+
+import hashlib
+import json
+import os
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from labgrader.course import asked, of_topic
+from labgrader.course import course as course_here
+from labgrader.program.cell import Cell
+from labgrader.program.notebook import LARGEST_NOTEBOOK, MOST_SOURCE, Unreadable, code_of, parse
+
+LONGEST_NAME = 220  # bytes: the names of a student's pages are longer, and no file's has more than 255
+LONGEST_SHOWN = 60  # characters of a name that will not do
+MOST_NAMED = 3  # files that are named in the place of one that is not there
+BESIDE = ("timestamp.txt", "submission_secret.txt")  # nbgrader's
+ODD_NAME = "odd-name-"
+# What pages, scripts, shells, addresses, other file systems or spreadsheets would read as more than a letter of a name.
+UNSAFE_IN_NAMES = frozenset('<>"`/\\:*?|;%')
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A released lab. answers: source of each blank by its grade id; points: what each is worth, by the same.
+
+    written: grade ids of the answers that a person grades. tasks: what names each task as it was released. notebook:
+    all of it, as JSON has it; digest: of the file.
+    """
+
+    topic: str
+    answers: dict[str, str]
+    points: dict[str, float]
+    written: tuple[str, ...]
+    tasks: dict[str, str]
+    notebook: dict
+    digest: str
+
+
+@dataclass(frozen=True)
+class Submission:
+    """What a student handed in. code: all code cells; cells: source by grade id, of the answers and the written ones.
+
+    reason: why it cannot be graded; "" if it can. outdated: tasks that were other ones in the lab that the student had,
+    with the version of the kit that released it. timestamp and secret: what nbgrader's timestamp.txt and
+    submission_secret.txt beside the notebook say; nbgrader gives feedback back by them. file: the notebook's name, if
+    it is another one than the lab's.
+    """
+
+    student: str
+    code: tuple[Cell, ...] = ()
+    cells: dict[str, str] = field(default_factory=dict)
+    reason: str = ""
+    digest: str = "unreadable"
+    outdated: dict[str, str] = field(default_factory=dict)
+    timestamp: str = ""
+    secret: str = ""
+    file: str = ""
+
+
+def read_lab(course: Path, topic: str) -> Lab:
+    """Read course/labs/TOPIC/TOPIC.ipynb.
+
+    Raises ValueError if it is not a released lab of that topic.
+    """
+    questions = of_topic(topic)
+    path = Path(course) / "labs" / topic / f"{topic}.ipynb"
+    if not path.is_file():
+        mend = f"`{course_here().command} release {topic}` makes it"
+        raise ValueError(f"topic: expected a released lab at {path}; {mend}")
+    data = path.read_bytes()
+    notebook = json.loads(data)
+    for cell in notebook["cells"]:
+        cell["source"] = source_of(cell)
+    cells = {grade_id(cell): cell for cell in notebook["cells"] if grade_id(cell)}
+    marks = {name: cell["metadata"]["nbgrader"] for name, cell in cells.items()}
+    answers = {name: source_of(cells[name]) for name in marks if name in questions and marks[name].get("solution")}
+    expected = released_by(notebook)[1] or asked(topic)  # a lab has the blanks that it was released with
+    lacking = [name for name in expected if name not in answers or f"check_{name}" not in cells]
+    if lacking:
+        raise ValueError(f"{path}: expected an answer and tests of each question, lacks {', '.join(lacking)}")
+    points = {name: float(marks[f"check_{name}"]["points"]) for name in answers}
+    written = tuple(name for name, mark in marks.items() if mark.get("grade") and mark.get("solution"))
+    digest = hashlib.sha256(data).hexdigest()
+    return Lab(topic, answers, points, written, released_by(notebook)[1], notebook, digest)
+
+
+def released_by(notebook: dict) -> tuple[str, dict[str, str]]:
+    """The version of the kit that released a notebook, and what names its tasks; ("", {}) if it does not say.
+
+    >>> released_by({"metadata": {course_here().metadata: {"version": "0.1.0", "tasks": {"iou": "5c0e"}}}})
+    ('0.1.0', {'iou': '5c0e'})
+    """
+    try:
+        mark = notebook["metadata"][course_here().metadata]
+        version, tasks = str(mark["version"])[:20], dict(mark["tasks"])
+    except (TypeError, KeyError, ValueError):
+        return "", {}
+    good = version.isascii() and version.isprintable() and all(isinstance(task, str) for task in tasks.values())
+    return (version, tasks) if good else ("", {})
+
+
+# -------------------------------------------------------------------------------------------------- submissions
+
+
+def read_submissions(folder: Path, lab: Lab) -> list[Submission]:
+    """Read what is in a folder of students' folders, by their names; each file once.
+
+    A student who handed in nothing of this topic is passed over, and so is what begins with a dot and holds nothing of
+    it. What a student put there never raises; ValueError says that there is no such folder.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ValueError(f"submissions: expected a folder of students' folders, got {folder}")
+    names = sorted((entry.name for entry in os.scandir(folder)), key=os.fsencode)
+    names = [name for name in names if not name.startswith(".") or os.path.isdir(folder / name / lab.topic)]
+    read = [read_submission(folder / name, lab) for name in names]
+    return [submission for submission in read if submission is not None]
+
+
+def read_submission(place: Path, lab: Lab) -> Submission | None:
+    """Read what a student's folder holds of a lab, None if it has no folder of it; never raises for what it holds."""
+    student, digest = name_of(place.name), "unreadable"
+    try:
+        notebook = find_notebook(place, lab.topic)
+        if notebook is None:
+            return None
+        data = read_bytes(notebook, LARGEST_NOTEBOOK)
+        digest = hashlib.sha256(data).hexdigest()
+        content = parse(data)
+        other = "" if notebook.stem == lab.topic else printable(notebook.name)
+        if other and not is_copy_of(content, lab):
+            raise Unreadable(f"the folder {lab.topic} holds no {lab.topic}.ipynb, and {other} is no copy of that lab")
+        code, cells = pick_cells(content["cells"], lab)
+    except Unreadable as reason:
+        return Submission(student, reason=str(reason), digest=digest)
+    except Exception as error:  # of one student's folder: the others are read all the same
+        why = getattr(error, "strerror", None) or type(error).__name__
+        return Submission(student, reason=f"it cannot be opened: {why}", digest=digest)
+    beside = text_of(notebook.with_name("timestamp.txt")), text_of(notebook.with_name("submission_secret.txt"))
+    return Submission(student, code, cells, "", digest, outdated(content, lab), *beside, other)
+
+
+def outdated(notebook: dict, lab: Lab) -> dict[str, str]:
+    """The tasks that were other ones in the notebook that a student got, with the version that released it."""
+    version, tasks = released_by(notebook)
+    return {name: version for name in lab.answers if name in tasks and tasks[name] != lab.tasks.get(name)}
+
+
+def text_of(path: Path) -> str:
+    """The text of a small file beside a notebook, "" if there is none that can be read."""
+    try:
+        return read_bytes(path, 200).decode().strip()
+    except (OSError, UnicodeDecodeError, Unreadable):
+        return ""
+
+
+def find_notebook(place: Path, topic: str) -> Path | None:
+    """The notebook in a student's folder, None if there is no folder of this topic; follows no link.
+
+    Where none has the lab's name and there is one notebook alone, it is that one.
+    """
+    if not is_folder(place, "the student's folder"):
+        raise Unreadable(f"not in a student's folder; expected STUDENT/{topic}/{topic}.ipynb")
+    if fault := fault_of(place.name):
+        raise Unreadable(f"rename the student's folder {printable(place.name)}: {fault}")
+    if not is_folder(place / topic, f"the folder {topic}"):
+        return None
+    notebook = place / topic / f"{topic}.ipynb"
+    mode = mode_of(notebook)
+    if mode is None:
+        names = sorted(entry.name for entry in os.scandir(place / topic) if not entry.name.startswith("."))
+        others = [name for name in names if name.endswith(".ipynb")]
+        if len(others) != 1:
+            names = [printable(name) for name in (others or names) if name not in BESIDE]
+            there = ", ".join(names[:MOST_NAMED]) + (", ..." if len(names) > MOST_NAMED else "")
+            mend = f"it holds {there}; rename the one to be graded" if there else "it is empty"
+            raise Unreadable(f"the folder {topic} holds no {topic}.ipynb: {mend}")
+        notebook = notebook.with_name(others[0])
+        mode = mode_of(notebook)
+    if mode is None or not stat.S_ISREG(mode):
+        what = "no file" if mode is None or not stat.S_ISLNK(mode) else "a symbolic link"
+        raise Unreadable(f"{printable(notebook.name)} is {what}")
+    return notebook
+
+
+def printable(name: str) -> str:
+    """The beginning of a stranger's name for a file, as a table and a terminal may show it."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name[:LONGEST_SHOWN])
+
+
+def is_copy_of(notebook: dict, lab: Lab) -> bool:
+    """Whether a notebook is the lab by its own mark or by its cells' grade ids, whatever the file's name."""
+    tasks = released_by(notebook)[1]
+    ids = {name for name in map(grade_id, notebook["cells"]) if name}
+    return bool(tasks and tasks.keys() <= lab.tasks.keys()) or bool(ids & {*lab.answers, *lab.written})
+
+
+def fault_of(name: str) -> str:
+    """What of a folder's name would not do in a page, a table, a terminal or as a file; "" if it may name a student.
+
+    >>> fault_of("Zoë O'Brien & Co."), fault_of("two\\nlines")
+    ('', "it holds '\\\\n'")
+    """
+    for character in name:
+        if character in UNSAFE_IN_NAMES or not character.isprintable():
+            return f"it holds {character!a}"
+    if name != name.strip():
+        return "it begins or ends with a space"
+    if name.startswith((".", ODD_NAME)):
+        return f"it begins with {'a dot' if name[0] == '.' else ODD_NAME}"
+    size = len(os.fsencode(name))
+    return f"it is {size} bytes long, at most {LONGEST_NAME} are possible" if size > LONGEST_NAME else ""
+
+
+def name_of(name: str) -> str:
+    """A student's name: the folder's, or one that is made of an odd one's bytes, so that no two are the same."""
+    return ODD_NAME + hashlib.sha256(os.fsencode(name)).hexdigest()[:12] if fault_of(name) else name
+
+
+def is_folder(path: Path, what: str) -> bool:
+    """Whether there is a folder; a link in its place is Unreadable."""
+    mode = mode_of(path)
+    if mode is not None and stat.S_ISLNK(mode):
+        raise Unreadable(f"{what} is a symbolic link")
+    return mode is not None and stat.S_ISDIR(mode)
+
+
+def mode_of(path: Path) -> int | None:
+    """Kind of what is at a path, a link itself; None if there is nothing."""
+    try:
+        return os.lstat(path).st_mode
+    except FileNotFoundError:
+        return None
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """Read a file that is no link and no longer than it may be."""
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    with open(os.open(path, flags), "rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise Unreadable(f"it is larger than {most >> 20} MB")
+    return data
+
+
+def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]:
+    """The code cells, and by grade id the sources that the lab asks for; where several have one, all of them."""
+    code = tuple(Cell(plain_text(cell.source), cell.grade_id) for cell in code_of(cells))
+    texts = {name: {} for name in (*lab.answers, *lab.written)}
+    for cell in cells:
+        name = grade_id(cell)
+        if name in texts and (text := source_of(cell)) is not None:
+            texts[name][text[:MOST_SOURCE]] = None
+    if not any(texts.values()) and not any(f"def {name}" in cell.source for name in lab.answers for cell in code):
+        raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
+    return code, {name: "\n\n".join(found) for name, found in texts.items() if found}
+
+
+def grade_id(cell: object) -> str | None:
+    """The grade id of a cell, None if it has none or is none."""
+    try:
+        name = cell["metadata"]["nbgrader"]["grade_id"]
+    except (TypeError, KeyError):
+        return None
+    return name if isinstance(name, str) else None
+
+
+def source_of(cell: dict) -> str | None:
+    """The source of a cell, which may be text or a list of lines; None if it is neither."""
+    source = cell.get("source")
+    if isinstance(source, list) and all(isinstance(line, str) for line in source):
+        source = "".join(source)
+    return plain_text(source) if isinstance(source, str) else None
+
+
+def plain_text(text: str) -> str:
+    """A text without halves of characters, which JSON can hold and files cannot."""
+    return text.encode("utf-8", "replace").decode()

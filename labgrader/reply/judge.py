@@ -1,0 +1,149 @@
+"""The verdict on an answer: from the outputs of all cases, however they were computed, to words for its student.
+
+    cases = expected_cases(question, seed)     keep them where no answer can see them
+    verdict(question, cases, outputs)          outputs by any way: a value that `plain` takes, or a Problem in its place
+
+A student's answer runs in a worker (`labgrader.run.run`), and a Problem stands where no value came back. `judge`
+calls a function that is trusted in this process: that of a question's author.
+"""
+
+import copy
+import linecache
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from labgrader.comparison import Case, Problem, compare, expected_cases, plain, quiet
+from labgrader.program.live import altered, own_entry
+from labgrader.question import Question
+from labgrader.reply.finding import Finding
+from labgrader.reply.messages import shown_case
+from labgrader.reply.sentences import Sentence, at_once, diagnose
+
+# What is told first: that it does not run, then its type, its shape, its values, and what it does to its arguments.
+STAGES = ("unanswered", "exception", "time", "kind", "length", "dtype", "shape", "finite", "values", "altered")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The result of all cases of a question.
+
+    problem: None if the answer passes; case: the number of the case that has it, from 0, and `where` says it in words.
+    question: None where no case was judged, and there is no hint. notes: what else is wrong, arguments that it changes.
+    cases, outputs: what it was made of. pieces: the program, and findings: what instruments and repair know about it,
+    once somebody has looked.
+    """
+
+    problem: Problem | None
+    case: int | None
+    where: str
+    question: Question | None = None
+    notes: tuple[str, ...] = ()
+    cases: Sequence[Case] = ()
+    outputs: Sequence[object] = ()
+    pieces: Sequence[tuple[str, str]] = ()
+    findings: Sequence[Finding] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every case is right."""
+        return self.problem is None
+
+    @cached_property
+    def sentence(self) -> Sentence | None:
+        """The surest thing that is true of a wrong answer; looked for when it is asked for."""
+        if self.problem is None or self.question is None or self.problem.kind == "unanswered":
+            return None
+        return diagnose(self.question, self.cases, self.outputs, self.pieces, self.findings)
+
+    @property
+    def needs_a_look(self) -> bool:
+        """Whether a wrong answer runs, and no sentence names its mistake without a look at its program."""
+        if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "time"):
+            return False
+        return at_once(self.question, self.cases, self.outputs) is None
+
+    @property
+    def hint(self) -> str | None:
+        """What `sentence` says, None if there is none."""
+        return self.sentence.says if self.sentence else None
+
+    @cached_property
+    def shown(self) -> tuple[str, ...]:
+        """Lines that show the call of the case, and what came and what was expected where they first differ."""
+        if self.problem is None or self.question is None or self.case is None:
+            return ()
+        return shown_case(self.question, self.cases[self.case], self.outputs[self.case])
+
+
+def verdict(
+    question: Question, cases: Sequence[Case], outputs: Sequence[object], altered: frozenset[int] = frozenset()
+) -> Verdict:
+    """Compare the outputs of all cases, and find what should be told first.
+
+    altered: positions of the arguments that the answer altered: then it is not right, since its caller needs them.
+    """
+    problems = [
+        got if isinstance(got, Problem) else compare(question, case.expected, got)
+        for case, got in zip(cases, outputs, strict=True)
+    ]
+    changed = tuple(f"it changes its argument {question.parameters[i]}: work on a copy" for i in sorted(altered))
+    told = [(stage(problem), i) for i, problem in enumerate(problems) if problem]
+    if not told:
+        problem = Problem("altered", f"{changed[0]}; what calls it still needs the old values") if changed else None
+        return Verdict(problem, None, "all cases" if changed else "", question, (), cases, outputs)
+    _, first = min(told)
+    by_hand = sum(case.by_hand for case in cases)
+    here, number, of = ("case by hand", first + 1, by_hand)
+    if first >= by_hand:
+        here, number, of = ("random case", first + 1 - by_hand, len(cases) - by_hand)
+    return Verdict(problems[first], first, f"{here} {number} of {of}", question, changed, cases, outputs)
+
+
+def stage(problem: Problem) -> int:
+    """How early a problem is told; any kind that STAGES does not name comes with the exceptions."""
+    return STAGES.index(problem.kind if problem.kind in STAGES else "exception")
+
+
+# ------------------------------------------------------------------------------------------ a trusted function
+
+
+def judge(question: Question, answer: Callable, seed: int) -> Verdict:
+    """Call a trusted answer on the cases that belong to a seed, here, and tell the first problem, if there is one.
+
+    >>> double = Question(name="0.double", reference=lambda x: 2 * x, inputs=lambda rng: (rng.random(3),))
+    >>> judge(double, lambda x: x + x, seed=0).passed
+    True
+    >>> judge(double, lambda x: (2 * x)[:, None], seed=0).problem.says
+    'expected shape (3,), got (3, 1)'
+    """
+    cases = expected_cases(question, seed)
+    return verdict(question, cases, *outputs_of(answer, [case.args for case in cases]))
+
+
+def outputs_of(answer: Callable, arguments: Sequence[tuple]) -> tuple[list, frozenset[int]]:
+    """Call a trusted answer on copies of each tuple of arguments.
+
+    Returns for each what `plain` makes of its output, or a Problem with its exception; and the positions of the
+    arguments that it altered.
+    """
+    outputs, changed = [], set()
+    for args in arguments:
+        given = copy.deepcopy(args)
+        outputs.append(output_of(answer, given))
+        changed |= {*altered(args, given)}
+    return outputs, frozenset(changed)
+
+
+def output_of(answer: Callable, args: tuple) -> object:
+    """`plain` of an output, or a Problem with the exception and the line of the answer that led to it."""
+    try:
+        with quiet():
+            return plain(answer(*args))
+    except Exception as error:
+        code = getattr(answer, "__code__", None)
+        entry, last = own_entry(error.__traceback__, () if code is None else (code.co_filename,))
+        if isinstance(error, NotImplementedError) and last:
+            return Problem("unanswered", "not answered yet")
+        line = (entry.tb_lineno, linecache.getline(code.co_filename, entry.tb_lineno).strip()) if entry else None
+        return Problem("exception", f"{type(error).__name__}: {error}", (line,) if line else ())

@@ -1,0 +1,350 @@
+"""Repair: the place of a student's own program that, written otherwise, makes every case right; or two such places.
+
+    repairs(pieces, "iou", cases, fresh, right)      what was found, the best first
+
+Every mutation of the program (`mutation`) runs on the cases until one is wrong. What survives is right on every public
+case and on fresh ones, drawn wider, so that what is said about its place is true. Where none survives, a mutation is
+told with which the program gives what a listed mistake gives, since then both are known; or else mutations that make
+some numbers right and none wrong are each tried together with a second one (`two_repairs`). The mutated text is never
+shown: a student reads where to look, and is asked what belongs there.
+
+Of several repairs the nearest to what the student wrote is told: the one that changes the fewest nodes, of these the
+kind that stands first in `finding.REPAIRS`, of these the one that marks least.
+
+Numbers limit the search, so that all machines find the same; the clock is a safety net. Mutated programs may do
+anything: this runs in a worker (`labgrader.run`).
+"""
+
+import ast
+import contextlib
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labgrader.comparison import parts, quiet
+from labgrader.program.live import LiveProgram, defines
+from labgrader.reply.alarm import TimeIsUp, alarm, limited
+from labgrader.reply.finding import REPAIRS, Finding
+from labgrader.reply.mutation import Mutation, mutations
+
+RANK = {kind: number for number, kind in enumerate(REPAIRS)}
+MOST_MUTATIONS = 6000  # of one program
+MOST_FIRSTS = 4  # mutations with which others are tried together
+MOST_SECONDS = 1000  # others that are tried together with the best first one; half as many with the next one ...
+MOST_GAINERS = 60  # second ones that are tried because they make something right themselves
+DEAREST_OF_TWO = 2.0  # nodes that each of two changes at most
+MOST_S = 4.0  # CPU seconds of the whole search: then what has been found is told, if there is something
+MOST_S_OF_ALL = 2.0  # for all cases once: of a program that takes longer, too few mutations could be tried
+CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
+MORE_COST = 0.5  # repairs that change so much more than the smallest are looked for, too
+LEFT_OUT = (
+    "line too many",
+    "too much",
+    "call too many",
+    "moved",
+)  # what a mistake beside which is no mistake of its own
+PROBES = 4  # wrong cases on which it is seen what a mutation makes right
+
+Cases = Sequence[tuple[tuple, object]]  # (arguments, expected) each
+Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
+
+
+class SearchIsOver(Exception):
+    """Raised when the time of the whole search is up."""
+
+
+ENDS = (Exception, SystemExit, KeyboardInterrupt, TimeIsUp)  # how a student's program may end
+
+
+@dataclass(frozen=True)
+class Search:
+    """A program, and how its outputs are judged. end: of the search, in CPU seconds of this process.
+
+    right: function (expected, got) -> bool; entries: function (expected, got) -> which of its numbers are right, None
+    for an output of another form. listed: what the question's listed mistakes give in each case, as `Listed`.
+    """
+
+    program: LiveProgram
+    right: Callable[[object, object], bool]
+    entries: Callable[[object, object], np.ndarray | None]
+    end: float
+    listed: "dict[int, Listed]"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A mutation of one of the program's functions. piece: the number of the function's piece."""
+
+    piece: int
+    statement: ast.stmt
+    mutation: Mutation
+
+    @property
+    def rank(self) -> tuple[float, int, int]:
+        """What decides which of several repairs is told: the smallest."""
+        return self.mutation.cost, RANK[self.mutation.kind], self.finding.width
+
+    @property
+    def finding(self) -> Finding:
+        """The place and the kind of it."""
+        return Finding(self.mutation.kind, self.piece, self.mutation.spans)
+
+
+def weight(args: tuple) -> int:
+    """How much a case has to be worked on: numbers in its arrays."""
+    return sum(np.size(a) for a in args)
+
+
+def repairs(
+    pieces: Sequence[tuple[str, str]],
+    name: str,
+    cases: Cases,
+    fresh: Callable[[], Cases],
+    right: Callable[[object, object], bool],
+    entries: Callable[[object, object], np.ndarray | None],
+    listed: Sequence[Listed] = (),
+) -> list[Finding]:
+    """Find the places of a program whose mutation makes all cases right, the best first.
+
+    pieces: (label, text) of the program, as `program` cuts it; name: of its function. cases: (arguments, expected) of
+    the public cases; fresh: gives more of them, asked for once, when a mutation passes the public ones. right, entries:
+    as in `Search`; listed: one for each of the cases. Empty if there is none, or if the time is up.
+    """
+    with quiet():
+        try:
+            with limited(MOST_S):
+                program = LiveProgram(name, pieces)
+            of_cases = {id(case): told for case, told in zip(cases, listed, strict=False)}
+            search = Search(program, right, entries, time.process_time() + MOST_S, of_cases)
+            by_use = sorted_by_use(search, cases)
+            if time.process_time() > search.end - MOST_S + MOST_S_OF_ALL:
+                return []
+            trials = [Trial(k, statement, m) for k, statement in program.functions() for m in mutations(statement)]
+            trials.sort(key=lambda trial: trial.rank[:2])
+            firsts = Firsts(search, by_use)
+            more = Asked(fresh)
+            found, beside = one_repair(search, trials[:MOST_MUTATIONS], by_use, more, firsts)
+            return found or beside or two_repairs(search, trials, by_use, more, firsts)
+        except ENDS:  # nothing can be said about such a program
+            return []
+
+
+def sorted_by_use(search: Search, cases: Cases) -> list[tuple[tuple, object]]:
+    """The wrong cases first, of these the small ones; without those for which the program takes too long as it is."""
+    tried = [(case, *outcome(search, case[0])) for case in cases]
+    kept = [
+        (unaltered and search.right(case[1], got), weight(case[0]), case)
+        for case, got, unaltered in tried
+        if unaltered is not None
+    ]
+    return [case for *_, case in sorted(kept, key=lambda entry: entry[:2])]
+
+
+class Asked:
+    """More cases, asked for once, when they are needed."""
+
+    def __init__(self, ask: Callable[[], Cases]):
+        self.ask, self.cases = ask, None
+
+    def __call__(self) -> Cases:
+        if self.cases is None:
+            self.cases = list(self.ask())
+        return self.cases
+
+
+def one_repair(
+    search: Search, trials: Sequence[Trial], cases: Cases, more: Asked, firsts: "Firsts"
+) -> tuple[list[Finding], list[Finding]]:
+    """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs.
+
+    Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does.
+    """
+    found: dict[Finding, tuple] = {}  # with what decides which one is told first
+    beside: dict[Finding, tuple] = {}
+    before = rightness(search, cases)
+    with over_if(found, beside):
+        for trial in trials:
+            if found and trial.mutation.cost > min(found.values())[0] + MORE_COST:
+                break
+            if trial.finding in found:
+                continue
+            with tried(search, trial) as runs:
+                if runs and repaired(search, cases, more):
+                    found[trial.finding] = trial.rank
+                elif runs and not found and trial.mutation.cost <= DEAREST_OF_TWO:
+                    firsts.look(trial)
+                    number = listed_mistake(search, cases) if not leaves_out(trial.mutation) else None
+                    if number is not None and rightness(search, cases) > before:  # one mistake is less than two
+                        beside[replace(trial.finding, value=float(number), of_two=True)] = trial.rank
+    return sorted(found, key=found.get), sorted(beside, key=beside.get)[:1]
+
+
+def leaves_out(mutation: Mutation) -> bool:
+    """Whether a mutation takes something out, or puts a name into the place of a longer expression."""
+    return mutation.kind in LEFT_OUT or (mutation.kind == "name" and mutation.cost >= 2)
+
+
+def listed_mistake(search: Search, cases: Cases) -> int | None:
+    """The number of a listed mistake that gives in all cases what the program gives now; None if there is none."""
+    numbers: frozenset[int] | None = None
+    for case in cases:
+        given = search.listed.get(id(case), {}).get(fingerprint(outcome(search, case[0])[0]), frozenset())
+        numbers = given if numbers is None else numbers & given
+        if not numbers:
+            return None
+    return min(numbers) if numbers else None
+
+
+def rightness(search: Search, cases: Cases) -> float:
+    """How many cases are right, those in part counted by their share of right numbers."""
+    entries = [search.entries(expected, outcome(search, args)[0]) for args, expected in cases]
+    return sum(float(right.mean()) for right in entries if right is not None and right.size)
+
+
+def fingerprint(output: object) -> bytes:
+    """The numbers of an output, rounded, and its shape; of outputs that differ by rounding most have the same.
+
+    >>> fingerprint([1, 0.1 + 0.2]) == fingerprint(np.array([1.0, 0.3]))
+    True
+    """
+    try:
+        arrays = [np.asarray(part).astype(float) for part in parts(output)]
+    except (TypeError, ValueError):
+        return b""
+    return b"".join(bytes(str(a.shape), "ascii") + (np.round(a, 7) + 0.0).tobytes() for a in arrays)
+
+
+@contextlib.contextmanager
+def over_if(*found: dict) -> Iterator[None]:
+    """A search whose time is up ends with what it has found, if that is something."""
+    try:
+        yield
+    except SearchIsOver:
+        if not any(found):
+            raise
+
+
+@contextlib.contextmanager
+def tried(search: Search, trial: Trial) -> Iterator[bool]:
+    """The program is mutated inside of the block, which gets whether it can be compiled."""
+    namespace, name = search.program.namespace, defines(trial.statement)
+    original = namespace[name]
+    try:
+        with trial.mutation.applied():
+            yield compiled(search, trial.statement)
+    finally:
+        namespace[name] = original
+
+
+def compiled(search: Search, statement: ast.stmt) -> bool:
+    """Put a function as its tree is now into the program; whether that is possible."""
+    try:
+        search.program.replace(statement)
+        return True
+    except Exception:  # what cannot be compiled
+        return False
+
+
+def repaired(search: Search, cases: Cases, more: Asked) -> bool:
+    """Whether the program is right in all cases, and then in more."""
+    return all(passes(search, case) for case in cases) and all(passes(search, case) for case in more())
+
+
+def passes(search: Search, case: tuple[tuple, object]) -> bool:
+    """Whether the program is right in a case, and leaves its arguments alone; raises SearchIsOver at the end."""
+    output, unaltered = outcome(search, case[0])
+    return bool(unaltered) and search.right(case[1], output)
+
+
+def outcome(search: Search, args: tuple) -> tuple[object, bool | None]:
+    """The program's output, and whether its arguments are as before; (None, False) if it raises.
+
+    It is (None, None) if that takes too long, and raises SearchIsOver once the whole search does.
+    """
+    if alarm().now > search.end:
+        raise SearchIsOver
+    try:
+        with limited(CALL_S):
+            return search.program.call(args)
+    except TimeIsUp:
+        return None, None
+    except (Exception, SystemExit):
+        return None, False
+
+
+# ------------------------------------------------------------------------------------------------- two mistakes
+
+
+class Firsts:
+    """Mutations that make some numbers of wrong cases right and none of them wrong: perhaps one of two repairs."""
+
+    def __init__(self, search: Search, cases: Cases):
+        self.search = search
+        self.probes: list[tuple[tuple, object, bytes, np.ndarray]] = []  # a case, its output, which numbers are right
+        for args, expected in cases[:PROBES]:
+            output, _ = outcome(search, args)
+            entries = search.entries(expected, output)
+            if entries is None or not entries.all():
+                none = np.zeros(1, bool)
+                self.probes.append((args, expected, bits(output), none if entries is None else entries))
+        self.found: dict[bytes, tuple[int, Trial]] = {}  # by what they give: the best one, and how much it makes right
+
+    def look(self, trial: Trial) -> None:
+        """Keep a mutation, which is applied now, if it makes something right."""
+        gained, given = 0, []
+        for args, expected, before, right_before in self.probes:
+            output, unaltered = outcome(self.search, args)
+            given.append(bits(output))
+            if given[-1] == before:
+                continue
+            now = self.search.entries(expected, output) if unaltered else None
+            if now is None:
+                return
+            lost = right_before & ~now if right_before.shape == now.shape else right_before
+            if lost.any():
+                return
+            gained += int(now.sum()) - int(right_before.sum())
+        if gained > 0:
+            key = b"|".join(given)
+            if key not in self.found or trial.rank < self.found[key][1].rank:
+                self.found[key] = gained, trial
+
+    def best(self) -> list[Trial]:
+        """Those that make the most right, of these the nearest; one of those that give the same."""
+        ordered = sorted(self.found.values(), key=lambda entry: (-entry[0], entry[1].rank))
+        return [trial for _, trial in ordered[:MOST_GAINERS]]
+
+
+def bits(output: object) -> bytes:
+    """An output as bytes."""
+    parts = output if isinstance(output, tuple | list) else (output,)
+    return b",".join(np.asarray(part).tobytes() for part in parts)
+
+
+def two_repairs(search: Search, trials: Sequence[Trial], cases: Cases, more: Asked, firsts: Firsts) -> list[Finding]:
+    """Try second mutations beside each of the best first ones: the first of the nearest pair, as one of two.
+
+    Second ones are those that make something right themselves, then the smallest ones.
+    """
+    best = firsts.best()
+    seconds = [*best, *(trial for trial in trials if trial.mutation.cost <= DEAREST_OF_TWO)]
+    found: dict[Finding, tuple] = {}
+    for number, first in enumerate(best[:MOST_FIRSTS]):
+        with over_if(found), tried(search, first):
+            for second in seconds[: MOST_SECONDS >> number]:
+                if overlap(first, second):
+                    continue
+                with tried(search, second) as runs:
+                    if runs and repaired(search, cases, more):
+                        pair = first.mutation.cost + second.mutation.cost, first.rank, second.rank
+                        found[replace(first.finding, of_two=True)] = pair
+                        break
+    return sorted(found, key=found.get)[:1]
+
+
+def overlap(first: Trial, second: Trial) -> bool:
+    """Whether two mutations change the same place."""
+    places = {(id(place.parent), place.field, place.index) for place in first.mutation.places}
+    return any((id(place.parent), place.field, place.index) in places for place in second.mutation.places)

@@ -1,0 +1,96 @@
+"""One look at the program of a wrong answer, in its worker: instruments first, then repair."""
+
+import inspect
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from labgrader.comparison import (
+    Case,
+    Problem,
+    as_expected,
+    canonical,
+    compare,
+    differences,
+    parts,
+    plain,
+    trusted,
+)
+from labgrader.question import PUBLIC_SEED, Question
+from labgrader.reply.finding import write
+from labgrader.reply.idle import idle
+from labgrader.reply.repair import Listed, repairs
+from labgrader.reply.watches import readings
+
+MOST_REPAIRS = 4  # that are told of
+FRESH = 50  # cases beside those that a check shows
+COMPARING = ("name", "rtol", "atol", "same_dtype")  # the fields of a Question by which outputs are compared
+
+Pairs = Sequence[tuple[tuple, object]]  # the arguments of cases, and what is expected
+
+
+class Job:
+    """A look at the program of the function `name`, where the question is not: a worker runs a student's lines.
+
+    comparing, canonical: what `comparing_of` gives; pieces: the program; public, listed: as `repairs` takes them.
+    """
+
+    def __init__(
+        self,
+        comparing: dict,
+        canonical: str,
+        name: str,
+        pieces: Sequence[tuple[str, str]],
+        public: Pairs,
+        listed: Sequence[Listed] = (),
+    ):
+        self.question = Question(reference=None, inputs=None, **comparing)
+        self.name, self.pieces, self.public, self.listed = name, pieces, public, listed
+        if canonical:
+            namespace = {"np": np}
+            exec(canonical, namespace)
+            object.__setattr__(self.question, "canonical", list(namespace.values())[-1])
+
+    def right(self, expected: object, got: object) -> bool:
+        """Whether an output is right."""
+        return compare(self.question, expected, got) is None
+
+    def entries(self, expected: object, got: object) -> np.ndarray | None:
+        """Which numbers of an output are right, None for one of another form."""
+        got = as_expected(expected, plain(got))
+        if isinstance(got, Problem) or [np.shape(p) for p in parts(got)] != [np.shape(p) for p in parts(expected)]:
+            return None
+        wrong = differences(self.question, *canonical(self.question, expected, got))
+        return ~np.concatenate([np.ravel(part) for part in wrong])
+
+    def watch(self) -> str:
+        """What instruments show, as JSON."""
+        return write(readings(self.pieces, self.name, self.public, self.right))
+
+    def repair(self, fresh: Callable[[], Pairs]) -> str:
+        """What repair finds, and what stands idle, as JSON; fresh: more cases, as `repairs` takes them."""
+        found = repairs(self.pieces, self.name, self.public, fresh, self.right, self.entries, self.listed)
+        return write([*found[:MOST_REPAIRS], *idle(self.pieces, self.name)])
+
+
+def comparing_of(question: Question) -> tuple[dict, str]:
+    """What tells a right output from a wrong one, to be sent: fields, and the source of `Question.canonical`.
+
+    That is a function complete in itself but for NumPy, as a reference is; a lambda is left out, so that outputs in
+    another form count as wrong: a repair may be missed then, and none is wrong.
+    """
+    fields = {name: getattr(question, name) for name in COMPARING}
+    named = question.canonical.__name__ != "<lambda>"
+    return fields, inspect.getsource(inspect.unwrap(question.canonical)) if named else ""
+
+
+def fresh_cases(question: Question, seed: int = PUBLIC_SEED) -> list[Case]:
+    """Random cases of another public seed, on which a repair is tried."""
+    rng = np.random.default_rng(seed + 1)
+    drawn = question.draws(rng, FRESH)
+    return [Case(args, trusted(question.reference, args), by_hand=False) for args in drawn]
+
+
+def pairs(cases: Sequence[Case]) -> list[tuple[tuple, object]]:
+    """Arguments and expected outputs alone."""
+    return [(case.args, case.expected) for case in cases]

@@ -1,0 +1,271 @@
+"""What is said about a wrong answer: the surest sentence that is true of it, and that a student can read.
+
+`sentences` asks in this order: is it a listed misconception; does it run (what an exception means in this task); what
+do instruments and repair find in the student's own program; which relation of the outputs would a student see at once;
+what stands idle in the program; which property of right answers does it lack; what do the wrong cases have in common;
+up to which step is it right; and at last, which cases are wrong.
+"""
+
+import copy
+import itertools
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labgrader.comparison import Case, Problem, alike, parts, trusted
+from labgrader.question import Misconception, Property, Question
+from labgrader.reply.contrast import contrast
+from labgrader.reply.errors import explain
+from labgrader.reply.finding import IDLE, REPAIRS, RIGHT, WATCHES, Finding
+from labgrader.reply.messages import Marked, marked, said
+from labgrader.reply.relations import View, related
+from labgrader.reply.repair import Listed, fingerprint
+
+ENDLESS = "A loop does not end, or has far too many turns: what changes in each turn, and when does it stop?"
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """Something true of a wrong answer.
+
+    kind: "exception", "misconception", a kind of finding (`finding.WATCHES`, `finding.IDLE`, `finding.REPAIRS`) or
+    "relation" name a mistake; "property", "contrast", "reached" and "case" are true of more mistakes than one. marked:
+    lines of the student's that it is about.
+    """
+
+    kind: str
+    says: str
+    marked: tuple[Marked, ...] = ()
+
+    @property
+    def names_the_mistake(self) -> bool:
+        """Whether one knows from it what to change."""
+        return self.kind not in ("property", "contrast", "reached", "case")
+
+
+def diagnose(
+    question: Question,
+    cases: Sequence[Case],
+    outputs: Sequence[object],
+    pieces: Sequence[tuple[str, str]] = (),
+    findings: Sequence[Finding] = (),
+) -> Sentence | None:
+    """The surest sentence about outputs that are wrong in some case, or an answer that changes its arguments.
+
+    pieces: the program, as `program` cuts it; findings: what is known about it (`run.run`). None if no case is
+    wrong and nothing was found.
+    """
+    return next(sentences(question, cases, outputs, pieces, findings), None)
+
+
+def at_once(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Sentence | None:
+    """The sentence that needs no search: about an exception, or a listed misconception; None if there is none."""
+    found = itertools.chain(listed(question, cases, outputs), exceptions(question, cases, outputs))
+    return next(found, None)
+
+
+def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sentence]:
+    """All sentences that are true of an answer, the surest first; arguments are those of `diagnose`."""
+    yield from listed(question, cases, outputs)
+    yield from exceptions(question, cases, outputs, pieces)
+    pairs = wrong_ones_first(question, cases, outputs)
+    values_are_right = bool(pairs) and alike(question, pairs[0][0].expected, pairs[0][1])
+    yield from found_in_the_program(question, pieces, findings, values_are_right)
+    if not pairs or values_are_right:
+        return
+    yield from outputs_exchanged(question, cases, outputs)
+    for name, view in views_of(question, cases, outputs):
+        yield from (Sentence("relation", name + says) for says in related(view))
+    yield from of_kinds(IDLE, pieces, findings)
+    right = [alike(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)]
+    yield from broken_properties(question, pairs[:1])  # that is the case that is shown, as a rule
+    if says := contrast(question, cases, right):
+        yield Sentence("contrast", says)
+    for sentence in broken_properties(question, pairs[1:]):
+        yield replace(sentence, says=f"In another wrong case: {sentence.says[0].lower()}{sentence.says[1:]}")
+    yield from of_kinds(RIGHT, pieces, findings)
+    yield which_cases(cases, right)
+
+
+def exceptions(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
+    """That no value comes back, and why."""
+    if any(isinstance(got, Problem) and got.kind == "time" for got in outputs):
+        yield Sentence("exception", ENDLESS)
+    nothing = [isinstance(got, Problem) and "returns None" in got.says for got in outputs]
+    if any(nothing):
+        words = ("In some cases no `return` is reached", "It never reaches a `return` with a value")[all(nothing)]
+        yield Sentence("exception", f"{words}: where does it stand, and is it in a branch or a loop?")
+    raised = [i for i, got in enumerate(outputs) if isinstance(got, Problem) and got.kind == "exception"]
+    if not raised:
+        return
+    first = outputs[raised[0]]
+    arguments = dict(zip(question.parameters, cases[raised[0]].args, strict=True))
+    line = first.lines[-1][1] if first.lines else ""
+    if says := explain(first.says, arguments, line, "\n".join(text for _, text in pieces)):
+        yield Sentence("exception", says)
+
+
+# ------------------------------------------------------------------------------------------ misconceptions
+
+
+def listed(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
+    """The hint of the listed misconception that gives these outputs."""
+    if misconception := recognise(question, cases, outputs):
+        yield Sentence("misconception", misconception.hint)
+
+
+def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Misconception | None:
+    """Find the misconception that gives these outputs in every case that tells it from a right answer."""
+    if all(isinstance(got, Problem) for got in outputs):
+        return None
+    for misconception in question.misconceptions:
+        told, stray = [], False  # told: of each case that tells it from a right answer, whether there is an output
+        for case, got in zip(cases, outputs, strict=True):
+            own = output_of(misconception, case.args)
+            if alike(question, own, got):
+                if not alike(question, own, case.expected):
+                    told.append(not isinstance(got, Problem))
+            elif isinstance(got, Problem) and alike(question, own, case.expected):
+                stray = True
+            else:
+                break
+        else:
+            if any(told) or (told and not stray):  # exceptions here and there may be of any mistake
+                return misconception
+    return None
+
+
+def output_of(misconception: Misconception, args: tuple) -> object:
+    """What a misconception gives, or a Problem where it raises."""
+    try:
+        return trusted(misconception.answer, args)
+    except Exception as error:
+        return Problem("exception", type(error).__name__)
+
+
+def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
+    """What the listed mistakes of a question give in each case; those that raise give nothing."""
+    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
+    for number, mistake in enumerate(question.misconceptions):
+        for found, case in zip(told, cases, strict=True):
+            output = output_of(mistake, case.args)
+            if not isinstance(output, Problem):
+                found.setdefault(fingerprint(output), set()).add(number)
+    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
+
+
+# ----------------------------------------------------------------------------------- the student's own program
+
+
+def found_in_the_program(
+    question: Question, pieces: Sequence[tuple[str, str]], findings: Sequence[Finding], values_are_right: bool
+) -> Iterator[Sentence]:
+    """What instruments show, an argument that is never read, then what repair finds, with the student's lines.
+
+    That an argument is changed is told at once where that is all that is wrong, and else at last. Of a cast that mends
+    wrong values is not said that the values are right.
+    """
+    shown = [f for f in findings if f.kind in (*WATCHES, "unread") and f.kind != "writes"]
+    repairs = [f for f in findings if f.kind in REPAIRS]
+    written = [f for f in findings if f.kind == "writes"]
+    for finding in (*written, *shown, *repairs[:1]) if values_are_right else (*shown, *repairs[:1], *written):
+        equal = [f for f in repairs if f.kind == finding.kind and f.width == finding.width and f != finding][:1]
+        equal = equal if len(finding.spans) == 1 else []  # more than two marked places help nobody
+        changes_values = finding.kind == "cast" and not values_are_right
+        says = said(replace(finding, kind="type") if changes_values else finding)
+        if finding in repairs and equal:
+            says = f"Change one of the two marked places, not both. {says}"
+        if finding.of_two and finding.value is not None and 0 <= finding.value < len(question.misconceptions):
+            one = question.misconceptions[int(finding.value)].hint
+            says = f"Perhaps two things are wrong. One is this: {one} And is the marked part as it should be?"
+        yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
+
+
+def of_kinds(
+    kinds: Collection[str], pieces: Sequence[tuple[str, str]], findings: Sequence[Finding]
+) -> Iterator[Sentence]:
+    """What stands idle: an argument that is never read, what is computed and never used; or the last right step."""
+    for finding in findings:
+        if finding.kind in kinds and finding.kind != "unread":  # which is told before
+            yield Sentence(finding.kind, said(finding), marked([finding], pieces))
+
+
+# ------------------------------------------------------------------------------------------------- relations
+
+
+def views_of(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[tuple[str, View]]:
+    """A view of each output that is wrong in some case, with words that name it; cases without output are left out."""
+    pairs = [(case, got) for case, got in zip(cases, outputs, strict=True) if not isinstance(got, Problem)]
+    counts = {len(parts(case.expected)) for case, _ in pairs} | {len(parts(got)) for _, got in pairs}
+    if not pairs or len(counts) != 1:
+        return
+    (count,) = counts
+    for k in range(count):
+        expected = tuple(np.asarray(parts(case.expected)[k]) for case, _ in pairs)
+        got = tuple(np.asarray(parts(got)[k]) for _, got in pairs)
+        view = View(
+            expected, got, tuple(case.args for case, _ in pairs), question.parameters, question.rtol, question.atol
+        )
+        if not all(view.same(e, g) for e, g in zip(expected, got, strict=True)):
+            yield f"Output {k + 1} of {count}: " if count > 1 else "", view
+
+
+def outputs_exchanged(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
+    """Two outputs exchanged, one in the place of another, or another number of outputs than is asked for."""
+    pairs = [(case, got) for case, got in zip(cases, outputs, strict=True) if not isinstance(got, Problem)]
+    asked, came = {len(parts(case.expected)) for case, _ in pairs}, {len(parts(got)) for _, got in pairs}
+    if len(asked) != 1 or len(came) != 1:
+        return
+    (count,), (given,) = asked, came
+    if given == 1 < count:
+        for k in range(count):
+            if all(alike(question, parts(case.expected)[k], got) for case, got in pairs):
+                yield Sentence("relation", f"You return only output {k + 1} of {count}. Return all of them.")
+    if count == 1 < given:
+        for k in range(given):
+            if all(alike(question, case.expected, got[k]) for case, got in pairs):
+                yield Sentence("relation", f"Number {k + 1} of what you return is right. Return it alone.")
+    if count != given:
+        return
+    for i, j in itertools.combinations(range(count), 2):
+        order = [j if k == i else i if k == j else k for k in range(count)]
+        if all(alike(question, tuple(parts(case.expected)[k] for k in order), got) for case, got in pairs):
+            yield Sentence("relation", f"Outputs {i + 1} and {j + 1} are exchanged. In which order are they asked for?")
+
+
+# ------------------------------------------------------------------------------------------- the last resort
+
+
+def wrong_ones_first(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[tuple[Case, object]]:
+    """The cases that have an output, the wrong ones first."""
+    pairs = [(case, got) for case, got in zip(cases, outputs, strict=True) if not isinstance(got, Problem)]
+    return sorted(pairs, key=lambda pair: alike(question, pair[0].expected, pair[1]))
+
+
+def broken_properties(question: Question, pairs: Sequence[tuple[Case, object]]) -> Iterator[Sentence]:
+    """The properties of right answers that a wrong one does not have in some cases."""
+    pairs = [(case, got) for case, got in pairs if finite(got) or not finite(case.expected)]
+    for prop in question.properties:
+        if not all(fulfilled(prop, case, got) for case, got in pairs):
+            yield Sentence("property", f"This holds of every right answer, and not of yours: {prop.says}.")
+
+
+def finite(output: object) -> bool:
+    """Whether no number of an output is NaN or infinite."""
+    return all(np.isfinite(part).all() for part in parts(output))
+
+
+def fulfilled(prop: Property, case: Case, got: object) -> bool:
+    """Whether a property holds; one that cannot even be computed counts as held."""
+    try:
+        with np.errstate(all="ignore"):
+            return bool(prop.holds(*copy.deepcopy(case.args), copy.deepcopy(got)))
+    except Exception:
+        return True
+
+
+def which_cases(cases: Sequence[Case], right: Sequence[bool]) -> Sentence:
+    """What to do with the case that is shown, and how many others are right; right: of each case."""
+    others = f" {sum(right)} of {len(cases)} cases are right." if any(right) else ""
+    return Sentence("case", f"Do the case above by hand, and print what each of your lines gives for it.{others}")

@@ -1,0 +1,230 @@
+"""Instruments: an answer runs again under a watch that shows where something goes wrong.
+
+Three watches: floating-point errors raise, arguments cannot be written, and integers are wide, so that bytes do not
+wrap round. Each finds a line of the student's own, and says nothing unless a wrong output hangs on it. Like `repair`,
+this runs in a worker.
+"""
+
+import ast
+import contextlib
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType, TracebackType
+
+import numpy as np
+
+from labgrader.comparison import quiet
+from labgrader.program.live import LiveProgram, altered, copied, own_entry
+from labgrader.reply.alarm import limited
+from labgrader.reply.finding import Finding, Span
+from labgrader.reply.repair import ENDS
+
+MOST_S = 2.0  # CPU seconds of all watches together
+MOST_EVENTS = 4000  # lines of which the variables are kept
+SMALL = ("uint8", "int8", "uint16", "int16")
+
+
+def readings(
+    pieces: Sequence[tuple[str, str]], name: str, cases: Sequence[tuple[tuple, object]], right
+) -> list[Finding]:
+    """What the watches show of a wrong answer, the surest first; arguments are those of `repair.repairs`."""
+    found = []
+    with contextlib.suppress(*ENDS), limited(MOST_S), quiet():
+        program = LiveProgram(name, pieces)
+        outputs = [outcome(program, args) for args, _ in cases]
+        wrong = [(a, e, out) for (a, e), out in zip(cases, outputs, strict=True) if not right(e, out)]
+        for watch in (floating_point, byte_arithmetic, written_argument):
+            if reading := watch(program, cases, wrong, right):
+                found.append(reading)
+    return found
+
+
+def outcome(program: LiveProgram, args: tuple) -> object:
+    """The output of a call, None if it raises."""
+    try:
+        return program.call(args)[0]
+    except Exception:
+        return None
+
+
+# ---------------------------------------------------------------------------------------- floating-point errors
+
+
+def floating_point(program: LiveProgram, cases, wrong, right) -> Finding | None:
+    """The first operation that overflows, divides by zero or has no result, where NaN or infinity comes out wrongly."""
+    for args, expected, got in wrong:
+        if not bad_numbers(expected, got):
+            continue
+        try:
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                program.call(args)
+        except FloatingPointError as error:
+            where = own_place(program, error.__traceback__)
+            if where is None:
+                return None
+            piece, span, frame = where
+            kind = "overflow" if "overflow" in str(error) else "division" if "divide" in str(error) else "no number"
+            return Finding(kind, piece, (span,), extreme(program.pieces[piece][1], span, frame, kind))
+        except Exception:
+            return None
+    return None
+
+
+def bad_numbers(expected: object, got: object) -> bool:
+    """Whether NaN or infinity stands where a finite number is expected."""
+    pairs = zip(as_tuple(expected), as_tuple(got), strict=False)
+    for e, g in pairs:
+        e, g = np.asarray(e), np.asarray(g)
+        if e.shape == g.shape and g.dtype.kind == "f" and (np.isfinite(e.astype(float)) & ~np.isfinite(g)).any():
+            return True
+    return False
+
+
+def as_tuple(output: object) -> tuple:
+    """Outputs as a tuple, also one."""
+    return tuple(output) if isinstance(output, tuple | list) else (output,)
+
+
+def own_place(program: LiveProgram, trace: TracebackType | None) -> tuple[int, Span, FrameType] | None:
+    """The deepest of the student's own expressions in a traceback: its piece, its place and its frame."""
+    entry, _ = own_entry(trace, program.files)
+    if entry is None:
+        return None
+    code = entry.tb_frame.f_code
+    line, last_line, column, end = list(code.co_positions())[entry.tb_lasti // 2]
+    if None in (line, last_line, column, end):
+        return None
+    return program.files.index(code.co_filename), Span(line, column, last_line, end), entry.tb_frame
+
+
+def extreme(text: str, span: Span, frame: FrameType, kind: str) -> float | None:
+    """The largest number that goes into an exponential, None if it cannot be told."""
+    part = text.split("\n")[span.line - 1].encode()[span.column : span.end].decode()
+    try:
+        node = ast.parse(part, mode="eval").body
+        if kind == "overflow" and isinstance(node, ast.Call) and node.args:
+            inner = compile(ast.Expression(node.args[0]), "<argument>", "eval")
+            largest = float(np.nanmax(np.asarray(eval(inner, frame.f_globals, frame.f_locals), float)))
+            return largest if np.isfinite(largest) else None
+    except Exception:
+        pass
+    return None
+
+
+# ------------------------------------------------------------------------------------------------- arguments
+
+
+def written_argument(program: LiveProgram, cases, wrong, right) -> Finding | None:
+    """The line that changes an argument."""
+    for args, _ in cases:
+        given = copied(args)
+        try:
+            program.answer(*given)
+        except Exception:
+            return None
+        if not altered(args, given):
+            continue
+        locked = copied(args)
+        for array in locked:
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+        try:
+            program.answer(*locked)
+        except ValueError as error:
+            where = own_place(program, error.__traceback__) if "read-only" in str(error) else None
+            return Finding("writes", where[0], (where[1],)) if where else None
+        except Exception:
+            return None
+    return None
+
+
+# ------------------------------------------------------------------------------------------------------ bytes
+
+
+def byte_arithmetic(program: LiveProgram, cases, wrong, right) -> Finding | None:
+    """The line where small integers wrap round: with wide ones every case is right."""
+    if not wrong or not any(is_small(a) for args, _ in cases for a in args):
+        return None
+    if not all(right_when_wide(program, args, expected, right) for args, expected in cases):
+        return None
+    for args, _, _ in sorted(wrong, key=lambda case: sum(np.size(a) for a in case[0])):
+        if reading := first_difference(program, args):
+            return reading
+    return None
+
+
+def is_small(value: object) -> bool:
+    """Whether an argument is an array of small integers."""
+    return isinstance(value, np.ndarray) and value.dtype.name in SMALL
+
+
+def wide(args: tuple) -> tuple:
+    """The arguments with small integers as wide ones."""
+    return tuple(a.astype(np.int64) if is_small(a) else a for a in copied(args))
+
+
+def right_when_wide(program: LiveProgram, args: tuple, expected: object, right: Callable) -> bool:
+    """Whether a case is right with wide integers."""
+    try:
+        return right(expected, program.answer(*wide(args)))
+    except Exception:
+        return False
+
+
+def first_difference(program: LiveProgram, args: tuple) -> Finding | None:
+    """The first line after which a variable has another value with wide integers."""
+    narrow, broad = (lines_of(program, given) for given in (copied(args), wide(args)))
+    line = None
+    for (at, before), (other, after) in zip(narrow, broad, strict=False):
+        if at != other:
+            break
+        if line is not None and any(not equal(before[k], after.get(k)) for k in before):
+            break
+        line = at
+    if line is None:
+        return None
+    piece, number = line
+    statement = statement_at(program.pieces[piece][1], number)
+    return None if statement is None else Finding("wraps", piece, (statement,))
+
+
+def lines_of(program: LiveProgram, args: tuple) -> list[tuple[tuple[int, int], dict]]:
+    """The student's lines in the order in which they run, each with the variables before it."""
+    names = program.files
+    found: list = []
+
+    def trace(frame, event, _):
+        if frame.f_code.co_filename not in names:
+            return None
+        if event in ("line", "return") and len(found) < MOST_EVENTS:
+            kept = {
+                k: np.array(v)
+                for k, v in frame.f_locals.items()
+                if isinstance(v, np.ndarray | np.generic | int | float)
+            }
+            found.append(((names.index(frame.f_code.co_filename), frame.f_lineno), kept))
+        return trace
+
+    sys.settrace(trace)
+    try:
+        program.answer(*args)
+    finally:
+        sys.settrace(None)
+    return found
+
+
+def equal(a: np.ndarray, b: np.ndarray | None) -> bool:
+    """Whether two variables have the same values."""
+    return (
+        b is not None and a.shape == b.shape and bool(np.array_equal(a.astype(float), b.astype(float), equal_nan=True))
+    )
+
+
+def statement_at(text: str, line: int) -> Span | None:
+    """What a statement that begins in a line computes."""
+    found = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.stmt) and n.lineno <= line <= n.end_lineno]
+    found = [n for n in found if getattr(n, "value", None) is not None]
+    if not found:
+        return None
+    value = max(found, key=lambda n: n.lineno).value
+    return Span(value.lineno, value.col_offset, value.end_lineno, value.end_col_offset)

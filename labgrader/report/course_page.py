@@ -1,0 +1,168 @@
+"""All labs of a course together: a page for the instructor, and a file that Moodle or Canvas takes.
+
+Each lab counts by its share of the points, under the policy in course.toml (`policy`). Who handed in nothing has 0
+there. Students are the same person in two labs if the roster has one email for both, or if their folders have one name:
+Moodle gives each a number of its own in every assignment.
+"""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+
+from labgrader.course import topics
+from labgrader.grade.changes import changed, read_changes
+from labgrader.grade.deadlines import read_deadline
+from labgrader.grade.gradebook import register
+from labgrader.grade.policy import Policy, read_policy
+from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
+from labgrader.handin.reading import read_lab
+from labgrader.handin.roster import Person, identity, keys_of, person_of, read_roster
+from labgrader.report.outputs import harmless, page
+from labgrader.report.platforms import CANVAS, person_by_name
+from labgrader.support import write_atomically
+
+FOLDER, TOTAL = "course", "Course total"
+WIDE = "body{max-width:none}s{color:#666}"
+
+
+@dataclass
+class Row:
+    """A student's line. finals: by lab; total: in percent; dropped: labs that do not count."""
+
+    name: str
+    person: Person | None
+    finals: dict[str, Final] = field(default_factory=dict)
+    total: float = 0.0
+    dropped: list[str] = field(default_factory=list)
+
+    @property
+    def waits(self) -> bool:
+        """Whether a person has still to grade something of it."""
+        return any(final.waits for final in self.finals.values())
+
+
+def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
+    """Write course.html and the table of a platform into grades/course; returns them, and who waits for a person.
+
+    platform: "moodle", "canvas" or "scores". Raises ValueError if no lab was graded, if course.toml or the roster
+    cannot be used, or if the platform could not find a student.
+    """
+    course = Path(course)
+    labs = [lab for lab in topics() if any((course / "grades" / lab / "feedback").glob("*.html"))]
+    if not labs or not (course / "gradebook.db").is_file():
+        raise ValueError(f"topic: expected labs that were graded in {course}, there is none")
+    policy, roster, finals = read_policy(course), read_roster(course), {}
+    for name in labs:
+        lab = read_lab(course, name)
+        changes = read_changes(course, lab)
+        register(course, changed(lab, [], changes)[0])
+        finals[name] = settle(course, name, changes, read_deadline(course, name))
+        finish_pages(course / "grades" / name, finals[name].values())
+    rows = rows_of(finals, roster)
+    for row in rows:
+        maxima = {lab: max((final.max_score for final in finals[lab].values()), default=0.0) for lab in labs}
+        scores = {lab: row.finals[lab].score if lab in row.finals else 0.0 for lab in labs}
+        shares = {lab: scores[lab] / maxima[lab] for lab in labs if maxima[lab]}
+        share, row.dropped = policy.total(shares)
+        row.total = 100.0 * share
+    if platform != "scores" and (odd := [row.name for row in rows if row.person is None]):
+        raise ValueError(f"{platform}: expected students in roster.csv, got {', '.join(odd)}")
+    table = {"scores": plain_table, "moodle": moodle_table, "canvas": canvas_table}[platform](labs, rows)
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in cells] for cells in table)
+    files = {"course.html": course_page(labs, rows, policy), f"{platform}.csv": text.getvalue()}
+    for name, content in files.items():
+        write_atomically(course / "grades" / FOLDER / name, content.encode())
+    return [course / "grades" / FOLDER / name for name in files], [row.name for row in rows if row.waits]
+
+
+def rows_of(finals: Mapping[str, Mapping[str, Final]], roster: dict[str, Person]) -> list[Row]:
+    """A row per person, in the order of names; who is in the roster and handed in nothing has an empty one.
+
+    Raises ValueError if two folders of a lab are one person's.
+    """
+    rows: dict[str, Row] = {}
+    for lab, of_lab in finals.items():
+        for student, final in of_lab.items():
+            person = person_of(roster, student) or person_by_name(student)
+            who = identity(roster, student)
+            row = rows.setdefault(who, Row(student, person))
+            if lab in row.finals:
+                both = " and ".join(other for other in of_lab if identity(roster, other) == who)
+                raise ValueError(f"{lab}: {both} are both {who}; rename the folder of one")
+            row.finals[lab] = final
+    here = {key for of_lab in finals.values() for student in of_lab for key in keys_of(student)}
+    for person in roster.values():
+        if person.id not in here:
+            rows.setdefault(identity(roster, person.id), Row(person.name or person.id, person))
+    return sorted(rows.values(), key=lambda row: row.name)
+
+
+def cell(row: Row, lab: str) -> str:
+    """A student's points in a lab, "" for none."""
+    return f"{row.finals[lab].score:g}" if lab in row.finals else ""
+
+
+def plain_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
+    """A row per student."""
+    heading = ["student", "name", "email", *labs, "dropped", TOTAL, "not final"]
+    found = [
+        [
+            *(row.name, row.person.name if row.person else "", row.person.email if row.person else ""),
+            *(cell(row, lab) for lab in labs),
+            *(" ".join(row.dropped), f"{row.total:.2f}", "yes" if row.waits else ""),
+        ]
+        for row in rows
+    ]
+    return [heading, *found]
+
+
+def moodle_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
+    """For Moodle's gradebook, which finds students by email: Grades > Import > CSV file."""
+    heading = ["Full name", "Email address", *labs, TOTAL, "Feedback"]
+    found = [
+        [
+            *(row.person.name, row.person.email, *(cell(row, lab) for lab in labs)),
+            *(f"{row.total:.2f}", NOT_FINAL if row.waits else ""),
+        ]
+        for row in rows
+    ]
+    return [heading, *found]
+
+
+def canvas_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
+    """For Canvas's Import Grades: the total in percent; what is not final is left out, and Canvas keeps what it has."""
+    possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), "100"]
+    found = [
+        [
+            *(row.person.name, row.person.id, *(row.person.more.get(column, "") for column in CANVAS)),
+            "" if row.waits else f"{row.total:.2f}",
+        ]
+        for row in rows
+    ]
+    return [["Student", "ID", *CANVAS, TOTAL], possible, *found]
+
+
+def course_page(labs: Sequence[str], rows: Sequence[Row], policy: Policy) -> str:
+    """The page for the instructor."""
+    weights = ", ".join(f"{lab} {policy.weights.get(lab, 1.0):g}" for lab in labs)
+    said = f"Weights: {weights}. Dropped: the lowest {policy.drop_lowest}. Free late days: {policy.late_days}."
+    heads = "".join(f'<th scope="col">{escape(head)}</th>' for head in ("student", *labs, TOTAL))
+    parts = ["<h1>The course</h1>", f"<p>{escape(said)}</p>", f"<table><tr>{heads}</tr>"]
+    for row in rows:
+        cells = "".join(f"<td>{of_lab(row, lab)}</td>" for lab in labs)
+        total = f"{row.total:.1f} %{' (not final)' if row.waits else ''}"
+        parts.append(f'<tr><th scope="row">{escape(row.name)}</th>{cells}<td>{total}</td></tr>')
+    return page("The course", [*parts, "</table>"], WIDE)
+
+
+def of_lab(row: Row, lab: str) -> str:
+    """A cell of the page: points, struck out where they do not count, and what is to know about them."""
+    final = row.finals.get(lab)
+    points = "-" if final is None else f"{final.score:g} of {final.max_score:g}"
+    notes = [] if final is None else [str(final.late) if final.late.days else "", "not final" if final.waits else ""]
+    note = f"<br><small>{escape('; '.join(filter(None, notes)))}</small>" if any(notes) else ""
+    return (f"<s>{points}</s> dropped" if lab in row.dropped else points) + note

@@ -1,0 +1,120 @@
+"""An autograder for Gradescope: `grades LAB --gradescope` writes its zip, and this module runs in its container.
+
+Their container is the sandbox there. In it, answers run as other users, who can read neither the kit nor the secret
+seed nor the results, and under the same limits and filter of system calls as in bubblewrap.
+"""
+
+import json
+import os
+import shutil
+import stat
+import sys
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+from labgrader.course import FILE as PROJECT
+from labgrader.course import course as course_here
+from labgrader.course import files_of
+from labgrader.grade.batch import SECRET_FILE, Batch, grade_batch
+from labgrader.grade.changes import CHANGES, changed, read_changes
+from labgrader.grade.settings import FILE
+from labgrader.handin.reading import read_lab, read_submission
+from labgrader.report.outputs import gradescope
+from labgrader.report.overview import COMMENTS_FILE, read_comments
+from labgrader.sandbox.sandbox import Limits
+from labgrader.support import write_atomically
+
+SETUP = """#!/bin/sh
+# Gradescope runs this once, as root, to build the image.
+set -e
+TORCH_INDEX=""  # the address of PyTorch's CPU builds saves 2 GB
+apt-get update
+for python in python3.13 python3.12 python3.11; do
+    apt-get install -y --no-install-recommends $python $python-venv && break
+done
+$python -m venv /usr/local/grader
+cd /autograder/source
+/usr/local/grader/bin/pip install ${TORCH_INDEX:+--extra-index-url "$TORCH_INDEX"} -r requirements.txt
+"""
+RUN = """#!/bin/sh
+# Gradescope runs this for each submission, as root.
+set -e
+umask 077
+chmod 700 /autograder
+cd /autograder/source
+exec /usr/local/grader/bin/python -m labgrader.report.gradescope {topic} /autograder
+"""
+
+
+def write_autograder(course: Path, topic: str) -> Path:
+    """Write grades/TOPIC/gradescope.zip, which grades as `grade` does in the round that it began.
+
+    Raises ValueError if there is no released lab or no round of grading, or if course.toml cannot be used.
+    """
+    course = Path(course)
+    lab, out, kit = read_lab(course, topic), course / "grades" / topic, course_here()
+    read_changes(course, lab)
+    if not (out / SECRET_FILE).is_file():
+        raise ValueError(f"topic: expected a round of grading in {out}; `{kit.command} grade {topic}` begins one")
+    needed = [f"{name}=={metadata.version(name).partition('+')[0]}\n" for name in (*kit.packages, "packaging", "tqdm")]
+    texts = {"setup.sh": SETUP, "run_autograder": RUN.format(topic=topic), "requirements.txt": "".join(needed)}
+    rooms = dict.fromkeys(("labgrader", kit.questions.partition(".")[0], *kit.copied))
+    kinds = ("*.py", "*.toml")  # a question's hints in another language stand beside it
+    files = {name: path for room in rooms for kind in kinds for name, path in files_of(room, kind)}
+    files |= {PROJECT: kit.file}
+    files |= {f"labs/{topic}/{topic}.ipynb": course / "labs" / topic / f"{topic}.ipynb"}
+    files |= {name: course / name for name in (FILE, CHANGES)}
+    files |= {name: out / name for name in (SECRET_FILE, COMMENTS_FILE)}
+    target = out / "gradescope.zip"
+    unfinished = target.with_suffix(".unfinished")
+    with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
+        contents = {name: path.read_bytes() for name, path in files.items() if path.is_file()}
+        for name, content in ({name: text.encode() for name, text in texts.items()} | contents).items():
+            info = zipfile.ZipInfo(name)
+            info.external_attr = (stat.S_IFREG | (0o700 if name in ("setup.sh", "run_autograder") else 0o600)) << 16
+            archive.writestr(info, content)
+    os.replace(unfinished, target)
+    return target
+
+
+def grade(topic: str, place: Path) -> str:
+    """Grade PLACE/submission with what lies in PLACE/source; returns Gradescope's results.json."""
+    course, work = place / "source", place / "work"
+    found = [path for path in sorted((place / "submission").rglob("*.ipynb")) if not path.is_symlink()]
+    named = [path for path in found if path.name == f"{topic}.ipynb"] or found
+    if len(named) != 1:
+        raise ValueError(f"expected one notebook {topic}.ipynb, got {len(named)}")
+    shutil.rmtree(work, ignore_errors=True)
+    student = student_of(place / "submission_metadata.json")
+    notebook = work / student / topic / f"{topic}.ipynb"
+    notebook.parent.mkdir(parents=True)
+    shutil.copyfile(named[0], notebook)
+    lab = read_lab(course, topic)
+    secret = (course / SECRET_FILE).read_text().strip()
+    submission = read_submission(work / student, lab)
+    batch = Batch(lab, [submission], work, secret, limits=Limits(container=True))
+    lab, (record,) = changed(lab, grade_batch(batch, progress=False)[0], read_changes(course, lab))
+    return gradescope(lab, record, read_comments(course))
+
+
+def student_of(metadata: Path) -> str:
+    """A name for who handed in, the same each time, from what Gradescope says of the submission."""
+    try:
+        users = sorted(str(user["id"]) for user in json.loads(metadata.read_bytes())["users"])
+    except (OSError, ValueError, TypeError, KeyError):
+        users = []
+    return "student" + "".join(f"-{user}" for user in users if user.isalnum())[:100]
+
+
+def main(topic: str, place: str) -> None:
+    """Write results/results.json; what a student can mend is said there."""
+    try:
+        results = grade(topic, Path(place))
+    except ValueError as error:
+        results = json.dumps({"score": 0.0, "output": f"This submission could not be graded: {error}."})
+    write_atomically(Path(place) / "results" / "results.json", results.encode())
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

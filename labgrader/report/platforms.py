@@ -1,0 +1,165 @@
+"""What goes back to a learning platform: a file of grades that it imports, and a zip of pages that it hands out.
+
+    Moodle   the grading worksheet of an assignment ("Upload grading worksheet"), and "Upload multiple feedback files"
+    Canvas   a file for "Import Grades", and a zip for "Upload Submissions"
+
+Scores are those of nbgrader's gradebook: functions, what a person graded, and penalties. Students have the names that
+`nbgrader zip_collect` gave them, which end with the platform's number, "Ada Lovelace_1234567"; a roster knows more.
+"""
+
+import csv
+import io
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from labgrader.course import course as course_here
+from labgrader.grade.changes import changed, read_changes
+from labgrader.grade.deadlines import read_deadline
+from labgrader.grade.gradebook import register
+from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
+from labgrader.handin.collect import extracted, read_name, student_and_notebook
+from labgrader.handin.reading import Lab, read_lab
+from labgrader.handin.roster import Person, keys_of, person_of, read_roster
+from labgrader.report.outputs import harmless
+from labgrader.support import write_atomically
+
+CANVAS = ("SIS User ID", "SIS Login ID", "Section")  # columns beside name and ID
+
+
+@dataclass(frozen=True)
+class Written:
+    """Files for a platform. waiting: who is to be graded by hand yet, and in what; without: who has no grade, and why.
+
+    maximum: what all is worth; released: what it was worth in the lab that students got.
+    """
+
+    files: list[Path]
+    waiting: list[str]
+    without: dict[str, str]
+    maximum: float
+    released: float
+
+
+def write_grades(course: Path, topic: str, platform: str) -> Written:
+    """Write the files of a platform into grades/TOPIC, and bring the pages there up to date.
+
+    platform: "moodle" or "canvas", or "scores" for a table and no zip. Raises ValueError, and writes nothing, if
+    nothing was graded, if course.toml or the roster cannot be used, or if the platform could not find a student.
+    """
+    course = Path(course)
+    out, lab = course / "grades" / topic, read_lab(course, topic)
+    roster, changes, deadline = read_roster(course), read_changes(course, lab), read_deadline(course, topic)
+    pages = {page.stem: page for page in sorted((out / "feedback").glob("*.html"))}
+    if not pages or not (course / "gradebook.db").is_file():
+        mend = f"`{course_here().command} grade {topic}` makes them"
+        raise ValueError(f"topic: expected a lab with grades in {course}; {mend}")
+    people = {student: person_of(roster, student) or person_by_name(student) for student in pages}
+    odd = [student for student, person in people.items() if person is None]
+    if odd and platform != "scores":
+        raise ValueError(
+            f"{platform}: expected students in roster.csv, or names that end with _NUMBER, as `nbgrader zip_collect` "
+            f"makes, got {', '.join(odd)}"
+        )
+    one = {person.id: student for student, person in people.items() if person is not None}
+    twice = [s for s, person in people.items() if person is not None and one[person.id] != s]
+    if twice and platform != "scores":
+        other = one[people[twice[0]].id]
+        raise ValueError(f"{platform}: {twice[0]} and {other} are both {people[other].id}; rename the folder of one")
+    now = changed(lab, [], changes)[0]
+    register(course, now)
+    finals = settle(course, topic, changes, deadline)
+    finish_pages(out, finals.values())
+    graded = [(people[student], final) for student, final in finals.items() if student in pages]
+    rows = {"scores": plain_rows, "moodle": moodle_rows, "canvas": canvas_rows}[platform](topic, graded)
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in row] for row in rows)
+    files = {out / f"{platform}.csv": text.getvalue().encode()}
+    if platform != "scores":
+        files[out / f"{platform}_feedback.zip"] = zip_of(pages, names_in_zip(course, topic, people, platform))
+    for path, data in files.items():
+        write_atomically(path, data)
+    here = {key for student in pages for key in keys_of(student)}
+    without = dict.fromkeys(pages.keys() - finals.keys(), "not graded")
+    without |= {person.name or person.id: "handed in nothing" for person in roster.values() if person.id not in here}
+    waiting = [f"{student} ({', '.join(final.waits)})" for student, final in finals.items() if final.waits]
+    return Written(list(files), waiting, without, maximum_of(now), maximum_of(lab))
+
+
+def maximum_of(lab: Lab) -> float:
+    """What the questions and the answers in words of a lab are worth together."""
+    marks = (cell["metadata"]["nbgrader"] for cell in lab.notebook["cells"] if "nbgrader" in cell["metadata"])
+    return sum((float(mark["points"]) for mark in marks if mark.get("grade")), 0.0)
+
+
+def person_by_name(student: str) -> Person | None:
+    """Whom a platform knows by the number that ends a student's name, None without a number."""
+    name, *number = reversed(keys_of(student))
+    return Person(name, student.removesuffix(f"_{name}")) if number else None
+
+
+def plain_rows(topic: str, graded: Sequence[tuple[Person | None, Final]]) -> list[list[str]]:
+    """A row per student."""
+    heading = ["student", "name", "email", "score", "max_score", "late", "to be graded by hand"]
+    rows = [
+        [
+            *(final.student, person.name if person else "", person.email if person else ""),
+            *(f"{final.score:g}", f"{final.max_score:g}", str(final.late), "yes" if final.waits else ""),
+        ]
+        for person, final in graded
+    ]
+    return [heading, *rows]
+
+
+def moodle_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
+    """Moodle's grading worksheet, which finds students by their identifier; its gradebook can find them by email."""
+    rows = [
+        [
+            *(f"Participant {person.id}", person.name, person.email, f"{final.score:g}", f"{final.max_score:g}"),
+            NOT_FINAL if final.waits else "",
+        ]
+        for person, final in graded
+    ]
+    return [["Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Feedback comments"], *rows]
+
+
+def canvas_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
+    """Canvas's gradebook, which finds students by its own ID.
+
+    The assignment has the name that an exported gradebook gives it, "04_iou (5511)", or else the lab's. There is no
+    room for words, so a grade that is not final is left out: Canvas keeps what it has.
+    """
+    headings = [heading for person, _ in graded for heading in person.more if heading.partition(" (")[0] == topic]
+    possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), f"{graded[0][1].max_score:g}" if graded else ""]
+    rows = [
+        [
+            *(person.name, person.id, *(person.more.get(column, "") for column in CANVAS)),
+            "" if final.waits else f"{final.score:g}",
+        ]
+        for person, final in graded
+    ]
+    return [["Student", "ID", *CANVAS, next(iter(headings), topic)], possible, *rows]
+
+
+def names_in_zip(course: Path, topic: str, people: dict[str, Person], platform: str) -> dict[str, str]:
+    """By student the name that the platform knows a page by; Canvas knows only names of files that it gave out."""
+    if platform == "moodle":
+        named = {student: keys_of(student)[0].removesuffix(f"_{person.id}") for student, person in people.items()}
+        return {s: f"{named[s].replace('_', ' ')}_{people[s].id}_assignsubmission_file_{topic}.html" for s in people}
+    names = {}
+    for path in extracted(course, topic):
+        if (whose := student_and_notebook(str(path))) is not None:
+            mark, _ = read_name(path)
+            names.setdefault(whose[0], f"{Path(mark.string).stem}.html")
+    return names
+
+
+def zip_of(pages: dict[str, Path], names: dict[str, str]) -> bytes:
+    """A zip of the students' pages; the same pages give the same bytes."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for student, page in pages.items():
+            if student in names:
+                archive.writestr(zipfile.ZipInfo(names[student]), page.read_bytes())
+    return content.getvalue()

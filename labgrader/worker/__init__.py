@@ -1,9 +1,0 @@
-"""One worker runs a student's lines: a plain process at the student's, a sandboxed one at the grader's.
-
-process      the program in the worker: it runs pieces, calls functions, looks for mistakes, and sends numbers back
-channel      the other end: sends, waits until its time is up, and takes nothing but numbers and known words
-stopwatch    CPU seconds of a worker, by which its time is up
-plain        starts a worker as a plain process; one is always ready for the next check
-fork_server  how a sandbox starts a worker: a server that loads the packages once and forks
-answer       an answer on the cases of its question: outputs, the verdict, and what is found in its program
-"""

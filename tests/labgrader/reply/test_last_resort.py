@@ -1,0 +1,153 @@
+"""Where no single change mends an answer: two, what stands idle in it, and what its wrong cases have in common."""
+
+import numpy as np
+import pytest
+
+from labgrader.comparison import Case
+from labgrader.question import Question
+from labgrader.reply import repair
+from labgrader.reply.contrast import contrast
+from labgrader.reply.finding import REPAIRS, Finding, Span
+from labgrader.reply.idle import idle
+from labgrader.reply.repair import repairs
+from labgrader.reply.sentences import found_in_the_program
+
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
+CASES = [(np.array([1.0, 5.0]), np.array([2.0, 3.0])), (np.array([4.0, 0.5, 7.0]), np.array([1.0, 1.0, 9.0]))]
+FRESH = [(np.array([-3.0, 2.0]), np.array([0.25, -8.0]))]
+
+
+def found(reference, source, shown=CASES, fresh=FRESH):
+    """What repair finds in a program, with the parts that it marks."""
+
+    def entries(expected, got):
+        same = np.shape(expected) == np.shape(got)
+        return np.isclose(expected, got).ravel() if same else None
+
+    def right(expected, got):
+        return entries(expected, got) is not None and entries(expected, got).all()
+
+    cases, more = ([(args, reference(*args)) for args in some] for some in (shown, fresh))
+    pieces = ("quiet", "import numpy as np"), ("f", source)
+    lines = source.split("\n")
+    return [
+        (f.kind, f.of_two, [lines[s.line - 1][s.column : s.end].strip() for s in f.spans])
+        for f in repairs(pieces, "f", cases, lambda: more, right, entries)
+    ]
+
+
+# --------------------------------------------------------------------------------------------- one repair, or two
+
+
+def test_a_repair_counts_if_it_mends_cases_that_are_not_shown():
+    """2 * 1 is 2 alone: of the two repairs that the shown case allows, another one tells which is right."""
+    source, shown = "def f(a, b):\n    return a + b", [(np.array([2.0]), np.array([1.0]))]
+    by_shown = found(np.multiply, source, shown, fresh=[])
+    by_more = found(np.multiply, source, shown, fresh=[(np.array([3.0]), np.array([5.0]))])
+    assert ("operator", False, ["+"]) in by_shown and ("too much", False, ["b"]) in by_shown
+    assert ("operator", False, ["+"]) in by_more and ("too much", False, ["b"]) not in by_more
+
+
+def test_of_two_mistakes_the_one_that_makes_more_right_is_told():
+    source = "def f(a, b):\n    low = np.maximum(a, b)\n    return np.append(low - a, -b.sum())"
+    assert found(lambda a, b: np.append(np.minimum(a, b) - a, b.sum()), source) == [("function", True, ["np.maximum"])]
+
+
+def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
+    source = "def f(a, b):\n    return a + b"
+    assert found(np.multiply, source)
+    monkeypatch.setattr(repair, "MOST_S_OF_ALL", 0.0)
+    assert found(np.multiply, source) == []
+
+
+def test_three_mistakes_are_not_found():
+    source = "def f(a, b):\n    return np.stack([a + 1.3, b * 1.7, a * b - 0.9 * a])[:, :2].sum(axis=0) ** 3"
+    assert found(lambda a, b: np.stack([a, b, a - b])[:, :2].prod(axis=0), source) == []
+
+
+PIECES = (("f", "def f(a, b):\n    return a + b - a"),)
+
+
+def said(*findings):
+    """The first sentence about findings, and how many places it marks."""
+    question = Question(name="0.f", reference=lambda a, b: b, inputs=lambda rng: ())
+    sentence = next(found_in_the_program(question, PIECES, findings, values_are_right=False))
+    return sentence.says, sum(len(line.parts) for line in sentence.marked)
+
+
+def test_at_most_two_places_are_offered_to_choose_from():
+    one, other = (Finding("name", 0, (Span(2, column, 2, column + 1),)) for column in (11, 15))
+    both, others = (
+        Finding("name", 0, spans) for spans in ((one.spans + other.spans), (Span(2, 19, 2, 20), *one.spans))
+    )
+    assert said(one, other)[0].startswith("Change one of the two") and said(one, other)[1] == 2
+    assert "one of the two" not in said(both, others)[0]
+
+
+def test_what_is_said_of_two_mistakes_promises_nothing_of_one():
+    for kind in REPAIRS:
+        says, _ = said(Finding(kind, 0, (Span(2, 11, 2, 12),), of_two=True))
+        assert says.startswith("Two things are wrong. First: ") and "every case is right" not in says
+
+
+# --------------------------------------------------------------------------------------------- what stands idle
+
+
+@pytest.mark.parametrize(
+    "source, kinds",
+    [
+        ("def f(a, b):\n    return a", ["unread"]),
+        ("def f(a, b):\n    c = a * b\n    return a", ["unused"]),
+        ("def f(a, b):\n    c = a * b\n    c += 1\n    return c", []),
+        ("def f(a, b):\n    def g(x):\n        return x + b\n    return g(a)", []),
+        ("def f(a, b):\n    for _ in range(3):\n        a = a + b\n    return a", []),
+        ("def f(a, b):\n    x, y = a\n    return x + b", []),  # what is unpacked need not be used
+        ("def f(a, b):\n    c = 1\n    return eval('a + b + c')", []),
+        ("def g(a, b):\n    return a\ndef f(a, b):\n    return g(a, b)", []),  # of the answer alone
+    ],
+)
+def test_what_is_never_read_is_found(source, kinds):
+    assert [finding.kind for finding in idle([("f", source)], "f")] == kinds
+
+
+# --------------------------------------------------------------------------------------------- what cases share
+
+
+def contrasted(right, *values):
+    """What is told of cases of one argument."""
+    question = Question(name="0.f", reference=lambda y: y, inputs=lambda rng: ())
+    return contrast(question, [Case((value,), value, False) for value in values], right)
+
+
+SOME, IGNORED = np.array([[1, 2], [3, 4]], np.uint8), np.array([[1, 255], [3, 4]], np.uint8)
+WIDE = np.ones((2, 3))
+
+
+def test_the_kind_of_the_wrong_cases_is_told_if_none_of_it_is_right():
+    assert "wrong whenever y holds 255, and right in the 2 other cases" in contrasted(
+        [True, False, True, False], SOME, IGNORED, SOME + 1, IGNORED + 0
+    )
+    assert "wrong whenever y is not square" in contrasted([True, True, False, False], SOME, SOME, WIDE, WIDE)
+    assert "wrong whenever y is negative" in contrasted([True, True, False, False], 1.0, 2.0, -1.0, -3.0)
+
+
+def test_a_kind_of_which_some_are_right_is_told_if_most_others_are():
+    assert "wrong only when y holds 255: in the 4 cases" in contrasted(
+        [True] * 5 + [False] * 2, *[SOME] * 4, *[IGNORED] * 3
+    )
+
+
+def test_nothing_is_told_where_no_kind_tells_them_apart():
+    assert contrasted([True, False, True], SOME, SOME, SOME) == ""
+    assert contrasted([True, True, False], SOME, SOME, IGNORED) == ""  # one may be wrong for another reason
+    assert contrasted([False, False], IGNORED, IGNORED) == ""
+    assert contrasted([True, True], SOME, IGNORED) == ""
+
+
+def test_rows_that_are_one_list_are_told_before_anything_else_and_an_unread_argument_before_a_repair():
+    text = "def f(a, b):\n    n = [[0] * 3] * 3\n    n[0][0] = a[0]\n    return n"
+    assert [(f.kind, f.spans[0].line) for f in idle([("f", text)], "f")] == [("aliased", 2), ("unread", 1)]
+    harmless = "def f(a, b):\n    n = np.array([[0] * 3] * 3)\n    return n + a + b"
+    assert idle([("f", harmless)], "f") == []
+    repair, unread = Finding("name", 0, (Span(2, 11, 2, 12),)), Finding("unread", 0, (Span(1, 6, 1, 7),))
+    assert said(repair, unread)[0].startswith("Your function never reads the marked argument")

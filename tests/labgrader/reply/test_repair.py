@@ -1,0 +1,119 @@
+"""Wrong answers that readers of the labs gave: the marked place is where a change mends them.
+
+tests/data/answers.json has them, each with its question, what the reader thought, and what a good reply is: the kind of
+the sentence, and the marked parts with their lines' numbers.
+tests/data/refused.json has wrong ones that were right by mistake once, or whose hint, some words of which it has, came
+without a look at their program; of a question's listed mistakes none is among them.
+"""
+
+import ast
+import json
+from pathlib import Path
+
+import pytest
+
+from labgrader.course import find
+from labgrader.program.live import LiveProgram, is_function
+from labgrader.program.slice import Program
+from labgrader.question import PUBLIC_SEED
+from labgrader.reply import repair as search
+from labgrader.reply.finding import IDLE, MOST_FINDINGS, WATCHES, Finding, read
+from labgrader.reply.judge import judge
+from labgrader.reply.mutation import mutations
+from labgrader.reply.repair_job import Job, comparing_of, pairs
+from labgrader.reply.sentences import sentences
+from labgrader.run import plain
+from labgrader.run.run import Answer, Limits, more_public_cases, public_cases
+
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
+ANSWERS, REFUSED = (
+    json.loads((Path(__file__).parents[2] / "data" / f"{name}.json").read_text()) for name in ("answers", "refused")
+)
+UNSEEN = (101, 102, 103)  # seeds that repair does not try
+
+
+def pieces_of(answer: dict) -> tuple[tuple[str, str], ...]:
+    """The program of an answer, as a check cuts it."""
+    return ("quiet", "import numpy as np"), (find(answer["question"]).function, answer["source"])
+
+
+def first_sentence(verdict, pieces, found):
+    """The kind of what is said first if no hand-written hint fits, and the parts that it marks."""
+    said = sentences(verdict.question, verdict.cases, verdict.outputs, pieces, found)
+    sentence = next(sentence for sentence in said if sentence.kind != "misconception")
+    return sentence.kind, [f"{line.number}: {line.text[a:b]}" for line in sentence.marked for a, b in line.parts]
+
+
+def mended(question, pieces, finding) -> bool:
+    """Whether some change of the kind, at the places of a finding, makes the answer right with other seeds."""
+    label, text = pieces[finding.piece]
+    tree = ast.parse(text)
+    for statement in filter(is_function, tree.body):
+        for mutation in mutations(statement):
+            if mutation.kind == finding.kind and mutation.spans == finding.spans:
+                with mutation.applied():
+                    changed = ast.unparse(tree)
+                answer = LiveProgram(question.function, (pieces[0], (label, changed))).answer
+                if all(judge(question, answer, seed).passed for seed in UNSEEN):
+                    return True
+    return False
+
+
+@pytest.fixture(autouse=True)
+def a_fast_machine(monkeypatch):
+    """What is found does not hang on how fast this machine is, or on what else it does."""
+    monkeypatch.setattr(search, "MOST_S", 30.0)
+
+
+def some(answers: list) -> list:
+    """Every fifth at once, and all of them at night."""
+    return [pytest.param(a, marks=[pytest.mark.nightly] if i % 5 else []) for i, a in enumerate(answers)]
+
+
+def looked_at(question, pieces, repair: bool = True) -> list[Finding]:
+    """What a worker finds in a program, found in this process."""
+    job = Job(*comparing_of(question), question.function, pieces, pairs(public_cases(question)))
+    found = read(job.watch(), pieces)
+    if repair:
+        found += read(job.repair(lambda: pairs(more_public_cases(question))), pieces)
+    return found[:MOST_FINDINGS]
+
+
+@pytest.mark.parametrize("answer", some(ANSWERS), ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}")
+def test_an_answer_is_told_what_its_reader_can_use(answer):
+    """A listed mistake may take the place of any other sentence, which still is true."""
+    question, pieces = find(answer["question"]), pieces_of(answer)
+    verdict = judge(question, LiveProgram(question.function, pieces).answer, PUBLIC_SEED)
+    assert not verdict.passed
+    if not answer["marked"]:
+        assert verdict.sentence.kind in (answer["kind"], "misconception"), verdict.hint
+        return
+    comes_first = answer["kind"] in WATCHES and answer["kind"] != "writes"  # whatever repair finds
+    found = looked_at(question, pieces, repair=not comes_first)
+    assert first_sentence(verdict, pieces, found) == (answer["kind"], answer["marked"])
+    if answer["kind"] not in (*WATCHES, *IDLE):
+        assert mended(question, pieces, next(f for f in found if f.kind == answer["kind"]))
+
+
+@pytest.mark.parametrize("answer", [a for a in ANSWERS if a["kind"] == "cast"], ids=lambda a: a["thought"])
+def test_values_that_another_type_would_mend_are_not_called_right(answer):
+    question, pieces = find(answer["question"]), pieces_of(answer)
+    verdict = judge(question, LiveProgram(question.function, pieces).answer, PUBLIC_SEED)
+    said = sentences(question, verdict.cases, verdict.outputs, pieces, looked_at(question, pieces))
+    assert next(s.says for s in said if s.kind == "cast").startswith("Another type belongs at the marked place")
+
+
+@pytest.mark.parametrize("answer", [a for a in ANSWERS if a["marked"]][::15], ids=lambda a: a["thought"])
+def test_a_worker_finds_the_same(answer):
+    question, pieces = find(answer["question"]), pieces_of(answer)
+    with Answer(question, Program(pieces), plain.fresh_worker, Limits()) as run:
+        assert run.findings() == looked_at(question, pieces)
+
+
+@pytest.mark.parametrize("answer", REFUSED, ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}")
+def test_what_was_accepted_by_mistake_is_refused_and_what_was_only_counted_is_named(answer):
+    question = find(answer["question"])
+    function = LiveProgram(question.function, pieces_of(answer)).answer
+    first, *others = (judge(question, function, seed) for seed in (0, 1, 2, 16))
+    assert not first.passed and not any(verdict.passed for verdict in others)
+    assert answer["hint"] in (first.hint or "")

@@ -1,0 +1,83 @@
+"""What the watches show of a wrong answer, and that they are silent where no wrong output hangs on it."""
+
+import numpy as np
+import pytest
+
+from labgrader.reply.watches import readings
+
+pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
+
+
+def softmax(z):
+    e = np.exp(z - z.max())
+    return e / e.sum()
+
+
+def shares(n):
+    return np.divide(n, n.sum(), out=np.zeros(n.shape), where=n.sum() > 0)
+
+
+def mean_or_nan(n):
+    with np.errstate(all="ignore"):
+        return n.sum() / np.float64(n.size)
+
+
+def grey(rgb):
+    return rgb.astype(int).sum(axis=-1) / 3
+
+
+def right(expected, got):
+    return np.shape(expected) == np.shape(got) and np.allclose(expected, got, equal_nan=True)
+
+
+Z = (np.array([1.0, 2.0]), np.array([3.0, 1000.0]))
+N = (np.array([3.0, 1.0]), np.zeros(2))
+RGB = (np.array([[1, 2, 3]], np.uint8), np.array([[200, 100, 7], [9, 9, 9]], np.uint8))
+# A reference, arguments, an answer, and what is found with its marked part.
+FOUND = [
+    (softmax, Z, "def f(z):\n    e = np.exp(z)\n    return e / e.sum()", [("overflow", "np.exp(z)")]),
+    (softmax, Z, "e = lambda z: np.exp(z)\ndef f(z): return e(z) / e(z).sum()", [("overflow", "np.exp(z)")]),
+    (softmax, Z, "def f(z):\n    return np.log(z - 5)", [("no number", "np.log(z - 5)")]),
+    (shares, N, "def f(n):\n    s = n.sum()\n    return n * (1 / s)", [("division", "1 / s")]),
+    (shares, N, "def f(n):\n    n /= max(n.sum(), 1)\n    return n", [("writes", "n /= max(n.sum(), 1)")]),
+    (shares, N, "def f(n):\n    n.sort()\n    return shares(n)\n", [("writes", "n.sort()")]),
+    (grey, RGB, "def f(x):\n    s = x[:, 0] + x[:, 1] + x[:, 2]\n    return s / 3",
+     [("wraps", "x[:, 0] + x[:, 1] + x[:, 2]")]),
+    (grey, RGB, "def f(x):\n    r, g, b = x.T\n    s = r + g\n    return (s + 1.0 * b) / 3", [("wraps", "r + g")]),
+]  # fmt: skip
+SILENT = [
+    (mean_or_nan, (np.ones(3), np.zeros(0)), "def f(n):\n    return n.sum() / np.float64(n.size)"),  # NaN on purpose
+    (mean_or_nan, (np.ones(3), np.zeros(0)), "def f(n):\n    return n.sum() / np.float64(n.size) + (n.size > 0)"),
+    (softmax, Z, "def f(z):\n    np.exp(z)\n    return 0 * z"),  # overflows, and nothing that is wrong hangs on it
+    (softmax, Z[:1], "def f(z):\n    return np.exp(z)"),  # wrong, and nothing overflows
+    (grey, RGB, "def f(x):\n    return (x[:, 0] + x[:, 1] + x[:, 2]) / 4"),  # wraps, and is wrong all the same
+    (grey, RGB, "def f(x):\n    return x.sum(axis=1) / 2"),
+    (shares, N, "def f(n):\n    return undefined"),
+    (shares, N, "def f(n:\n"),
+    (shares, N, "def g(n):\n    return n"),
+    (shares, N, "def f(n):\n    while True: pass"),
+    (shares, N, "def f(n):\n    raise SystemExit"),
+]
+
+
+def watched(reference, arguments, source):
+    """Kinds and marked texts of what the watches find."""
+    pieces = ("quiet", "import numpy as np"), ("shares, the kit's", "def shares(n): return n"), ("f", source)
+    found = readings(pieces, "f", [((a,), reference(a)) for a in arguments], right)
+    texts = [source.split("\n")[span.line - 1][span.column : span.end] for f in found for span in f.spans]
+    return list(zip([f.kind for f in found], texts, strict=True)), found
+
+
+@pytest.mark.parametrize("reference, arguments, source, shown", FOUND)
+def test_the_line_is_found(reference, arguments, source, shown):
+    assert watched(reference, arguments, source)[0] == shown
+
+
+@pytest.mark.parametrize("reference, arguments, source", SILENT)
+def test_nothing_is_found_where_nothing_hangs_on_it(reference, arguments, source):
+    assert watched(reference, arguments, source)[0] == []
+
+
+def test_the_number_that_is_too_large_is_told():
+    (finding,) = watched(softmax, Z, "def f(z): return np.exp(z) / np.exp(z).sum()")[1]
+    assert finding.value == 1000.0
