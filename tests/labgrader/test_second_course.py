@@ -54,7 +54,7 @@ from pathlib import Path
 from sums import check
 from labgrader.file_check import check_file
 from labgrader.grade_course import grade_course
-from labgrader.release import release
+from labgrader.release.release import release
 
 topic, course = "01_adding", Path(".")
 changed = [path.as_posix() for path in release(course)]

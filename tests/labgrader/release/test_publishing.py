@@ -20,7 +20,7 @@ from labgrader.program.cell import Cell, Parsed
 from labgrader.release import publishing
 from labgrader.release.publishing import published, unpublished
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SITE = replace(course(), repository="https://github.com/owner/name", wheel="labkit-manipulation==0.2.0")
 NOTEBOOKS = sorted([*ROOT.glob("lessons/*.ipynb"), *ROOT.glob("labs/*/*.ipynb")])
 HERE = re.compile(

@@ -17,7 +17,7 @@ from labgrader.course import course as course_here
 from labgrader.release.bundle import bundle, topics_of_week
 from labgrader.release.release import mistakes, read, release, tidy, to_bytes
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SOLUTION = '''def double(x):
     """Twice x, an array."""
     ### BEGIN SOLUTION

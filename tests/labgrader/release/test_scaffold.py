@@ -17,7 +17,7 @@ from labgrader.grade_course import grade_course
 from labgrader.release import release, scaffold
 from tests.labgrader.reply import test_questions
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 OF_LAB, OF_QUESTION = 9, 16  # TODOs that a new lab has, and a new question
 
 
