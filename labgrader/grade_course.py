@@ -21,6 +21,7 @@ from labgrader.report.forget import keep_out_of_git
 from labgrader.report.outputs import write_outputs
 from labgrader.report.overview import add_comment, read_comments, standings
 from labgrader.sandbox.sandbox import Limits
+from labgrader.support import keep_closed
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ def private() -> Iterator[None]:
 
 def close_to_others(course: Path, out: Path) -> None:
     """Take the rights of others away from what earlier runs, or nbgrader, may have left open."""
-    for folder in (out, *(path for path in out.rglob("*") if path.is_dir()), course / "autograded"):
+    for folder in (out, *(path for path in out.rglob("*") if path.is_dir())):
         if folder.is_dir():
             folder.chmod(0o700)
-    (course / "gradebook.db").chmod(0o600)
+    keep_closed(course)

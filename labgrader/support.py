@@ -1,8 +1,9 @@
 """What several modules here need: files written whole or not at all, refusals in words, variables for a while."""
 
 import os
+import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 # What of a course's folder is about persons, for the instructor alone; folders end with a slash.
@@ -10,6 +11,20 @@ PRIVATE = (
     *("downloaded/", "submitted/", "autograded/", "feedback/", "grades/"),
     *("gradebook.db*", "roster.csv", "course.toml", "changes.json"),
 )
+
+
+def keep_closed(course: Path) -> None:
+    """Take the rights of others away from what a course's folder holds about persons, whoever wrote it.
+
+    A folder with the set-group-ID bit is shared by its group, which keeps its rights.
+    """
+    course = Path(course)
+    rights = 0o2770 if course.stat().st_mode & stat.S_ISGID else 0o700
+    for name in PRIVATE:
+        for path in course.glob(name.rstrip("/")):
+            if not path.is_symlink():
+                with suppress(OSError):  # of what a colleague owns
+                    path.chmod(stat.S_IMODE(path.stat().st_mode) & rights & (~0 if path.is_dir() else 0o660))
 
 
 def write_atomically(path, data: bytes) -> None:

@@ -9,6 +9,7 @@ import datetime
 import json
 import os
 import re
+import secrets
 import subprocess
 import sys
 import warnings
@@ -34,7 +35,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from labgrader.grade.batch import Record
 from labgrader.grade.markdown import harmless_markdown
 from labgrader.grade.nbgrader_plugins import KERNEL, RUBRIC_TAG
-from labgrader.handin.reading import Lab, Submission, grade_id, source_of
+from labgrader.handin.reading import Lab, Submission, grade_id, source_of, text_of
 from labgrader.handin.roster import Person, person_of
 from labgrader.report.outputs import lines_of
 from labgrader.sandbox.sandbox import NO_SANDBOX
@@ -80,16 +81,12 @@ def write_gradebook(
                     name_student(gradebook, record.student, person_of(roster, record.student))
                     copied = copy_for_formgrader(lab, record, submission, comments, rubrics)
                     wanted = {f"check_{result.question}": result.points for result in record.results}
-                    wanted["timestamp"] = timestamp_of(submission)
+                    wanted["timestamp"] = time_of(submission.timestamp)
+                    write_beside(target, submission)
                     if there is not None and wanted.items() <= there.items() and is_file_of(target, copied):
                         continue
                     write_scores(gradebook, lab, record, submission, comments)
                     write_atomically(target, copied)
-                    # `nbgrader generate_feedback` copies them to the feedback, and release_feedback reads them there.
-                    files = {"timestamp.txt": submission.timestamp, "submission_secret.txt": submission.secret}
-                    for name, text in files.items():
-                        if text:
-                            write_atomically(target.with_name(name), text.encode())
                 gradebook.db.commit()
             except Exception as error:  # of one student: the others' scores are written all the same
                 if fault_of_file(error):
@@ -171,7 +168,7 @@ def register(course: Path, lab: Lab) -> None:
 def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, comments: Mapping[str, str]) -> None:
     """Write one submission's scores, what is said about each answer, and what a person has to grade."""
     where = (lab.topic, lab.topic, record.student)
-    gradebook.update_or_create_submission(lab.topic, record.student, timestamp=timestamp_of(submission))
+    gradebook.update_or_create_submission(lab.topic, record.student, timestamp=time_of(submission.timestamp))
     for result in record.results:
         grade = gradebook.find_grade(f"check_{result.question}", *where)
         grade.auto_score = result.points
@@ -207,10 +204,32 @@ def write_nothing(gradebook, lab: Lab, record: Record) -> None:
         grade.auto_score, grade.needs_manual_grade = 0.0, True
 
 
-def timestamp_of(submission: Submission) -> datetime.datetime | None:
-    """When it was handed in, if its timestamp says so in a way that a calendar has."""
+def write_beside(target: Path, submission: Submission) -> None:
+    """Write timestamp.txt and submission_secret.txt beside a copy: the student's, or new ones where there are none.
+
+    `nbgrader generate_feedback` copies them to the feedback. It stops at a time that is none, and `release_feedback` at
+    a student without them: nobody after that one gets feedback.
+    """
+    new = {
+        "timestamp.txt": (submission.timestamp, lambda text: time_of(text) is not None, now),
+        "submission_secret.txt": (submission.secret, bool, secrets.token_hex),
+    }
+    for name, (text, is_usable, make) in new.items():
+        there = text_of(target.with_name(name))
+        wanted = next(filter(is_usable, (text, there)), None) or make()
+        if wanted != there:
+            write_atomically(target.with_name(name), wanted.encode())
+
+
+def now() -> str:
+    """The time as nbgrader writes it."""
+    return f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def time_of(text: str) -> datetime.datetime | None:
+    """The time in a timestamp.txt, if it is one in a way that a calendar has."""
     try:
-        stamp = parse_utc(submission.timestamp)
+        stamp = parse_utc(text)
         return stamp if stamp and 2000 <= stamp.year < 2200 else None
     except Exception:  # dateutil raises many kinds for what is no date
         return None

@@ -25,6 +25,7 @@ from pathlib import Path, PurePosixPath
 from nbgrader.plugins import ExtractorPlugin, FileNameCollectorPlugin
 
 from labgrader.program.notebook import LARGEST_NOTEBOOK
+from labgrader.support import keep_closed
 
 # A name may hold a line's end, which `.` takes in as well: else what a platform wrote would not be seen around it.
 MOODLE = re.compile(r"(?P<name>[^_]+)_(?P<number>[0-9]+)_assignsubmission_file_?(?P<file>.*)", re.DOTALL)
@@ -114,6 +115,10 @@ class LmsExtractor(ExtractorPlugin):
     def extract(self, archive_path: str, extracted_path: str) -> None:
         """Extract what is in a folder of zips; notebooks that lie there without a zip are copied."""
         archive, target = Path(archive_path), Path(extracted_path)
+        course = getattr(getattr(self.parent, "coursedir", None), "root", None)
+        if course:  # nbgrader copies to submitted next
+            (Path(course) / "submitted").mkdir(exist_ok=True)
+            keep_closed(course)
         for path in archive.rglob("*.ipynb"):
             self.write(target / "files" / path.relative_to(archive), path.read_bytes(), 0.0)
         for path in sorted(archive.rglob("*.zip")):
