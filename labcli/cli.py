@@ -5,6 +5,7 @@ only when it runs, and prints what comes back; it is named below. Wrong input ma
 `main` says it in one line.
 """
 
+import os
 import sys
 import traceback
 from typing import Annotated
@@ -55,6 +56,7 @@ def main() -> None:
     """Run a command. What the user can mend is one line and exit status 2; Ctrl-C is 130; --debug shows tracebacks."""
     # nbformat's validator would build grammars of internationalised addresses for a second, and notebooks have none.
     sys.modules.setdefault("rfc3987_syntax", None)
+    os.environ["PYTHONSAFEPATH"] = "1"  # no Python process that a command starts imports what lies in this folder
     try:
         app(prog_name="labkit")
     except Exception as error:

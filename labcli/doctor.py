@@ -83,7 +83,7 @@ def check_packages() -> Iterator[Finding]:
     for extra in USERS:
         of_extra = requirements(KIT, extra)
         yield complete(f"[{extra}]", {name: of_extra[name] for name in of_extra.keys() - runtime.keys()}, extra)
-    done = subprocess.run([sys.executable, "-m", "pip", "check"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-P", "-m", "pip", "check"], capture_output=True, text=True)
     found, *more = (done.stdout or done.stderr).strip().splitlines()  # a finding a line
     yield Finding("versions", NOTE if done.returncode else OK, found + f", and {len(more)} more" * bool(more))
 

@@ -2,6 +2,7 @@
 
 import os
 import stat
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -42,6 +43,12 @@ def write_atomically(path, data: bytes) -> None:
         raise OSError(error.errno, f"could not write the file ({os.strerror(error.errno or 0)})", str(path)) from error
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def git(folder: Path, *words: str) -> subprocess.CompletedProcess:
+    """Run a command of git's in a folder, without the programs that the folder's own configuration names."""
+    safe = ("-c", "core.fsmonitor=false", "-c", f"core.hooksPath={os.devnull}")
+    return subprocess.run(["git", "-C", str(Path(folder).resolve()), *safe, *words], capture_output=True, check=False)
 
 
 def require(name: str, fits, expected: str, got) -> None:

@@ -59,6 +59,7 @@ def labkit(monkeypatch):
 
     def run(*words) -> int:
         monkeypatch.setattr(sys, "argv", ["labkit", *map(str, words)])
+        monkeypatch.setenv("PYTHONSAFEPATH", "")  # which `main` sets
         with pytest.raises(SystemExit) as stop:
             cli.main()
         return stop.value.code

@@ -49,7 +49,7 @@ class Diagnoser:
         self.limits = f"{seconds} s and {memory >> 30} GB"
         path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
         self.process = subprocess.Popen(
-            [sys.executable, "-c", f"from labgrader.grade.diagnose_outputs import main; main({seconds}, {memory})"],
+            [sys.executable, "-P", "-c", f"from labgrader.grade.diagnose_outputs import main; main({seconds}, {memory})"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

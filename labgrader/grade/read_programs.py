@@ -42,7 +42,7 @@ def read_all(sources: Sequence[str]) -> dict[str, Read | None]:
     path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
     while len(found) < len(sources):
         done = subprocess.run(
-            [sys.executable, "-c", "from labgrader.grade.read_programs import main; main()"],
+            [sys.executable, "-P", "-c", "from labgrader.grade.read_programs import main; main()"],
             input=json.dumps(sources[len(found) :]).encode(),
             capture_output=True,
             env=os.environ | {"PYTHONPATH": path},

@@ -10,7 +10,6 @@ import json
 import re
 import shutil
 import sqlite3
-import subprocess
 import tomllib
 import zipfile
 from contextlib import closing, suppress
@@ -27,7 +26,7 @@ from labgrader.handin.collect import student_and_notebook
 from labgrader.handin.roster import FILE as ROSTER
 from labgrader.handin.roster import keys_of, person_of, plain, read_roster
 from labgrader.report.overview import COMMENTS_FILE, read_comments
-from labgrader.support import PRIVATE, counted, write_atomically
+from labgrader.support import PRIVATE, counted, git, write_atomically
 
 EXTENSION = re.compile(r"(?ms)^[ \t]*\[\[[ \t]*extension[ \t]*\]\].*?(?=^[ \t]*\[|\Z)")
 STEPS = ("submitted", "autograded", "feedback")
@@ -41,9 +40,8 @@ def keep_out_of_git(course: Path) -> list[str]:
     course, added = Path(course), []
     for name in PRIVATE:
         for path in sorted(course.glob(name.rstrip("/"))):
-            command = ["git", "-C", str(course.resolve()), "check-ignore", "-q", str(path.resolve())]
             try:
-                status = subprocess.run(command, capture_output=True, check=False).returncode
+                status = git(course, "check-ignore", "-q", str(path.resolve())).returncode
             except OSError:
                 return []
             if status == 1 and f"/{name}" not in added:

@@ -11,6 +11,7 @@ from pathlib import Path
 import grading_course as kit
 import pytest
 import serving
+from nbgrader.utils import notebook_hash
 
 from labgrader.course import asked
 from labgrader.grade.gradebook import opened
@@ -71,6 +72,35 @@ def test_autograde_refuses_in_one_sentence_and_touches_nothing(course):
     done = autograde(course)
     assert done.returncode == 1 and SAYS in done.stderr and "Traceback" not in done.stderr
     assert scores(course) == POINTS and copies(course) == before
+
+
+def test_feedback_reaches_all_whoever_handed_in_no_secret_and_no_time_and_nobody_else_reads_the_course(course):
+    """Ada's come from a hub, Ben handed in by Moodle, or wrote a time that is none; the commands run with umask 022."""
+    for name, text in (("timestamp.txt", "2026-10-01 12:00:00 UTC"), ("submission_secret.txt", "hers")):
+        (course / "submitted/ada" / TOPIC / name).write_text(text)
+    (course / "submitted/ben" / TOPIC / "timestamp.txt").write_text("yesterday")
+    (course / "roster.csv").write_text("id\nada\nben\n")
+    for path in (course, *course.rglob("*")):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    exchange = course.with_name("exchange")
+    exchange.mkdir()
+    grade(course)
+    beside = course / "autograded/ben" / TOPIC
+    kept = [(beside / name).read_text() for name in ("timestamp.txt", "submission_secret.txt")]
+    for words in (["generate_feedback", TOPIC], ["release_feedback", TOPIC, f"--Exchange.root={exchange}"]):
+        command = [sys.executable, "-m", "nbgrader", *words]
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        done = subprocess.run(command, cwd=course, env=environment, umask=0o022, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    released = sorted(exchange.glob("labkit/feedback/*.html"))
+    secrets = {student: (course / f"feedback/{student}/{TOPIC}/submission_secret.txt").read_text() for student in POINTS}
+    hashes = {notebook_hash(secret=secret, notebook_id=TOPIC) for secret in secrets.values()}
+    assert {page.stem for page in released} == hashes and len(released) == 2 and secrets["ada"] == "hers"
+    assert all(page.stat().st_mode & 0o044 == 0o044 for page in released)  # students fetch them
+    for name in ("submitted", "autograded", "feedback", "grades", "roster.csv", "gradebook.db"):
+        assert (course / name).stat().st_mode & 0o077 == 0, name
+    grade(course)
+    assert kept == [(beside / name).read_text() for name in ("timestamp.txt", "submission_secret.txt")]
 
 
 @pytest.mark.nightly

@@ -51,8 +51,9 @@ def collect(course: Path, files: dict[str, str | bytes], when: tuple[int, ...] =
     archive.write_bytes(zipped(files, when))
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "nbgrader", "zip_collect", TOPIC]
-    done = subprocess.run(command, cwd=course, env=environment, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=course, env=environment, umask=0o022, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+    assert not [name for name in ("downloaded", "submitted") if (course / name).stat().st_mode & 0o077]
     return done.stderr
 
 
