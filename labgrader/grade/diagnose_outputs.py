@@ -48,8 +48,9 @@ class Diagnoser:
     def __init__(self, seconds: int = SECONDS, memory: int = MEMORY):
         self.limits = f"{seconds} s and {memory >> 30} GB"
         path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
+        begin = f"from labgrader.grade.diagnose_outputs import main; main({seconds}, {memory})"
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-c", f"from labgrader.grade.diagnose_outputs import main; main({seconds}, {memory})"],
+            [sys.executable, "-P", "-c", begin],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -5,10 +5,11 @@ comes from the public cases that `check` uses. An answer that is right in them r
 secret and to this student alone, the same ones after each resubmission of a round; if it is wrong there, it earns
 nothing and its student reads one fixed sentence. So does one with an output that is right in them, where outputs may
 count one by one (`changes`). A batch judges everybody in public before anybody in secret (`batch`), so nothing that an
-answer does with secret arguments can reach a page of that batch. One thing outlives it: names of files that an answer
-looked for and did not find stay in the kernel's cache, where an answer of a later batch can tell by the time which ones
-were asked for. With many of them it can say of secret arguments on a public page what they were; `--new-round` draws
-others. What was read is forgotten between batches (`sandbox.forget_pages`).
+answer does with secret arguments can reach a page of that batch. The filter of system calls (`seccomp`) refuses what
+would outlive it, as far as we know of it, and what was read is forgotten between batches (`sandbox.forget_pages`). One
+thing is left that we know of: names of files that an answer looked for and did not find stay in the kernel's cache,
+where an answer of a later batch, or of late work, can tell by the time which ones were asked for. With many of them it
+can say of secret arguments on a public page what they were, or answer them from a table; `--new-round` draws others.
 """
 
 import hashlib
@@ -162,7 +163,7 @@ class Grading:
             refused = not_gradable(self.lab, name, program.refused)
             return replace(refused, program=self.submission.cells.get(name, ""))
         flags = copied_code.of_the_kit(self.cuts[name][1], question)
-        flags += [f"uses the kit's {other}, a later task, of which its own is wrong" for other in self.later(name)]
+        flags += self.of_later_tasks(name, lambda other: self.draft(other).right)
         first, late = program, program.late
         program = late if first.refused else first
         result = Result(name, 0.0, worth, "", flag="; ".join(flags), program=text_of(program), late=program is late)
@@ -191,14 +192,15 @@ class Grading:
             parts=() if problem.kind in LOOK_AT else right_parts(question, public_cases(question), outputs),
         )
 
-    def later(self, name: str) -> list[str]:
-        """The answers to tasks below its own that an answer calls, and has from the kit, since they are wrong.
+    def of_later_tasks(self, name: str, is_right: Callable[[str], bool]) -> list[str]:
+        """Say which answers to tasks below its own an answer calls, and has from the kit, since they are wrong.
 
         A later answer may hold an earlier one: mean IoU of one class alone is its IoU.
         """
         order = list(self.lab.answers)
         below = [other for other in self.cuts[name][0].calls if order.index(other) > order.index(name)]
-        return [other for other in below if not self.draft(other).right]
+        wrong = [other for other in below if not is_right(other)]
+        return [f"uses the kit's {other}, a later task, of which its own is wrong" for other in wrong]
 
     def is_right(self, question: Question, program: Program) -> bool:
         """Whether a program is right in the public cases."""
@@ -216,7 +218,13 @@ class Grading:
     def judged_in_secret(self, name: str, secret: str) -> Result:
         """Judge an answer on its student's cases; of one that is wrong in public only the parts."""
         question, draft = self.questions[name], self.draft(name)
-        program = self.program(name, lambda other: self.result(other, secret).right)
+
+        def is_right(other: str) -> bool:
+            return self.result(other, secret).right
+
+        program = self.program(name, is_right)
+        kits = [flag for flag in self.of_later_tasks(name, is_right) if flag not in draft.flag]
+        draft = replace(draft, flag="; ".join(filter(None, [draft.flag, *kits])))
         program = program.late if draft.late and program.late is not None else program
         if program.refused:
             return not_gradable(self.lab, name, program.refused) if draft.right else replace(draft, parts=())

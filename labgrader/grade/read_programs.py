@@ -16,6 +16,7 @@ from pathlib import Path
 
 from labgrader.grade.attempts import attempts
 from labgrader.grade.shapes import Shapes, shapes
+from labgrader.program.effects import without_idle
 
 LONGEST = 40_000  # characters of a program that is read
 SECONDS, MEMORY = 3, 1 << 30  # of a processor, for one program; bytes of address space, for the process
@@ -32,7 +33,8 @@ class Read:
 def read(source: str) -> Read:
     """Read a program here; raises what a parser raises for what is no Python."""
     tree = ast.parse(source)
-    return Read(shapes(tree), attempts(tree))
+    tried = attempts(tree)
+    return Read(shapes(without_idle(tree)), tried)
 
 
 def read_all(sources: Sequence[str]) -> dict[str, Read | None]:

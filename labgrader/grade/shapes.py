@@ -23,7 +23,7 @@ SWAPPED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE}
 ANY_ORDER = (ast.Add, ast.Mult, ast.BitAnd, ast.BitOr, ast.BitXor, ast.Eq, ast.NotEq)
 WORDS = (ast.operator, ast.unaryop, ast.boolop, ast.cmpop)
 
-Shapes = dict[str, list[int]]  # the lines of a program on which each of its shapes stands, by the shape's fingerprint
+Shapes = dict[str, list[int]]  # the lines of a program on which each of its shapes begins and ends, by fingerprint
 
 
 def shapes(tree: ast.Module) -> Shapes:
@@ -79,12 +79,15 @@ class Reader:
         return self.keep("for", [self.text(node.target), self.text(node.iter)], node.iter)
 
     def keep(self, word: str, parts: Sequence[tuple[str, int]], node: ast.AST) -> tuple[str, int]:
-        """Make a shape of a word and the texts of what is in it; kept with the lines where its node stands."""
+        """Make a shape of a word and the texts of what is in it; kept with the first and last line of its node.
+
+        All lines between them would take the square of a long expression's lines.
+        """
         text, size = f"{word}({','.join(text for text, _ in parts)})", 1 + sum(size for _, size in parts)
         if len(text) > LONGEST_TEXT:
             text = hashlib.sha256(text.encode()).hexdigest()
         lines = self.found.setdefault(text, (size, set()))[1]
-        lines.update(range(node.lineno, node.end_lineno + 1) if hasattr(node, "lineno") else ())
+        lines.update((node.lineno, node.end_lineno) if hasattr(node, "lineno") else ())
         return text, size
 
     def text(self, node: ast.AST) -> tuple[str, int]:

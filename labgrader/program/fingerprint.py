@@ -1,10 +1,14 @@
 """Fingerprints of functions: of their syntax trees without what a copier changes first, names, comments and layout.
 
+What has no effect is left out (`effects`): one `pass` would else make another function of a copy.
+
 It needs the standard library alone, so that a stranger's text is parsed in the sandbox.
 """
 
 import ast
 import hashlib
+
+from labgrader.program.effects import without_idle
 
 LEAST_NODES = 45  # of a syntax tree: anybody may write a shorter function just so
 
@@ -12,7 +16,7 @@ LEAST_NODES = 45  # of a syntax tree: anybody may write a shorter function just 
 def fingerprints(source: str) -> dict[str, str]:
     """The fingerprints of the functions in a source that are long enough, with their names; {} if it is no Python."""
     try:
-        tree = ast.parse(source)
+        tree = without_idle(ast.parse(source))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return {}
     found = [(*words_of(node), node.name) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]

@@ -41,7 +41,7 @@ FAREWELL_S = 10.0  # for the server to kill a child
 # The worker's own files, from the folder of this package on.
 MODULES = ["labgrader/__init__.py", "labgrader/question.py", "labgrader/comparison.py"]
 for room, names in {
-    "program": "cell fingerprint live slice",
+    "program": "cell effects fingerprint live slice",
     "reply": "alarm finding idle mutation recipes repair repair_job steps syntax watches",
     "run": "process",
     "sandbox": "fork_server",

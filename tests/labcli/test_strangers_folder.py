@@ -1,8 +1,6 @@
 """Started in a folder that a stranger filled, such as an unpacked hand-in, no command runs code that lies there."""
 
-import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -47,7 +45,8 @@ def folder(tmp_path_factory):
     kit.submit(folder, "bob", TOPIC, kit.right_answers(TOPIC) | {"iou": "def iou(n):\n    return n.sum(0) / n.sum(1)"})
     marker = folder.with_name("ran")
     for name in NAMES:
-        (folder / f"{name}.py").write_text(f"open({str(marker)!r}, 'a').write('{name} ')\nraise ImportError('not this')")
+        text = f"open({str(marker)!r}, 'a').write('{name} ')\nraise ImportError('not this')"
+        (folder / f"{name}.py").write_text(text)
     program = folder.with_name("program")
     program.write_text(f"#!/bin/sh\necho git >> {marker}\n")
     program.chmod(0o755)

@@ -15,13 +15,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import grading_course as kit
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from labcli.cli import app
 from labgrader import grade_course as run
 from labgrader.course import course as the_course
-from labgrader.course import find
+from labgrader.course import find, of_topic
 from labgrader.grade import batch, gradebook
 from labgrader.grade import grade as grading
 from labgrader.grade.batch import read_record, record_path, secret_for
@@ -523,6 +524,24 @@ def test_an_answer_out_of_the_kits_to_a_later_task_is_for_a_person_to_judge(grad
     ada, ben, _ = (next(r for r in record.results if r.question == "iou") for record in grade(graded).records)
     assert ada.right and not ada.flag
     assert ben.right and ben.flag == "uses the kit's mean_iou, a later task, of which its own is wrong"
+
+
+def table(name: str, otherwise: str) -> str:
+    """An answer that knows the public cases by heart."""
+    known = {case.args[0].tobytes(): np.asarray(case.expected).tolist() for case in public_cases(of_topic(TOPIC)[name])}
+    known = repr(known).replace("nan", "float('nan')")
+    line = f"np.array({name}_known[n.tobytes()]) if n.tobytes() in {name}_known else {otherwise}"
+    return f"{name}_known = {known}\ndef {name}(n):\n    return {line}\n"
+
+
+def test_a_later_task_that_is_wrong_in_secret_alone_is_for_a_person_to_judge_too(graded):
+    """In public both are tables; in secret the table of mean IoU fails, and the kit's takes its place."""
+    both = {"iou": OF_MEANS.replace("iou(n)", "by_means(n)", 1) + table("iou", "by_means(n)")}
+    both |= {"mean_iou": table("mean_iou", "0.0")}
+    kit.submit(graded, "ada", TOPIC, kit.right_answers(TOPIC) | both)
+    results = {result.question: result for result in grade(graded).records[0].results}
+    assert not results["mean_iou"].right and results["iou"].right
+    assert results["iou"].flag == "uses the kit's mean_iou, a later task, of which its own is wrong"
 
 
 def test_a_task_that_was_another_one_when_the_lab_was_released_is_named_and_not_graded(course):

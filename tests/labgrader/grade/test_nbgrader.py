@@ -93,7 +93,9 @@ def test_feedback_reaches_all_whoever_handed_in_no_secret_and_no_time_and_nobody
         done = subprocess.run(command, cwd=course, env=environment, umask=0o022, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     released = sorted(exchange.glob("labkit/feedback/*.html"))
-    secrets = {student: (course / f"feedback/{student}/{TOPIC}/submission_secret.txt").read_text() for student in POINTS}
+    secrets = {
+        student: (course / f"feedback/{student}/{TOPIC}/submission_secret.txt").read_text() for student in POINTS
+    }
     hashes = {notebook_hash(secret=secret, notebook_id=TOPIC) for secret in secrets.values()}
     assert {page.stem for page in released} == hashes and len(released) == 2 and secrets["ada"] == "hers"
     assert all(page.stat().st_mode & 0o044 == 0o044 for page in released)  # students fetch them

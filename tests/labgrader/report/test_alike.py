@@ -1,16 +1,23 @@
 """Answers that are alike beyond what their task forces are listed for the instructor, and others are not."""
 
 import ast
+import json
 import re
+import tracemalloc
 from pathlib import Path
 
 import grading_course as kit
 import pytest
 
+from labgrader.course import of_topic, topics
+from labgrader.grade import copied_code
 from labgrader.grade.batch import Record, write_record
 from labgrader.grade.grade import Result
-from labgrader.grade.read_programs import read_all
+from labgrader.grade.read_programs import read, read_all
+from labgrader.grade.shapes import shapes
 from labgrader.handin.reading import read_lab
+from labgrader.program.effects import without_idle
+from labgrader.program.fingerprint import fingerprints
 from labgrader.report import alike
 from labgrader.report.alike import Found, old_records
 from labgrader.report.alike_page import MOST_NAMED, alike_page, told, write_alike
@@ -163,6 +170,75 @@ def test_a_copied_solution_or_reference_is_listed_whatever_was_added(labs):
     path.unlink()
     said = {(pair.question, str(pair.one), str(pair.other)) for pair in found.pairs}
     assert said == {("trimap_band", "ada", "the kit's reference"), ("mean_iou", "ada", "the model solution")}
+
+
+# Each is put into a copy at the beginning of each function, and before each of its last lines.
+IDLE = (
+    ("pass",),
+    ("...", "'a text'", "0", "True"),
+    ("idle = 1", "idle_2 = idle + 2", "idle_3 = [idle_2, idle]", "assert True"),
+    ("import math", "def idle_6(a):\n    return a + 1", "idle_7 = idle_6(2) + math.pi", "print('here')"),
+    ("if False:\n    return 1", "while 0:\n    x = 1", "for _ in range(3):\n    pass", "len('abc') > 2"),
+    ("idle_4 = 0", "idle_4 += 1", "idle_5: int = 3", "np.zeros(3)"),
+)
+
+
+class Padded(ast.NodeTransformer):
+    """Puts statements into each function."""
+
+    def __init__(self, lines: tuple[str, ...]):
+        self.added = [ast.parse(line).body[0] for line in lines]
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
+        node.body = [*self.added, *node.body[:-1], *self.added, node.body[-1]]
+        return node
+
+
+def padded(source: str, lines: tuple[str, ...]) -> str:
+    return ast.unparse(ast.fix_missing_locations(Padded(lines).visit(ast.parse(source))))
+
+
+@pytest.mark.parametrize("lines", IDLE, ids=lambda lines: lines[0].split("\n")[0])
+def test_lines_without_effect_hide_no_copy_of_a_reference(lines):
+    """All references that are long enough to be known, by their fingerprints; and as many as before by likeness."""
+    questions = [question for topic in topics() for question in of_topic(topic).values()]
+    known = [question for question in questions if fingerprints(question.source)]
+    assert len(known) >= 45
+    for question in known:
+        copied = fingerprints(padded(question.source, lines))
+        assert copied_code.of_the_kit(copied, question), question.name
+        kept, idle = (read(text).shapes.keys() for text in (question.source, padded(question.source, lines)))
+        assert kept == idle, question.name
+
+
+def test_what_has_an_effect_is_kept():
+    source = """def f(n, out):
+    n[0] = 1
+    out.sort()
+    np.fill_diagonal(out, 0)
+    np.add(n, 1, out=out)
+    x = g(n)
+    for k in range(3):
+        x += k
+    if n:
+        raise ValueError
+    return x"""
+    assert ast.unparse(without_idle(ast.parse(source))) == source
+    assert "y = 1" in ast.unparse(without_idle(ast.parse("y = 1\ndef f(): return 2")))  # others read it
+
+
+def test_a_long_chain_with_comments_between_its_lines_takes_little_memory():
+    """470 additions over many lines: 1.4 GB when each kept all lines that it spans."""
+    comments = "\n    #".join([""] * 80)
+    source = "def f(x):\n  return (x" + "".join(f"{comments}\n    + {i}" for i in range(470)) + ")"
+    tracemalloc.start()
+    try:
+        found = shapes(ast.parse(source))
+        size = len(json.dumps(found))
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert len(found) > 400 and used < 30 << 20 and size < 1 << 20
 
 
 def test_an_earlier_term_is_compared_with_this_one_but_not_with_itself_or_with_who_comes_again(labs, tmp_path):

@@ -143,6 +143,16 @@ def test_memory_a_file_and_the_time_of_a_processor_have_an_end(worker):
         "fcntl.lockf(file, fcntl.LOCK_SH)",
         "fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_RDLCK)",
         "fcntl.fcntl(os.open('/', 0), fcntl.F_NOTIFY, fcntl.DN_ACCESS)",
+        "fcntl.fcntl(file, 1036, numbers)",  # F_SET_RW_HINT
+        "fcntl.fcntl(file, 1035, numbers)",  # F_GET_RW_HINT
+        "fcntl.fcntl(file, 1038, numbers)",  # F_SET_FILE_RW_HINT
+        "fcntl.ioctl(file, 0x6612)",  # EXT4_IOC_PRECACHE_EXTENTS
+        "fcntl.ioctl(file, 0x80086601, numbers)",  # FS_IOC_GETFLAGS
+        "os.utime('/dev/null')",
+        "0 if libc.syscall(132, b'/dev/null', 0) == 0 else 1 / 0",  # utime
+        "0 if libc.syscall(235, b'/dev/null', 0) == 0 else 1 / 0",  # utimes
+        "0 if libc.syscall(261, -100, b'/dev/null', 0) == 0 else 1 / 0",  # futimesat
+        "0 if libc.futimens(os.open('/dev/null', os.O_RDWR), 0) == 0 else 1 / 0",
         "0 if libc.syscall(162) == 0 else 1 / 0",  # sync
         "0 if libc.madvise(mapped, 4096, 3) == 0 else 1 / 0",  # MADV_WILLNEED
         "0 if libc.madvise(mapped, 4096, 20) == 0 else 1 / 0",  # MADV_COLD
@@ -159,6 +169,19 @@ def test_system_calls_that_answers_do_not_need_are_refused(worker, call):
         """
     problem = told(worker, textwrap.dedent(known) + f"{call}\nreturn 1")
     assert getattr(problem, "kind", problem) == "exception"
+
+
+def test_what_python_asks_of_an_open_file_is_allowed(worker):
+    """To copy its number, to keep it from other programs, not to wait for it, and whether it is a terminal."""
+    line = """
+        import fcntl
+        file = os.open("/dev/null", os.O_RDWR)
+        twice = [os.dup(file), fcntl.fcntl(file, fcntl.F_DUPFD, 20), fcntl.fcntl(file, fcntl.F_DUPFD_CLOEXEC, 20)]
+        os.set_inheritable(file, True)
+        os.set_blocking(file, False)
+        return len({*twice, file}), os.get_inheritable(file), os.get_blocking(file), os.isatty(file)
+        """
+    assert told(worker, line) == (4, True, False, False)
 
 
 @pytest.mark.skipif(
