@@ -1,7 +1,10 @@
 """01_labels.labels_from_colours: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, MOST_CLASSES, array, image
 from labgrader.question import Question, holds, wrong
 
 
@@ -34,6 +37,16 @@ def _picture(rng):
     return rgb.astype(np.uint8), np.concatenate([palette, known])
 
 
+def _many_colours(rng, shape):
+    """Draw as many colours as a palette may have, and a picture of a shape; its last pixel has the last colour."""
+    palette = np.unique(rng.integers(0, 256, (2 * MOST_CLASSES, 3)), axis=0)
+    palette = rng.permutation(palette)[:MOST_CLASSES].astype(np.uint8)
+    unknown = rng.integers(0, 256, (*shape, 3))
+    rgb = np.where(rng.random((*shape, 1)) < 0.2, unknown, palette[rng.integers(0, MOST_CLASSES, shape)])
+    rgb[-1, -1] = palette[-1]
+    return rgb.astype(np.uint8), palette
+
+
 _PALETTE = np.array([[0, 0, 0], [0, 0, 255], [255, 0, 0], [0, 255, 0]], np.uint8)
 # Two known colours; then such as have a known one's number in a wrong base (255, 16, 10, 257, 100 ...).
 _NEARLY = np.array(
@@ -51,10 +64,14 @@ _AS_GREY = np.array([[[11, 1, 0], [1, 11, 0], [11, 0, 1], [1, 0, 11], [0, 11, 1]
 
 QUESTION = Question(
     reference=labels_from_colours,
-    inputs=_picture,
+    kinds={"rgb": image(), "palette": array("C 3", 0, 255, dtype="uint8", says=("1 to 255", "all different"))},
+    inputs=(_picture, *(partial(_many_colours, shape=s) for s in ((1, LONG), (LONG, 1), (5, 5)))),
     by_hand=(
         (np.array([[[15, 0, 7], [0, 9, 0]]], np.uint8), np.array([[0, 9, 0], [1, 1, 1]], np.uint8)),  # equally bright
+        (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE[:3]),
         (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
+        (np.array([[[9, 0, 7]], [[9, 1, 7]]], np.uint8), np.array([[9, 0, 7]], np.uint8)),  # one class
+        (np.array([[[1, 2, 3], [2, 3, 1]]], np.uint8), np.array([[2, 3, 1], [3, 1, 2], [1, 2, 3]], np.uint8)),
         (_NEARLY, _PALETTE),
         (np.array([[[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 255, 0]]], np.uint8), _PALETTE),  # 1 * 255 is 255 * 1
         (_AS_GREY, np.array([[0, 0, 34], [0, 34, 0], [34, 0, 0]], np.uint8)),

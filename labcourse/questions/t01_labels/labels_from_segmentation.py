@@ -1,7 +1,10 @@
 """01_labels.labels_from_segmentation: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array
 from labgrader.question import Question, holds, wrong
 
 
@@ -31,10 +34,26 @@ def _raw_mask(rng):
     return raw.astype(np.int32), class_of_part
 
 
+def _mask_of_many_links(rng, shape):
+    """Draw a mask of a shape, of bodies with 127 links."""
+    bodies = int(rng.integers(1, 3))
+    class_of_part = rng.integers(1, 256, (bodies, 128)).astype(np.uint8)
+    raw = rng.integers(0, bodies, shape) + (rng.integers(0, 128, shape) << 24)
+    return np.where(rng.random(shape) < 0.2, -1, raw).astype(np.int32), class_of_part
+
+
 QUESTION = Question(
     reference=labels_from_segmentation,
-    inputs=_raw_mask,
+    kinds={
+        "segmentation": array("H W", -1, dtype="int32", says="-1 where nothing is seen"),
+        "class_of_part": array(
+            "B L", 0, 255, dtype="uint8", lengths={"B": (1, 10**6), "L": (1, 128)}, says=("1,000,000", "128")
+        ),
+    },
+    inputs=(_raw_mask, *(partial(_mask_of_many_links, shape=s) for s in ((1, LONG), (LONG, 1), (4, 4)))),
     by_hand=(
+        (np.array([[-1]], np.int32), np.array([[2]], np.uint8)),
+        (np.array([[-1, 0, 16777217]], np.int32), np.array([[1, 0], [3, 2]], np.uint8)),
         (
             np.array([[-1, 0, 1], [2, 1 + (1 << 24), 1 + (2 << 24)]], np.int32),
             np.array([[1, 1, 1], [3, 3, 2], [2, 0, 0]], np.uint8),
@@ -45,7 +64,7 @@ QUESTION = Question(
         ),
         (
             np.array([[(1 << 17) + 1, (1 << 18) + 2, (1 << 19) + 3, 0]], np.int32),  # 17 to 19 bits are too few
-            (np.arange(3, 600_003) // 3 % 4).astype(np.uint8)[:, None],
+            (np.arange(3, 1_000_003) // 3 % 4).astype(np.uint8)[:, None],
         ),
         # sixteen links are 10 in hexadecimal
         (np.array([[9 << 24, 16 << 24, 17 << 24]], np.int32), (np.arange(18)[None] // 3 % 4).astype(np.uint8)),

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import array, count
 from labgrader.question import Question, holds, wrong
 
 
@@ -34,6 +35,13 @@ def _labels_and_size(rng):
     return y.astype(np.uint8), height, width
 
 
+def _long_side(rng):
+    """Draw a row or a column of any bytes, and another length of some thousand."""
+    old, new = (int(n) for n in rng.integers(3001, 6001, 2))
+    y = rng.integers(0, 256, old).astype(np.uint8)
+    return (y[:, None], new, 1) if rng.random() < 0.5 else (y[None], 1, new)
+
+
 _ALL_DIFFERENT = np.random.default_rng(1).permutation(24).astype(np.uint8).reshape(4, 6)
 _LONG = (np.arange(6000) % 251).astype(np.uint8)[:, None]  # in float32 3419.5 * 6000 / 4129 is off
 _LARGE = (np.add.outer(np.arange(301), 2 * np.arange(307)) % 5).astype(np.uint8)  # not every index is a uint8
@@ -41,7 +49,14 @@ _LARGE = (np.add.outer(np.arange(301), 2 * np.arange(307)) % 5).astype(np.uint8)
 
 QUESTION = Question(
     reference=resize_labels,
-    inputs=_labels_and_size,
+    kinds={
+        "y": array(
+            "H W", 0, 255, dtype="uint8", lengths={"H": (1, 6000), "W": (1, 6000)}, says=("any values", "1 to 6000")
+        ),
+        "height": count(1, 6000, says="1 to 6000"),
+        "width": count(1, 6000, says="1 to 6000"),
+    },
+    inputs=(_labels_and_size, _labels_and_size, _labels_and_size, _long_side),
     by_hand=(
         (np.array([[1, 3]], np.uint8), 1, 4),
         (np.arange(22, dtype=np.uint8)[:, None], 11, 1),  # in floats 7.5 / 11 * 22 is less than 15
@@ -49,6 +64,7 @@ QUESTION = Question(
         (np.array([[5], [9]], np.uint8), 11, 1),  # steps of 2 / 11, added up, are 1 too late
         (np.arange(14, dtype=np.uint8)[:, None], 9, 1),  # in floats 4.5 / (9 / 14) is not 7
         (_LONG, 4129, 1),
+        (_LONG.T, 1, 6000),
         (_ALL_DIFFERENT, 2, 3),  # a new centre falls between two old pixels
         (_LARGE, 5, 6),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
