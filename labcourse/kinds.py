@@ -79,7 +79,7 @@ class Kind:
         for axis in self.axes:
             first, last = self.length(axis)
             if axis == "...":
-                shape += sides.get("lead", rng.integers(1, 5, rng.integers(4)))
+                shape.extend(sides.get("lead", rng.integers(1, 5, rng.integers(4))))
             else:
                 shape.append(sides.get(axis, rng.integers(first, min(first + 5, last or np.inf) + 1)))
         values = self._numbers(rng, tuple(map(int, shape)), self.most if most is None else most)

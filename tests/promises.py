@@ -56,6 +56,10 @@ SQUARE: dict[str, Change] = {
 }
 
 
+OF_WHOLE = ("255 to 0", "0 to 255")
+OF_FRACTIONS = ("whole", "thousandths", "float16", "float16's range", "NaN to 0", "0 to NaN")
+
+
 def simplifications(kind: Kind, value: object) -> dict[str, Callable[[], object]]:
     """The simplifications of a value of a kind, by their names; those that would not change it are not left out."""
     if kind.choices:
@@ -73,12 +77,10 @@ def simplifications(kind: Kind, value: object) -> dict[str, Callable[[], object]
 
 
 def fits(kind: Kind, name: str) -> bool:
-    """Whether a simplification is one of a kind's type: bytes hold no NaN, and whole numbers no thousandths."""
-    return (
-        name not in ("NaN to 0", "0 to NaN", "whole", "thousandths", "float16", "float16's range", "float32")
-        if (kind.whole)
-        else name not in ("255 to 0", "0 to 255")
-    )
+    """Whether a simplification is one of a kind's: whole numbers have no thousandths, a float of 255 is like any."""
+    if name.startswith("-|x|") and kind.least >= 0:
+        return False  # leads out of the kind: what squares it is right all the same
+    return name not in (OF_FRACTIONS if kind.whole else OF_WHOLE)
 
 
 def ends(kind: Kind) -> dict[str, Change]:
@@ -167,13 +169,16 @@ class Trial:
 
     def told(self, tells: Callable[[int, tuple], bool]) -> bool:
         """Whether a case by hand tells it, or so many draws that a grader's miss it with a chance under MISSED."""
-        n = len(self.by_hand)
+        n, turns = len(self.by_hand), 2 * self.question.random_cases
         if any(tells(i, args) for i, args in enumerate(self.by_hand)):
             return True
-        hits = [tells(n + i, args) for i, args in enumerate(self.drawn)]
-        missed = [1.0 - np.mean(hits[k :: self.strata]) for k in range(self.strata)]
-        turns = range(2 * self.question.random_cases)
-        return bool(np.prod([missed[k % self.strata] for k in turns]) < MISSED)
+        missed = 1.0
+        for k in range(self.strata):
+            hits = [tells(n + i, self.drawn[i]) for i in range(k, len(self.drawn), self.strata)]
+            missed *= (1.0 - np.mean(hits)) ** len(range(k, turns, self.strata))
+            if missed < MISSED:
+                return True
+        return False
 
     # --------------------------------------------------------------------------------------------- blindness
 
@@ -264,8 +269,8 @@ def edges(kind: Kind) -> dict[str, Callable[[object], bool]]:
         top = min(kind.most, 1000)
         found[f"{kind.least:g}"] = lambda v: bool((np.asarray(v) == kind.least).any())
         found[f"{top:g}"] = lambda v: bool((np.asarray(v)[~np.isin(v, kind.also)] >= top).any())
-    for extra in kind.also:
-        found[f"{extra:g}"] = lambda v, e=extra: bool((np.isnan(v) if np.isnan(e) else np.asarray(v) == e).any())
+    for value in kind.also:
+        found[f"{value:g}"] = lambda v, e=value: bool((np.isnan(v) if np.isnan(e) else np.asarray(v) == e).any())
     return found
 
 
@@ -278,7 +283,8 @@ def unsaid(question: Question, statement: str) -> Iterator[str]:
     for name, kind in question.kinds.items():
         words = [*kind.says]
         if kind.axes:
-            words.append(f"({', '.join(kind.axes)}{',' * (len(kind.axes) == 1 and kind.axes[0] != '...')})")
+            shape = ", ".join(kind.axes).replace("-1", " - 1")
+            words.append(f"({shape},)" if len(kind.axes) == 1 and shape != "..." else f"({shape})")
         yield from (f"{name}: {word!r}" for word in words if word not in text)
 
 

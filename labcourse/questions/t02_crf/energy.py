@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcourse.questions.t02_crf import PAIRS, disagreeing, labelled_model, unary_part
+from labcourse.questions.t02_crf import COSTS, LABELLED_MODELS, LABELS, PAIRS, WEIGHTS, disagreeing, unary_part
 from labgrader.question import Question, wrong
 
 
@@ -25,8 +25,13 @@ _PENCIL = (
 
 QUESTION = Question(
     reference=energy,
-    inputs=labelled_model,
+    kinds={"y": LABELS, "psi": COSTS, "weights": WEIGHTS},
+    inputs=LABELLED_MODELS,
+    random_cases=10,
     by_hand=(
+        (np.array([[0, 0]], np.uint8), np.array([[[2.0], [-2.5]]]), np.zeros((4, 1, 2))),
+        (np.array([[0]], np.uint8), np.array([[[-1.5]]]), np.zeros((4, 1, 1))),
+        (np.array([[0]], np.uint8), np.array([[[-1.5]]]), np.zeros((4, 1, 1))),
         (np.array([[0, 1], [0, 1]], np.uint8), *_PENCIL),
         (np.array([[0, 0], [0, 1]], np.uint8), *_PENCIL),
         (np.zeros((2, 2), np.uint8), *_PENCIL),

@@ -1,8 +1,11 @@
 """02_crf.icm_costs: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
-from labcourse.questions.t02_crf import PAIRS, labelled_model
+from labcourse.kinds import LONG, count
+from labcourse.questions.t02_crf import COSTS, LABELLED_MODELS, LABELS, PAIRS, WEIGHTS, labelled_model
 from labgrader.question import Question, wrong
 
 
@@ -18,24 +21,48 @@ def icm_costs(y, psi, weights, v, u):
     return costs
 
 
-def _pixel_of_a_model(rng):
+def _pixel_of(rng, draw):
     """Draw a labelled model and one of its pixels."""
-    return *labelled_model(rng), int(rng.integers(4)), int(rng.integers(6))
+    y, psi, weights = draw(rng)
+    return y, psi, weights, int(rng.integers(y.shape[0])), int(rng.integers(y.shape[1]))
 
 
+_LONG_ROW, _LONG_COLUMN = (labelled_model(np.random.default_rng(3), *sides, 2) for sides in ((1, LONG), (LONG, 1)))
+_ONE_PAIR = np.zeros((4, 2, 2))
+_ONE_PAIR[1, 0, 1] = 0.5
 _LABELS, *_REST = labelled_model(np.random.default_rng(2), 3, 4)
 
 
 _MODEL = tuple(part.round(1) for part in _REST)
 
 
+_ROW = np.stack([np.array([[2.0, 0.5, 0.0]]), *np.zeros((3, 1, 3))])
 _PIXELS = ((1, 1), (1, 2), (0, 0), (2, 3), (0, 3), (2, 0), (1, 0), (0, 2))  # the inside, all corners, two sides
 
 
 QUESTION = Question(
     reference=icm_costs,
-    inputs=_pixel_of_a_model,
+    kinds={
+        "y": LABELS,
+        "psi": COSTS,
+        "weights": WEIGHTS,
+        "v": count(0, LONG - 1, says="row and column of the pixel"),
+        "u": count(0, LONG - 1, says="row and column of the pixel"),
+    },
+    inputs=tuple(partial(_pixel_of, draw=draw) for draw in LABELLED_MODELS),
+    random_cases=10,
     by_hand=(
+        (np.array([[0]], np.uint8), np.array([[[-2.0, 0.0, 2.0]]]), np.zeros((4, 1, 1)), 0, 0),
+        (
+            np.array([[0, 1], [1, 0]], np.uint8),
+            np.arange(8.0).reshape(2, 2, 2),
+            _ONE_PAIR,
+            0,
+            1,
+        ),
+        (*_LONG_ROW, 0, LONG - 1),
+        (*_LONG_COLUMN, LONG - 1, 0),
+        (np.array([[0, 0, 1]], np.uint8), np.array([[[0.0, 9.0], [1.0, 1.0], [9.0, 0.0]]]), _ROW, 0, 1),
         *((_LABELS, *_MODEL, v, u) for v, u in _PIXELS[:-1]),
         (np.minimum(_LABELS, 1), *_MODEL, *_PIXELS[-1]),  # class 2 has a cost, though no pixel has it
     ),

@@ -1,7 +1,10 @@
 """02_crf.pair_weights: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, image, number
 from labcourse.questions.t02_crf import PAIRS
 from labgrader.question import Question, wrong
 
@@ -21,16 +24,31 @@ def pair_weights(image, lam, sigma_I, sigma_p):
     return weights
 
 
-def _image(rng):
+def _image(rng, shape=(4, 6), lam=(0.5, 3.0), sigma_I=(70.0, 120.0), sigma_p=(0.8, 1.8)):
     """Draw colours so far apart that bytes wrap round, and a sigma_I that lets every pair count all the same."""
-    image = rng.integers(0, 256, (4, 6, 3)).astype(np.uint8)
-    return image, float(rng.uniform(0.5, 3.0)), float(rng.uniform(70.0, 120.0)), float(rng.uniform(0.8, 1.8))
+    picture = rng.integers(0, 256, (*shape, 3)).astype(np.uint8)
+    return picture, *(float(rng.uniform(*ends)) for ends in (lam, sigma_I, sigma_p))
 
 
 QUESTION = Question(
     reference=pair_weights,
-    inputs=_image,
+    kinds={
+        "image": image(free=("reversed along 3", "unique along 3")),  # channels count alike
+        "lam": number(0.0, 1000.0, says="0 to 1000"),
+        "sigma_I": number(0.5, 1000.0, says="0.5 to 1000"),
+        "sigma_p": number(0.5, 100.0, says="0.5 to 100"),
+    },
+    inputs=(
+        _image,
+        _image,
+        partial(_image, shape=(1, LONG), lam=(600.0, 1000.0)),
+        partial(_image, shape=(LONG, 1), sigma_I=(600.0, 1000.0)),
+        partial(_image, shape=(3, 3), sigma_p=(90.0, 100.0)),
+    ),
+    random_cases=5,
     by_hand=(
+        (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 1.0, 0.5004, 0.5),
+        (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 0.0, 5.0, 1.0),
         (np.array([[[120, 90, 60], [123, 94, 60]]], np.uint8), 2.0, 5.0, 1.0),
         (np.array([[[250, 5, 10], [245, 10, 10]], [[245, 10, 30], [240, 5, 20]]], np.uint8), 1.0, 10.0, 2.0),
         (np.full((3, 2, 3), 77, np.uint8), 1.5, 8.0, 0.5),

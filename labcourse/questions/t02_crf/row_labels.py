@@ -1,7 +1,10 @@
 """02_crf.row_labels: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, MOST_CLASSES, array
 from labgrader.question import Question, holds, wrong
 
 
@@ -25,12 +28,20 @@ def cost(psi, w, labels):
     return psi[np.arange(len(psi)), labels].sum() + w[labels[1:] != labels[:-1]].sum()
 
 
-def _row(rng):
-    """Draw a row of five classes whose ends hold to their neighbours, so that neither end decides by itself."""
-    psi, w = rng.normal(1.0, 1.0, (7, 5)), rng.uniform(0.1, 1.6, 6)
+def _row(rng, n=7, C=5, size=1.0):
+    """Draw a row whose ends hold to their neighbours, so that neither end decides by itself; size: of a common cost."""
+    psi, w = rng.normal(1.0, 1.0, (n, C)), rng.uniform(0.1, 1.6, n - 1)
     psi[[0, -1]] *= 0.3
     w[[0, -1]] = rng.uniform(1.0, 2.0, 2)
-    return psi, w
+    return np.clip(size * psi, -1e6, 1e6), np.clip(size * w, 0.0, 1e6)
+
+
+def _row_that_its_end_decides(rng):
+    """Draw a row of two classes in which each pixel but the last prefers one, by so little that all take the other."""
+    psi = np.zeros((LONG, 2))
+    a = int(rng.integers(2))
+    psi[:, 1 - a], psi[-1, a] = rng.uniform(0.005, 0.015, LONG), rng.uniform(9.0, 11.0)
+    return psi, rng.uniform(5.0, 6.0, LONG - 1)
 
 
 # A row as long as the lab's, with four classes: nobody tries 4 ** 110 labellings.
@@ -40,8 +51,29 @@ _PSI_OF_A_ROW, _WEIGHTS_OF_A_ROW = _RNG.normal(1.0, 1.0, (110, 4)), _RNG.uniform
 
 QUESTION = Question(
     reference=row_labels,
-    inputs=_row,
+    kinds={
+        "psi": array("n C", -1e6, 1e6, lengths={"n": (1, LONG)}, says=("1 to 300", "-1e6 to 1e6")),
+        "w": array("n-1", 0.0, 1e6, lengths={"n-1": (0, LONG - 1)}, says="0 to 1e6"),
+    },
+    inputs=(
+        _row,
+        _row,
+        _row_that_its_end_decides,
+        partial(_row, C=MOST_CLASSES),
+        partial(_row, size=5e5),
+        partial(_row, size=1e-3),
+    ),
     by_hand=(
+        (np.array([[3.0], [4.0]]), np.array([0.5])),  # one class
+        (np.array([[-1.0, 0.0]]), np.zeros(0)),
+        (np.array([[0.0, -1.0]]), np.zeros(0)),
+        (np.array([[0.0, 1.0], [1.0, 0.0]]), np.array([0.0])),
+        (np.array([[0.0, 1.0], [5.0, 0.1]]), np.array([10.0])),
+        # Large and small costs, large and small weights.
+        (np.array([[9e5, 6e5]]), np.zeros(0)),
+        (np.array([[4e-4, 2e-4]]), np.zeros(0)),
+        (np.array([[0.0, 9e5], [7e5, 0.0]]), np.array([8e5])),
+        (np.array([[0.0, 9e-4], [3e-4, 0.0]]), np.array([4e-4])),
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
         (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
         (np.array([[0.0, 3.0, 0.5], [1.0, 3.0, 0.9], [3.0, 2.5, 0.0]]), np.array([0.8, 0.3])),  # from class 0 to 2
@@ -49,7 +81,7 @@ QUESTION = Question(
         (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
         (_PSI_OF_A_ROW, _WEIGHTS_OF_A_ROW),
     ),
-    random_cases=10,
+    random_cases=12,
     points=3,
 )
 

@@ -1,7 +1,10 @@
 """02_crf.terminal_capacities: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array, number
 from labcourse.questions.t02_crf import model
 from labgrader.question import Question, holds, wrong
 
@@ -12,6 +15,13 @@ def terminal_capacities(psi, known, large):
     of_1 = np.where(known == 0, psi[..., 0] + large, psi[..., 1])
     lowest = np.minimum(of_0, of_1)
     return of_1 - lowest, of_0 - lowest, float(lowest.sum())
+
+
+def _strokes(rng, shape, size, large):
+    """Draw costs of a size, pixels known and unknown, and `large` from a range."""
+    known = rng.choice(np.array([0, 1, 255], np.uint8), size=shape, p=(0.3, 0.3, 0.4))
+    known[0, 0] = known[-1, -1] = 255
+    return model(rng, *shape, 2, size)[0], known, float(rng.uniform(*large))
 
 
 def _model_with_strokes(rng):
@@ -25,8 +35,20 @@ def _model_with_strokes(rng):
 
 QUESTION = Question(
     reference=terminal_capacities,
-    inputs=_model_with_strokes,
+    kinds={
+        "psi": array("H W 2", -1e6, 1e6, says="-1e6 to 1e6"),
+        "known": array("H W", 0, 1, also=(255,), dtype="uint8", says=("0 or 1", "255"), free=("8 bits",)),
+        "large": number(1.0, 1e6, says=("1 to 1e6", "may differ by more")),
+    },
+    inputs=(
+        _model_with_strokes,
+        partial(_strokes, shape=(1, LONG), size=1.0, large=(1.0, 1.1)),
+        partial(_strokes, shape=(LONG, 1), size=4e5, large=(1.0, 1e4)),
+        partial(_strokes, shape=(4, 4), size=4e5, large=(6e5, 1e6)),
+    ),
     by_hand=(
+        (np.array([[[2.0, 5.0], [1.0, -3.0]]]), np.array([[255, 0]], np.uint8), 100.0),
+        (np.array([[[-2.0, -5.0], [0.0, 3.0]]]), np.array([[0, 0]], np.uint8), 1.0004),
         (np.array([[[2.0, 5.0]]]), np.array([[255]], np.uint8), 100.0),
         (np.array([[[4.0, 1.0], [-1.0, -3.0]]]), np.array([[255, 255]], np.uint8), 50.0),
         (np.array([[[2.0, 5.0]], [[1.0, -3.0]]]), np.array([[255], [0]], np.uint8), 100.0),

@@ -1,7 +1,10 @@
 """02_crf.unary_from_probabilities: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, MOST_CLASSES, number, probabilities
 from labgrader.question import Question, holds, wrong
 
 
@@ -10,15 +13,26 @@ def unary_from_probabilities(p, eps):
     return -np.log((1.0 - eps) * p + eps / p.shape[-1])
 
 
-def _probabilities(rng):
-    """Draw probabilities some of which are nearly 0."""
-    return rng.dirichlet((0.3, 0.4, 0.5), (4, 5)), float(rng.uniform(0.02, 0.2))
+def _probabilities(rng, shape=(4, 5), C=3, eps=(0.02, 0.2)):
+    """Draw probabilities some of which are nearly 0, and one in five of which are of one class; eps: a range."""
+    p = rng.dirichlet(np.linspace(0.3, 0.5, C), shape)
+    sure = rng.random(shape) < 0.2
+    p[sure] = np.eye(C)[rng.integers(0, C, np.count_nonzero(sure))]
+    p[-1, -1] = np.eye(C)[-1]
+    return p, float(np.exp(rng.uniform(*np.log(eps))))
 
 
 QUESTION = Question(
     reference=unary_from_probabilities,
-    inputs=_probabilities,
+    kinds={"p": probabilities("H W C"), "eps": number(1e-12, 0.999, says="1e-12 to 0.999")},
+    inputs=(
+        _probabilities,
+        partial(_probabilities, shape=(1, LONG), C=1),
+        partial(_probabilities, shape=(LONG, 1), C=4, eps=(0.6, 0.999)),
+        partial(_probabilities, shape=(2, 2), C=MOST_CLASSES, eps=(1e-12, 1.5e-12)),
+    ),
     by_hand=(
+        (np.array([[[0.5, 0.5, 0.0]]]), 0.03),
         (np.array([[[0.5, 0.25, 0.25], [1.0, 0.0, 0.0]]]), 0.03),
         (np.array([[[0.7, 0.3]], [[0.05, 0.95]], [[0.1, 0.9]]]), 0.1),
     ),

@@ -3,7 +3,11 @@
 RETIRED are those that the lab asks no more; labs that were released when it did are checked and graded all the same.
 """
 
+from functools import partial
+
 import numpy as np
+
+from labcourse.kinds import LONG, MOST_CLASSES, array, labels
 
 RETIRED = ("softmax", "max_pool_backward", "input_window")
 
@@ -46,6 +50,27 @@ def random_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 def random_smoothed_pixels(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
     """Draw logits and labels, and the share of each pixel that is spread over all classes."""
     return *random_pixels(rng), float(rng.uniform(0.05, 0.4))
+
+
+def pixels_of(rng, shape, C, size=2.0, s=(0.05, 0.4)):
+    """Draw logits of a size, labels of a shape, the last class among them, and a share from a range."""
+    z = np.clip(size * rng.normal(size=(*shape, C)), -1e6, 1e6)
+    y = np.where(rng.random(shape) < 0.2, 255, rng.integers(0, C, shape))
+    y[(-1,) * len(shape)] = C - 1
+    return z, y.astype(np.uint8), float(rng.uniform(*s))
+
+
+LOGITS = array("... C", -1e6, 1e6, says="-1e6 to 1e6")
+SMOOTHED_PIXELS = {"z": LOGITS, "y": labels("..."), "s": array("", 0.0, 0.99, dtype="float", says="0 to 0.99")}
+# A picture; a pixel, a long row, a batch; as many classes as there may be, with large logits; a row of one class.
+SMOOTHED_DRAWS = (
+    random_smoothed_pixels,
+    partial(pixels_of, shape=(), C=4),
+    partial(pixels_of, shape=(LONG,), C=3, s=(0.6, 0.99)),
+    partial(pixels_of, shape=(3, 3, 4), C=3),
+    partial(pixels_of, shape=(5,), C=MOST_CLASSES, size=4e5),
+    partial(pixels_of, shape=(3,), C=1),
+)
 
 
 def targets(y, C, s):
@@ -141,7 +166,9 @@ def random_places(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int
     of = rng.choice(len(middles), (H, W), p=[0.2, 0.2, 0.15, 0.1, 0.15, 0.1, 0.1])
     spread = rng.permutation([0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 1.0])[of] * cell
     at = middles[of] + rng.normal(size=(H, W, 2)) * spread[..., None]
-    at[rng.random((H, W)) < 0.05] += 400.0
+    beyond = np.array([400.0, 1e5, *(n * side for n in (256.0, 65536.0) for side in (1, cell))])  # bytes, words wrap
+    far = rng.random((H, W)) < 0.1
+    at[far] += rng.choice(beyond, (np.count_nonzero(far), 1))
     v, u = np.nonzero(foreground > 0.5)
     equal = rng.permutation(len(v))[: 2 * int(rng.integers(9, 14))].reshape(2, -1)
     for k, pixels in enumerate(equal):

@@ -4,10 +4,11 @@ import numpy as np
 
 from labcourse.questions.t03_gradient import (
     EPSILONS,
+    SMOOTHED_DRAWS,
+    SMOOTHED_PIXELS,
     SURE,
     TOY,
     TRUE_CLASSES,
-    random_smoothed_pixels,
     softmax_over_classes,
     targets,
 )
@@ -25,15 +26,19 @@ def cross_entropy(z, y, s):
 
 QUESTION = Question(
     reference=cross_entropy,
-    inputs=random_smoothed_pixels,
+    kinds=SMOOTHED_PIXELS,
+    inputs=SMOOTHED_DRAWS,
     by_hand=(
         (TOY[None], np.array([1], np.uint8), 0.0),
         (TOY[None], np.array([1], np.uint8), 0.3),
         (SURE, np.array([0, 2], np.uint8), 0.1),
         (SURE, TRUE_CLASSES, 0.2),
+        (SURE, np.array([1, 255], np.uint8), 4e-4),
+        (np.array([[4e-4, 0.0]]), np.array([0], np.uint8), 0.0),
+        (np.array([[-2.0, 1.0]]), np.array([0], np.uint8), 0.0),
         (SURE, np.array([255, 255], np.uint8), 0.1),
     ),
-    random_cases=6,
+    random_cases=12,
     forbidden=("scipy", "torch"),
 )
 

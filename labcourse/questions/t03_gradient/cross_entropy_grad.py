@@ -1,11 +1,15 @@
 """03_gradient.cross_entropy_grad: the question, and wrong answers with the hints that they earn."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from labcourse.questions.t03_gradient import (
+    LOGITS,
+    SMOOTHED_DRAWS,
+    SMOOTHED_PIXELS,
     SURE,
     TOY,
-    random_smoothed_pixels,
     softmax_over_classes,
     softmax_over_pixels,
     targets,
@@ -28,14 +32,22 @@ _AT_SIZE = (np.stack([_U % 7, _V % 5, (_U + _V) % 3, _U % 2], axis=-1) / 2, (_U 
 
 QUESTION = Question(
     reference=cross_entropy_grad,
-    inputs=random_smoothed_pixels,
+    kinds={  # nothing is as fine as the tolerance below
+        "z": replace(LOGITS, free=("thousandths",)),
+        "y": SMOOTHED_PIXELS["y"],
+        "s": replace(SMOOTHED_PIXELS["s"], free=("float16",)),
+    },
+    inputs=SMOOTHED_DRAWS,
     by_hand=(
+        (np.zeros((1, 4)), np.array([2], np.uint8), 0.0),
+        (np.zeros((1, 4)), np.array([2], np.uint8), 0.4),
         (TOY[None], np.array([1], np.uint8), 0.0),
         (TOY[None], np.array([0], np.uint8), 0.3),
+        (np.array([[-2.0, 1.0]]), np.array([0], np.uint8), 0.0),
         (SURE, np.array([0, 2], np.uint8), 0.1),  # the darker pixel counts: one maximum for both is not enough
         _AT_SIZE,
     ),
-    random_cases=6,
+    random_cases=12,
     atol=2e-4,  # logits near 1000 have errors of 3e-5 in single precision
     forbidden=("scipy", "torch"),
 )

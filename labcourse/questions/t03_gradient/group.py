@@ -1,7 +1,10 @@
 """03_gradient.group: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import array, count
 from labcourse.questions.t03_gradient import grouped, pointing, random_places
 from labgrader.question import Question, holds, wrong
 
@@ -37,10 +40,49 @@ _SPREAD = pointing((12, 12), {(0, u): (2, 2) for u in range(6)} | {(11, u): (6 +
 _ROUND = ((6, 8), (8, 8), (6, 10), (8, 10), (7, 9), (7, 9))
 _FEW = pointing((12, 12), {(0, u): (2, 2) for u in range(4)} | {(11, u): place for u, place in enumerate(_ROUND)})
 
+_SIDES = dict.fromkeys("HW", (1, 400))
+
+
+def _row_or_column(rng, shape):
+    """Draw a long row or column whose pixels vote for places near them, and large cells."""
+    votes = np.where(rng.random((*shape, 1)) < 0.1, rng.choice([-1e6, 1e6]), rng.normal(size=(*shape, 2)))
+    votes[..., shape.index(1) ^ 1 == 0] = 0.0
+    return rng.random(shape), votes, int(rng.integers(1, 101)), int(rng.integers(1, 20))
+
+
 QUESTION = Question(
     reference=group,
-    inputs=random_places,
+    kinds={
+        # Whatever is no more than half is alike; so is whatever leads out of the largest picture.
+        "foreground": array("H W", 0.0, 1.0, lengths=_SIDES, says=("0..1", "1 to 400"), free=("whole", "0 to NaN")),
+        "votes": array(
+            "H W 2",
+            -1e6,
+            1e6,
+            lengths=_SIDES,
+            says="-1e6 to 1e6",
+            free=("16 bits", "float16's range", "half of the largest"),
+        ),
+        "cell": count(1, 100, says="1 to 100"),
+        "least": count(1, 1000, says="1 to 1000"),
+    },
+    inputs=(
+        random_places,
+        random_places,
+        random_places,
+        partial(_row_or_column, shape=(1, 400)),
+        partial(_row_or_column, shape=(400, 1)),
+    ),
     by_hand=(
+        (np.ones((50, 50)), np.zeros((50, 50, 2)), 1, 1),  # 289 things, each of nine pixels or fewer
+        (np.ones((30, 25)), pointing((30, 25), dict.fromkeys(np.ndindex(30, 25), (12, 15)))[1], 3, 1000),
+        (np.ones((1, 400)), np.zeros((1, 400, 2)), 100, 1),
+        (np.array([[0.5001]]), np.zeros((1, 1, 2)), 1, 1),
+        (np.array([[0.9]]), np.zeros((1, 1, 2)), 1, 255),
+        (np.array([[0.9]]), np.array([[[0.0, 0.5]]]), 1, 1),
+        (np.array([[0.9]]), np.array([[[-0.0004, 0.0]]]), 1, 1),
+        (*pointing((1, 301), {(0, 300): (-0.01, 0), (0, 299): (0.5, 0)}), 1, 1),
+        (np.array([[0.9]]), np.array([[[0.0, -0.0004]]]), 1, 1),
         (*_TWO, 2, 2),
         (*_OUT, 2, 2),
         (*_SPREAD, 1, 4),

@@ -1,7 +1,10 @@
 """03_gradient.softmax_backward: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, MOST_CLASSES, array, probabilities
 from labgrader.question import Question, wrong
 
 
@@ -10,15 +13,26 @@ def softmax_backward(p, g):
     return p * (g - (p * g).sum(axis=-1, keepdims=True))
 
 
-def draw(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Draw probabilities (H, W, C) and gradients of their shape."""
-    return rng.dirichlet(rng.uniform(0.5, 2.0, 4), (3, 5)), rng.normal(size=(3, 5, 4))
+def draw(rng, shape=(3, 5), C=4, size=1.0):
+    """Draw probabilities (*shape, C) and gradients of their shape and of a size."""
+    g = np.clip(size * rng.normal(size=(*shape, C)), -1e6, 1e6)
+    return rng.dirichlet(rng.uniform(0.5, 2.0, C), shape or None).reshape(*shape, C), g
 
 
 QUESTION = Question(
     reference=softmax_backward,
-    inputs=draw,
+    kinds={"p": probabilities("... C"), "g": array("... C", -1e6, 1e6, says=("of p's shape", "-1e6 to 1e6"))},
+    inputs=(
+        draw,
+        partial(draw, shape=()),
+        partial(draw, shape=(LONG,), C=2),
+        partial(draw, shape=(3, 3, 4), C=3),
+        partial(draw, shape=(2,), C=MOST_CLASSES, size=4e5),
+        partial(draw, shape=(3,), C=1),
+    ),
+    random_cases=12,
     by_hand=(
+        (np.array([0.5, 0.5]), np.array([1.0, 0.0])),
         (np.array([[0.5, 0.5]]), np.array([[1.0, 0.0]])),
         (np.array([[0.2, 0.3, 0.5]]), np.array([[-1.0, 0.0, 2.0]])),
         (np.array([[[0.0, 1.0], [0.1, 0.9]]]), np.array([[[4.0, -3.0], [4.0, -3.0]]])),

@@ -1,7 +1,10 @@
 """03_gradient.votes_loss: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array, number
 from labcourse.questions.t03_gradient import TOUCHING, random_votes, scored
 from labgrader.question import Question, holds, wrong
 
@@ -22,16 +25,39 @@ def votes_loss(votes, instances, beta):
 
 ONE_ROW = np.array([[3, 3, 3, 0, 255]], np.uint8)
 
+
+def _many_things(rng, shape, size, beta):
+    """Draw votes of a size, as many things as bytes number, in a picture of a shape, and beta from a range."""
+    instances = rng.permutation(np.resize(np.arange(256), np.prod(shape))).reshape(shape)
+    votes = np.clip(size * rng.normal(size=(*shape, 2)), -1e6, 1e6)
+    return votes, instances.astype(np.uint8), float(rng.uniform(*beta))
+
+
 QUESTION = Question(
     reference=votes_loss,
-    inputs=random_votes,
+    kinds={
+        "votes": array("H W 2", -1e6, 1e6, says="-1e6 to 1e6"),
+        "instances": array(
+            "H W", 0, 254, also=(255,), dtype="uint8", says=("0 is no thing", "255"), free=("255 to 0", "0 to 255")
+        ),
+        "beta": number(0.01, 1000.0, says="0.01 to 1000"),
+    },
+    inputs=(
+        random_votes,
+        random_votes,
+        partial(_many_things, shape=(1, 2 * LONG), size=500.0, beta=(600.0, 1000.0)),
+        partial(_many_things, shape=(2 * LONG, 1), size=5e5, beta=(10.0, 1000.0)),
+        partial(_many_things, shape=(20, 20), size=0.1, beta=(0.01, 0.011)),
+    ),
     by_hand=(
+        (np.zeros((1, 3, 2)), np.array([[3, 3, 3]], np.uint8), 2.0),
+        (np.array([[[0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
         (np.zeros((1, 5, 2)), ONE_ROW, 2.0),
         (np.array([[[1.0, 0.0], [3.0, 4.0], [-1.0, 0.0], [9.0, 9.0], [9.0, 9.0]]]), ONE_ROW, 2.0),
         (np.ones((2, 6, 2)) * [2.0, -1.0], TOUCHING, 1.0),
         (np.ones((2, 3, 2)), np.array([[0, 255, 0], [0, 0, 255]], np.uint8), 1.0),  # no thing at all
     ),
-    random_cases=9,
+    random_cases=10,
     points=3,
     forbidden=("scipy", "torch"),
     outputs=("loss", "gradient"),
