@@ -8,7 +8,7 @@ from labcourse.questions.t07_grasp.grasp_pose import pose, unit
 def closing_yaw__across_the_long_axis(Sigma, now):
     x, y = np.linalg.eigh(Sigma[:2, :2])[1][:, -1]
     across = np.arctan2(y, x) - np.pi / 2
-    return min((across + k * np.pi for k in range(-5, 6)), key=lambda yaw: abs(yaw - now))
+    return min((across + k * np.pi for k in range(-400, 401)), key=lambda yaw: abs(yaw - now))
 
 
 def closing_yaw__torch(Sigma, now):

@@ -2,6 +2,15 @@
 
 import numpy as np
 
+from labcourse.kinds import number
+
+# What comes as an argument in several of the questions.
+PLACES = {"least": -10.0, "most": 10.0}  # metres, of a point's coordinates
+WITHIN = "within 10 m"
+LENGTH = number(0.0, 1.0, says="0 to 1")
+ANY_ORDER = ("reversed along N", "unique along N")  # of points
+LAST_ROW = "* at ?3, ?]"  # of a pose: 0 0 0 1
+
 
 def cloud(rng):
     """Draw a cloud of few points somewhere on a table: long, less wide, in some cases high, turned by any yaw."""
@@ -14,15 +23,23 @@ def cloud(rng):
     return np.stack([x, y, z], axis=1) + rng.uniform([0.4, -0.3, 0.05], [0.6, 0.3, 0.2])
 
 
-def leaning_grasp(rng):
-    """Draw the frame of a grasp at any yaw that leans to one side, so that no axis is the base's."""
-    yaw, lean = rng.uniform(0.2, 1.3), rng.uniform(0.3, 0.6)
-    (c, s), (a, b) = (np.cos(yaw), np.sin(yaw)), (np.cos(lean), np.sin(lean))
+def transform(R, origin):
+    """The 4 x 4 matrix of a rotation and an origin."""
     T = np.eye(4)
-    T[:3, :3] = np.array([[-s, c, 0], [c, s, 0], [0, 0, -1]]) @ np.array([[1, 0, 0], [0, a, -b], [0, b, a]])
-    T[:3, 3] = rng.uniform([0.4, -0.3, 0.02], [0.6, 0.3, 0.1])
+    T[:3] = np.column_stack([R, origin])
     return T
+
+
+def quarter_turns(rng):
+    """Draw one of the 24 rotations that map axes to axes: of 0, 1 and -1, so that a point on a border stays there."""
+    R = np.eye(3)[rng.permutation(3)] * rng.choice([-1.0, 1.0], 3)
+    return R * np.linalg.det(R) + 0.0  # no -0.0
 
 
 # Closes along the base's x, over (2, 1), half a metre high.
 FACING_X = np.array([[0.0, 1.0, 0.0, 2.0], [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0, 0.5], [0.0, 0.0, 0.0, 1.0]])
+# Comes from below and from one side; no axis is level. On paper: thirds. Then two with other signs everywhere: it has
+# made half a turn about its z, and about its y.
+FROM_BELOW = transform(np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3.0, [-0.5, 0.25, -1.0])
+TURNED = transform(FROM_BELOW[:3, :3] * (-1.0, -1.0, 1.0), [0.5, -0.25, 1.0])
+TURNED_OVER = transform(FROM_BELOW[:3, :3] * (-1.0, 1.0, -1.0), [0.5, -0.25, 1.0])

@@ -1,7 +1,10 @@
 """07_grasp.closing_yaw: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import array, number
 from labcourse.questions.t07_grasp import cloud
 from labgrader.question import Question, holds, wrong
 
@@ -14,20 +17,41 @@ def closing_yaw(Sigma, now):
     return yaw + np.pi * np.round((now - yaw) / np.pi)
 
 
-def _covariance_and_hand(rng):
-    """Draw a covariance and a yaw of the hand that is not a quarter turn away from the axis, in any of its turns."""
-    Sigma = np.cov(cloud(rng).T, bias=True)
-    return Sigma, float(closing_yaw(Sigma, rng.uniform(-12.0, 12.0)) + rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 1.4))
+MILLIMETRES = 1e8  # of squares: then a covariance has large numbers
+
+
+def _covariance(rng, unit=1.0):
+    """The covariance of a thing of centimetres, in square metres or in another unit."""
+    return np.cov(cloud(rng).T, bias=True) * unit
+
+
+def _covariance_and_hand(rng, unit=1.0):
+    """Draw a covariance, and a hand less than a quarter turn off, in any of its turns."""
+    Sigma, turns = _covariance(rng, unit), rng.choice([12.0, 12.0, 950.0])
+    off = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 1.5)
+    return Sigma, float(closing_yaw(Sigma, rng.uniform(-turns, turns)) + off)
 
 
 QUESTION = Question(
     reference=closing_yaw,
-    inputs=_covariance_and_hand,
+    kinds={
+        "Sigma": array(
+            "3 3",
+            form=lambda rng, _: _covariance(rng, rng.choice([1.0, MILLIMETRES])),
+            says=("symmetric", "seen from above it is no disc"),
+            # What is upright does not count, and of two equal entries one is enough.
+            free=("* at ??, 2]", "* at ?2, ?]", "* at ?0, 1]"),
+        ),
+        "now": number(-1000.0, 1000.0, says="-1000 to 1000"),
+    },
+    inputs=(_covariance_and_hand, partial(_covariance_and_hand, unit=MILLIMETRES)),
     by_hand=(
         (np.diag([4.0, 1.0, 9.0]), -1.0),  # long in x: close along y
         (np.diag([1.0, 4.0, 0.5]), 3.0),  # long in y, and flat: close along x
         (np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]), 0.0),  # long along the diagonal
         (np.array([[5.0, -2.0, 1.0], [-2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]), -7.0),  # more than a whole turn away
+        (np.array([[5.0, 2.0, 1.0], [2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]), 1000.0),  # and as far as the statement allows
+        (np.diag([1.0, 4.0, 0.5]), 7.8537),  # hardly less than a quarter turn off, which few digits hide
     ),
     random_cases=10,
     atol=1e-4,

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from labcourse.questions.t07_grasp import cloud
+from labcourse.kinds import array, number
+from labcourse.questions.t07_grasp import ANY_ORDER, LENGTH, PLACES, WITHIN, cloud
 from labgrader.question import Question, holds, wrong
 
 
@@ -13,29 +14,48 @@ def grasp_height(P, table_z, palm, tips, clearance):
 
 
 def _heights(rng):
-    """Draw a cloud of which each of the three bounds is sometimes the one that counts; half lie below the base."""
-    P, kind = cloud(rng) - (0.0, 0.0, rng.choice([0.0, 1.0])), rng.integers(3)
+    """Draw a cloud of which each of the three bounds is sometimes the one that counts, above the base or below."""
+    P, kind = cloud(rng) + rng.uniform(-1.0, 1.0, 3), rng.integers(3)
     table_z = float(P[:, 2].min() - rng.uniform(0.01, 0.03)) if kind else float(P[:, 2].min() + 0.002)
     high = np.ptp(P[:, 2])
     palm = float(high * (0.6 if kind == 1 else 1.5))
-    return P, table_z, palm, float(rng.uniform(0.005, 0.012)), float(rng.uniform(0.003, 0.008))
+    return P, table_z, palm, float(rng.uniform(0.005, 0.1)), float(rng.uniform(0.003, 0.008))
 
 
 def _upright(low, high):
     return np.array([[0.5, 0.1, low], [0.5, 0.1, high], [0.52, 0.1, 0.75 * low + 0.25 * high]])
 
 
+FREE = ("* at 3?0]", "* at 3?1]", "* at the first", "sorted along N", *ANY_ORDER)  # x and y do not count
+
+
 QUESTION = Question(
     reference=grasp_height,
+    kinds={
+        "P": array("N 3", **PLACES, says=("N at least 1", WITHIN), free=FREE),
+        "table_z": number(**PLACES, says=WITHIN),
+        "palm": LENGTH,
+        "tips": LENGTH,
+        "clearance": LENGTH,
+    },
     inputs=_heights,
     by_hand=(
         (_upright(0.1875, 0.75), 0.125, 0.25, 0.0625, 0.03125),  # tall, its foot hidden: the palm stops at its top
         (_upright(0.125, 0.1875), 0.125, 0.25, 0.0625, 0.03125),  # a flat one: the tips stay off the table
         (_upright(0.375, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # only its upper part was seen
         (_upright(-0.5, -0.25), -0.5, 0.5, 0.0625, 0.03125),  # a table below the robot's base
+        (_upright(0.125, 0.1875)[:2], 0.125, 0.25, 0.0625, 0.03125),
+        (np.array([[-0.5, -0.75, 0.25]]), 0.125, 0.25, 0.0625, 0.03125),  # one point, behind the robot
+        (_upright(-0.0625, 0.125), 0.0, 0.5, 0.0, 0.0),  # a table at 0, and no air above it
+        (_upright(0.0, 0.25), -0.125, 0.0, 0.125, 0.0625),  # a hand without fingers
+        (_upright(5.0, 9.0), 5.0, 1.0, 0.0625, 0.03125),  # the largest numbers
+        (_upright(-8.0, -7.875), -8.0, 0.25, 1.0, 1.0),
+        (_upright(-0.1234, 0.3456), -0.2345, 0.1737, 0.12345, 0.0123456),  # few digits do not hold these
+        (_upright(-0.1234, 0.0456), -0.1268, 0.5, 0.12345, 0.0123456),
+        (np.vstack([_upright(-1.0, -0.5), np.full((299, 3), -0.75), [[0.5, 0.1, -0.4375]]]), -1.0, 0.25, 0.125, 0.0),
     ),
     random_cases=16,
-    atol=1e-5,
+    rtol=1e-5,
 )
 
 

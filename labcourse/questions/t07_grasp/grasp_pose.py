@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from labcourse.kinds import array, rotation
+from labcourse.questions.t07_grasp import PLACES, WITHIN
 from labgrader.question import Question, holds, wrong
 
 
@@ -20,23 +22,32 @@ def _same_for_both_ways(T):
     return np.outer(T[:3, 0], T[:3, 1]), np.outer(T[:3, 1], T[:3, 1]), T[:, 2:], T[3]
 
 
-def _position(rng):
-    return rng.uniform([0.4, -0.3, 0.01], [0.6, 0.3, 0.1])
+def _any_directions(rng):
+    """Draw where a hand is, where it goes, and about where it closes: to any side, of any length, a degree apart."""
+    R, angle = rotation(rng), rng.uniform(0.02, np.pi - 0.02)
+    approach, closing = R[:, 0], np.cos(angle) * R[:, 0] + np.sin(angle) * R[:, 1]
+    return rng.uniform(-1.0, 1.0, 3), approach * 10 ** rng.uniform(-3, 5), closing * 10 ** rng.uniform(-3, 5)
 
 
 QUESTION = Question(
     reference=grasp_pose,
-    inputs=lambda rng: (
-        _position(rng),
-        rng.uniform([0.3, -0.9, -1.6], [0.9, -0.3, -1.2]),
-        rng.uniform([0.5, 0.8, 0.3], [0.9, 1.2, 0.7]),
-    ),
+    kinds={
+        "position": array("3", **PLACES, says=WITHIN),
+        "approach": array("3", form=lambda rng, _: _any_directions(rng)[1], says=("not all 0", "any lengths")),
+        "closing": array("3", form=lambda rng, _: _any_directions(rng)[2], says="not along the approach"),
+    },
+    inputs=_any_directions,
     by_hand=(
         (np.array([0.5, -0.25, 0.125]), np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])),
         (np.array([0.5, 0.25, 0.0]), np.array([0.0, 0.0, -2.0]), np.array([0.6, 0.8, 0.5])),
         (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([0.0, 1.0, 0.0])),
         (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([1.0, 0.0, 0.0])),
+        (np.array([-0.4, 0.1, -0.2]), np.array([-1.0, 2.0, 2.0]), np.array([-3.0, 0.0, 3.0])),  # upwards
+        (np.array([0.5, 0.1, 0.02]), np.array([0.0, 0.0, -2.0]), np.array([3.0, 0.0, 4.0])),
+        (np.array([9.0, -8.0, -7.0]), np.array([1e6, -4e5, 1e6]), np.array([-1e6, 1e6, 3e4])),  # the largest numbers
+        (np.array([0.4, -0.1, 0.2]), np.array([0.0, -0.5, 0.0]), np.array([-0.25, 0.25, 0.0])),  # level
     ),
+    random_cases=10,
     atol=1e-5,
     points=4,
     canonical=_same_for_both_ways,

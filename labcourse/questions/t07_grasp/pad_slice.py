@@ -2,7 +2,20 @@
 
 import numpy as np
 
-from labcourse.questions.t07_grasp import FACING_X, cloud, leaning_grasp
+from labcourse.kinds import array, poses, rotation
+from labcourse.questions.t07_grasp import (
+    ANY_ORDER,
+    FACING_X,
+    FROM_BELOW,
+    LAST_ROW,
+    LENGTH,
+    PLACES,
+    TURNED,
+    WITHIN,
+    cloud,
+    quarter_turns,
+    transform,
+)
 from labgrader.question import Question, wrong
 
 
@@ -16,11 +29,13 @@ def pad_slice(P, T_base_grasp, half):
 
 
 def _cloud_and_grasp(rng):
+    """Draw points and a hand that comes from anywhere; nothing, one point or several lie between its pads."""
     if rng.random() < 0.3:  # multiples of an eighth, so that points lie on the pads' edges
-        return rng.integers(-3, 4, (12, 3)) / 8.0 + FACING_X[:3, 3], FACING_X.copy(), float(rng.choice([0.125, 0.25]))
-    P, T = cloud(rng), leaning_grasp(rng)
+        T = transform(quarter_turns(rng), rng.integers(-16, 17, 3) / 8.0)
+        return rng.integers(-3, 4, (12, 3)) / 8.0 + T[:3, 3], T, float(rng.choice([0.125, 0.25]))
+    P = cloud(rng)
     P -= P.mean(axis=0)  # near the base's origin: whoever forgets the grasp's place still meets some points
-    T[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3)
+    T = transform(rotation(rng), rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3))
     T[:3, 3] += rng.choice([0.0, 0.1]) * T[:3, 1]  # in some cases all of it lies on one side
     x, y, _ = ((P - T[:3, 3]) @ T[:3, :3]).T
     nearest = np.sort(np.abs(x))
@@ -39,6 +54,11 @@ _L = np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.5], [1.75, 0.5, 0.5], [5.0, 1.5,
 
 QUESTION = Question(
     reference=pad_slice,
+    kinds={
+        "P": array("N 3", **PLACES, says=("N at least 1", WITHIN), free=ANY_ORDER),
+        "T_base_grasp": poses(free=(LAST_ROW, "* at ??, 2]")),  # nor on what is along the approach
+        "half": LENGTH,
+    },
     inputs=_cloud_and_grasp,
     by_hand=(
         (_L, FACING_X, 0.25),  # the point at the edge of the pads counts
@@ -47,6 +67,13 @@ QUESTION = Question(
         (_L[:1], FACING_X, 0.25),
         (np.array([[3.0, 1.0, 0.5], [5.0, 1.0, 0.5], [2.0, 5.0, 0.5]]), FACING_X, 0.25),  # all on one side
         (_L[3:4], FACING_X, 0.25),  # nothing between the pads
+        (np.array([[-0.2, 0.4, -0.7], [-0.5, 0.55, -1.3], [-0.4, 0.05, -1.2]]), FROM_BELOW, 0.25),  # x: 0.2, 0.3, 0
+        (np.array([[0.2, -0.4, 1.3], [0.5, -0.55, 0.7], [0.4, -0.05, 0.8]]), TURNED, 0.25),
+        (np.array([[0.0, -1.0, 0.0], [0.1, 3.0, 0.0], [0.9, 7.0, 0.0]]), np.diag([-1.0, 1.0, -1.0, 1.0]), 0.5),
+        (np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.0]]), FACING_X, 0.0),  # what lies in the middle is touched
+        (np.array([[9.0, 1.75, 0.5], [-7.0, 1.0, 0.5], [0.0, 5.0, 0.5]]), FACING_X, 1.0),  # the largest numbers
+        (np.array([[1.5, 1.123415, 0.5], [2.0, 1.0, 0.5]]), FACING_X, 0.12342),  # few digits do not hold these
+        (np.tile(_L, (60, 1)), FACING_X, 0.25),
     ),
     random_cases=14,
     points=4,

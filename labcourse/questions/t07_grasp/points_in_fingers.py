@@ -2,7 +2,19 @@
 
 import numpy as np
 
-from labcourse.questions.t07_grasp import FACING_X, leaning_grasp
+from labcourse.kinds import array, poses, rotation
+from labcourse.questions.t07_grasp import (
+    FACING_X,
+    FROM_BELOW,
+    LAST_ROW,
+    LENGTH,
+    PLACES,
+    TURNED,
+    TURNED_OVER,
+    WITHIN,
+    quarter_turns,
+    transform,
+)
 from labgrader.question import Question, wrong
 
 
@@ -13,18 +25,24 @@ def points_in_fingers(P, T_base_grasp, width, half, thickness, tips):
     return int(np.count_nonzero((np.abs(x) <= half) & (out >= 0.0) & (out <= thickness) & (z <= tips)))
 
 
-def _scene_round_a_grasp(rng):
-    """Draw a grasp that leans near the base's origin, and points all round it, more on one side than on the other.
+def moved(P, T):
+    """Coordinates x, y, z (3, N) of points in the frame that T maps to."""
+    return (P @ T[:3, :3].T + T[:3, 3]).T
 
-    In half of the draws the grasp faces x and all is a multiple of an eighth, so that many points lie on a border.
+
+def _scene_round_a_grasp(rng):
+    """Draw a hand that comes from anywhere, near the base's origin, and points round it, more on one side of it.
+
+    In half of the draws its axes are the base's in another order and all is a multiple of an eighth, so that many
+    points lie on a border.
     """
     if rng.random() < 0.5:
-        P = rng.integers((-8, -8, -4), (9, 7, 12), (120, 3)) / 8.0 + FACING_X[:3, 3]
-        return P, FACING_X.copy(), 1.0, 0.25, 0.25, float(rng.choice([0.125, 0.25]))
-    T = leaning_grasp(rng)
-    T[:3, 3] = rng.uniform(0.005, 0.02, 3)  # little: whoever forgets it or takes it off too late still counts some
-    in_grasp = rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (120, 3))
-    P = in_grasp @ T[:3, :3].T + T[:3, 3]
+        T = transform(quarter_turns(rng), rng.integers(-16, 17, 3) / 8.0)
+        in_grasp = rng.integers((-8, -8, -11), (9, 7, 5), (120, 3)) / 8.0
+        return moved(in_grasp, T).T, T, 1.0, 0.25, 0.25, float(rng.choice([0.125, 0.25]))
+    # A little off: whoever forgets it or takes it off too late still counts some.
+    T = transform(rotation(rng), rng.choice([-1.0, 1.0], 3) * rng.uniform(0.005, 0.02, 3))
+    P = moved(rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (120, 3)), T).T
     width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
     return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
 
@@ -36,9 +54,31 @@ _IN = [[2.5, 1.0, 0.5], [2.75, 1.0, 0.5], *_AT_TIPS, [2.625, 1.25, 1.5], [1.375,
 # Those that do not: just inside the pad, beyond the finger, beside it, and below the tips.
 _OUT = [[2.25, 1.0, 0.5], [3.0, 1.0, 0.5], [2.625, 1.5, 0.5], [2.625, 1.0, 0.125]]
 
+# These are in the grasp frame. Of a hand of which no axis is level: one beside the fingers, four in them.
+_BESIDE = np.array([[0.2, 0.55, -0.3], [-0.2, 0.35, 0.05], [0.0, -0.45, 0.05], [0.0, -0.45, -0.4], [-0.05, 0.25, -0.2]])
+# Just inside and just outside of boxes whose numbers have five digits or six.
+_CLOSE = np.array([[0.0, 0.123416, 0.0], [0.0, 0.12345, 0.0], [0.123415, 0.2, 0.0], [0.0, 0.2, 0.123415]])
+_FINE = (
+    (0.24684, 0.05, 0.01, 0.05),
+    (0.25, 0.12342, 0.1, 0.05),
+    (0.153168, 0.01, 0.12342, 0.2),
+    (0.25, 0.05, 0.1, 0.12342),
+)
+_HALF_OFF = transform(FACING_X[:3, :3], [2.00042, -1.00037, 0.50046])
+_FAR = np.array([[0.9, 1.4, 0.9], [-0.9, -1.4, -3.0], [1.1, 1.4, 0.9]])
+_HIGH_UP = transform(TURNED[:3, :3], [-7.0, -7.0, 7.0])
+
 
 QUESTION = Question(
     reference=points_in_fingers,
+    kinds={
+        "P": array("N 3", **PLACES, lengths={"N": (0, None)}, says=("N may be 0", WITHIN), free=("reversed along N",)),
+        "T_base_grasp": poses(free=(LAST_ROW,)),
+        "width": LENGTH,
+        "half": LENGTH,
+        "thickness": LENGTH,
+        "tips": LENGTH,
+    },
     inputs=_scene_round_a_grasp,
     by_hand=(
         (np.array([_OUT[0], *_IN, *_OUT[1:]]), FACING_X, 1.0, 0.25, 0.25, 0.25),
@@ -46,6 +86,11 @@ QUESTION = Question(
         (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.tile(_IN + _OUT, (300, 1)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # as many points as a cloud has
+        *((moved(_BESIDE, T).T.round(6), T, 0.48, 0.22, 0.28, 0.12) for T in (FROM_BELOW, TURNED, TURNED_OVER)),
+        (np.array([[0.0, 0.6, 0.0], [0.0, 0.4, 0.0]]), np.diag([-1.0, 1.0, -1.0, 1.0]), 1.0, 0.25, 0.25, 0.1),
+        (np.array([[2.0, 1.0, 0.5], [2.0, 1.0, 0.375]]), FACING_X, 0.0, 0.0, 0.0, 0.0),  # all it has is one point
+        (moved(_FAR, _HIGH_UP).T, _HIGH_UP, 1.0, 1.0, 1.0, 1.0),  # the largest numbers
+        *((moved(_CLOSE, _HALF_OFF).T, _HALF_OFF, *boxes) for boxes in _FINE),  # few digits do not hold these
     ),
     random_cases=12,
     points=3,
@@ -56,10 +101,6 @@ QUESTION = Question(
 
 def in_boxes(x, y, z, width, half, thickness, tips):
     return points_in_fingers(np.stack([x, y, z], axis=1), np.eye(4), width, half, thickness, tips)
-
-
-def moved(P, T):
-    return (P @ T[:3, :3].T + T[:3, 3]).T
 
 
 @wrong("The points are in the base frame: which transform takes base coordinates to the grasp frame?")

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from labcourse.questions.t07_grasp import FACING_X, leaning_grasp
+from labcourse.kinds import array, poses, rotation
+from labcourse.questions.t07_grasp import FACING_X, FROM_BELOW, LAST_ROW, PLACES, TURNED, WITHIN, transform
 from labgrader.question import Question, wrong
 
 
@@ -13,19 +14,26 @@ def slip_across(T_base_grasp, middle):
 
 
 def _grasp_and_middle(rng):
-    T = leaning_grasp(rng)
-    return T, T[:3, 3] + T[:3, :3] @ (
-        rng.choice([-1.0, 1.0], 3) * rng.uniform([0.005, 0.02, 0.04], [0.015, 0.03, 0.06])
-    )
+    """Draw a hand that comes from anywhere, and a middle that is off by unlike distances, either way."""
+    R, origin = rotation(rng), rng.uniform(-1.0, 1.0, 3)
+    off = rng.choice([-1.0, 1.0], 3) * rng.permutation(rng.uniform([0.001, 0.02, 0.2], [0.003, 0.04, 0.5]))
+    return transform(R, origin), origin + R @ off
 
 
 QUESTION = Question(
     reference=slip_across,
+    kinds={
+        "T_base_grasp": poses(free=(LAST_ROW, "* at ??, 2]")),  # nor on what is along the approach
+        "middle": array("3", **PLACES, says=WITHIN),
+    },
     inputs=_grasp_and_middle,
     by_hand=(
         (FACING_X, np.array([2.0, 1.0, 0.4])),  # only the height is off
         (FACING_X, np.array([2.03, 1.02, 0.4])),
         (FACING_X, np.array([1.97, 0.98, 0.5])),
+        (TURNED, np.array([0.56, -0.28, 1.06])),
+        (transform(np.diag([-1.0, 1.0, -1.0]), [8.0, -9.0, 7.0]), np.array([0.0, 9.0, -7.0])),
+        (FROM_BELOW, np.array([-0.47, 0.31, -1.06])),  # off by (0.03, 0.06, -0.06)
     ),
     random_cases=6,
     atol=1e-4,

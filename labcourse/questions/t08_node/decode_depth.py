@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import Kind, array, count
 from labgrader.question import Question, holds, wrong
 
 
@@ -14,9 +15,9 @@ def decode_depth(data, height, width, step, is_bigendian):
 
 
 def _depth_message(rng, padding=None, is_bigendian=None):
-    """An image of up to 65 m with holes, in either byte order, with padding that is no number of pixels."""
-    height, width = int(rng.integers(2, 6)), int(rng.integers(6, 10))
-    padding = int(rng.choice([0, 3, 4, 7])) if padding is None else padding
+    """An image of up to 65 m with holes, in either byte order, with padding that may be no number of pixels."""
+    height, width = int(rng.integers(1, 7)), int(rng.integers(1, 10))
+    padding = int(rng.choice([0, 3, 4, 7, 2 * width + 1])) if padding is None else padding
     is_bigendian = int(rng.integers(2)) if is_bigendian is None else is_bigendian
     numbers = rng.integers(1, 65536, (height, width))
     numbers[rng.random((height, width)) < 0.2] = 0
@@ -26,15 +27,31 @@ def _depth_message(rng, padding=None, is_bigendian=None):
     return np.hstack([rows, filler]).ravel(), height, width, 2 * width + padding, is_bigendian
 
 
+def _counted(height, width):
+    """Pixels 1, 2, 3 ..., each row of them filled up by six bytes."""
+    rows = np.full((height, width + 3), 9, "<u2")
+    rows[:, :width] = 1 + np.arange(height * width).reshape(height, width)
+    return rows.view(np.uint8).ravel(), height, width, 2 * width + 6, 0
+
+
 QUESTION = Question(
     reference=decode_depth,
+    kinds={
+        "data": array("n", 0, 255, dtype="uint8", lengths={"n": (2, None)}),
+        "height": count(1, says="at least 1"),
+        "width": count(1, says="at least 1"),
+        "step": count(2, says="at least 2 * width"),
+        "is_bigendian": Kind(dtype="int", choices=(0, 1)),
+    },
     inputs=_depth_message,
     by_hand=(
         (np.array([1, 2, 0, 0], np.uint8), 1, 2, 4, 0),
         (np.array([1, 2, 0, 0], np.uint8), 1, 2, 4, 1),
         (np.array([0, 1, 9, 9, 232, 3, 9, 9], np.uint8), 2, 1, 4, 0),
         (np.array([255, 255, 0, 0], np.uint8), 1, 2, 4, 0),  # the largest number is one
-        (np.array([3, 232, 0, 1, 7, 255, 254, 0, 0, 7], np.uint8), 2, 2, 5, 1),
+        (np.array([3, 232, 0, 1, 7, 255, 254, 0, 0, 7, 128, 0, 0, 128, 7], np.uint8), 3, 2, 5, 1),
+        (np.array([0, 2], np.uint8), 1, 1, 2, 1),
+        *(_counted(*shape) for shape in ((1, 1000), (1000, 1))),  # no count of these fits into a byte
     ),
     random_cases=6,
     rtol=1e-5,

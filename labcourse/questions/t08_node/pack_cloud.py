@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import array
 from labgrader.question import Question, holds, wrong
 
 
@@ -13,9 +14,10 @@ def pack_cloud(P):
 
 
 def _holed_cloud(rng):
-    P = rng.normal(0.3, 0.4, (int(rng.integers(8, 14)), 3))
+    """Points of either sign, of millimetres or of kilometres; holes by one coordinate or by all, and the origin."""
+    P = rng.normal(0.0, rng.choice([0.01, 1.0, 1000.0]), (int(rng.integers(8, 14)), 3))
     P[rng.choice(len(P), 3, replace=False)] = np.nan
-    P[-3:] = rng.normal(0.3, 0.4, (3, 3))
+    P[-3:] = rng.normal(0.0, 1.0, (3, 3))
     P[-3, rng.integers(2)] = np.nan
     P[-2, rng.integers(3)] = rng.choice([np.inf, -np.inf])
     P[-1] = 0.0  # a point
@@ -24,12 +26,25 @@ def _holed_cloud(rng):
 
 QUESTION = Question(
     reference=pack_cloud,
+    kinds={
+        "P": array(
+            *("N 3", -1e6, 1e6),
+            also=(np.nan, np.inf, -np.inf),
+            lengths={"N": (0, None)},
+            says=("N may be 0", "NaN or infinite", "up to a million"),
+        ),
+    },
     inputs=_holed_cloud,
     by_hand=(
         (np.array([[1.0, 2.0, 3.0], [np.nan, np.nan, np.nan], [0.5, -0.25, 8.0]]),),
         (np.array([[0.1, 0.2, np.nan], [1.5, -1.0, 0.75], [0.3, 2.5, 1.0]]),),
         (np.array([[np.nan, 0.0, 0.0], [0.6, -0.4, 0.2]]),),
         (np.array([[0.1, 0.2, np.inf], [0.4, -0.2, 0.3], [0.0, 0.0, 0.0]]),),
+        (np.array([[1.0, 2.0, 3.0], [np.nan, 0.0, 0.0]]),),
+        (np.array([[-1e6, 3e5, 0.125], [-np.inf, 1e6, -7e5]]),),
+        (np.full((2, 3), np.nan),),  # nothing was seen
+        (np.zeros((0, 3)),),
+        (np.arange(-450.0, 450.0).reshape(300, 3),),  # as many as no byte counts, and no hole
     ),
 )
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import array, count
 from labgrader.question import Question, holds, wrong
 
 
@@ -38,11 +39,29 @@ def _streams(rng):
     return np.sort(a), np.sort(b), slop
 
 
+def _ascending(rng, stamps):
+    """Stamps of any size, sorted, none twice."""
+    return np.sort(stamps) + np.arange(len(stamps))
+
+
 _NOW = 1_700_000_000_000_000_000
 
 
 QUESTION = Question(
     reference=pair_stamps,
+    kinds={
+        "a": array(
+            "A", 0, dtype="int64", form=_ascending, says=("nanoseconds", "0 or more", "ascending", "A at least 1")
+        ),
+        "b": array(
+            *("B", 0),
+            dtype="int64",
+            form=_ascending,
+            lengths={"B": (0, None)},
+            says=("nanoseconds", "0 or more", "ascending", "b may be empty"),
+        ),
+        "slop": count(0, says="0 or more"),
+    },
     inputs=_streams,
     by_hand=(
         (np.array([0, 33, 66]), np.array([2, 40, 90]), 10),
@@ -50,6 +69,9 @@ QUESTION = Question(
         (np.array([10]), np.array([2, 6, 13, 30]), 8),
         (np.array([10, 50, 60]), np.array([6, 14, 56, 61]), 10),  # 56 is nearest to 50, and 60 to 56
         (np.array([10, 20]), np.array([], int), 5),
+        (np.array([0, 33, 66]), np.array([36, 70]), 40),
+        (np.array([0, 33, 66]), np.array([0, 34, 66]), 0),  # only what is equal
+        (1000 * np.arange(1, 301), 1000 * np.arange(301) + 400, 400),  # as many as no byte counts
         (np.array([0, 33, 66]), np.array([36, 70]), 40),  # 0 has lost its partner, and 36 is another's
         (np.array([10, 20, 60]), np.array([15, 61]), 9),  # 15 is as near to 10 as to 20
         (np.array([_NOW]), np.array([_NOW - 2**32 - 2]), 3),  # four seconds, which 32 bits do not see

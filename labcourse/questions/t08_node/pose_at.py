@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import array, count
 from labgrader.question import Question, wrong
 
 
@@ -23,6 +24,12 @@ def turned(axis, angle):
     """The unit quaternion (x, y, z, w) of a turn by an angle about an axis."""
     axis = np.asarray(axis, float)
     return np.array([*(np.sin(angle / 2) * axis / np.linalg.norm(axis)), np.cos(angle / 2)])
+
+
+def turns(rng, count):
+    """Any turns, as unit quaternions (count, 4)."""
+    quaternions = rng.normal(size=(count, 4))
+    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
 def _stream(rng):
@@ -63,6 +70,23 @@ _HARDLY = np.array([turned((0, 0, 1), 0.006 * k) for k in range(4)])
 
 QUESTION = Question(
     reference=pose_at,
+    kinds={
+        "stamps": array(
+            *("N", 0),
+            dtype="int64",
+            form=lambda rng, stamps: np.sort(stamps) + np.arange(len(stamps)),
+            lengths={"N": (2, None)},
+            says=("nanoseconds", "0 or more", "ascending", "N at least 2"),
+        ),
+        "positions": array("N 3", -100.0, 100.0, lengths={"N": (2, None)}, says="within 100 m"),
+        "quaternions": array(
+            *("N 4", -1.0, 1.0),
+            lengths={"N": (2, None)},
+            form=lambda rng, q: turns(rng, len(q)),
+            says=("unit", "of either sign"),
+        ),
+        "t": count(0, says=("nanoseconds", "0 or more")),
+    },
     inputs=_stream,
     by_hand=(
         (_STAMPS, _PLACES, _TURNS, 10),  # a quarter of the first way, and of its turn

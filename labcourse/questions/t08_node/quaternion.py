@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import rotations
 from labgrader.question import Question, holds, wrong
 
 
@@ -51,6 +52,7 @@ def _rotation(rng):
 
 QUESTION = Question(
     reference=quaternion,
+    kinds={"R": rotations(says=("rotation", "any angle"))},
     inputs=_rotation,
     by_hand=(
         (_turn((0.2, 1.0, -0.4), 0.6),),
