@@ -38,9 +38,9 @@ QUESTION = Question(
     reference=decode_depth,
     kinds={
         "data": array("n", 0, 255, dtype="uint8", lengths={"n": (2, None)}),
-        "height": count(1, says="at least 1"),
-        "width": count(1, says="at least 1"),
-        "step": count(2, says="at least 2 * width"),
+        "height": count(1, 4000, says="1 to 4000", free=("-|x|",)),  # how many rows are left, `data` says
+        "width": count(1, 4000, says="1 to 4000"),
+        "step": count(2, 10_000, says=("at least 2 * width", "at most 10000"), free=("-|x|",)),
         "is_bigendian": Kind(dtype="int", choices=(0, 1)),
     },
     inputs=_depth_message,
@@ -51,7 +51,7 @@ QUESTION = Question(
         (np.array([255, 255, 0, 0], np.uint8), 1, 2, 4, 0),  # the largest number is one
         (np.array([3, 232, 0, 1, 7, 255, 254, 0, 0, 7, 128, 0, 0, 128, 7], np.uint8), 3, 2, 5, 1),
         (np.array([0, 2], np.uint8), 1, 1, 2, 1),
-        *(_counted(*shape) for shape in ((1, 1000), (1000, 1))),  # no count of these fits into a byte
+        *(_counted(*shape) for shape in ((1, 4000), (4000, 1))),  # no count of these fits into a byte
     ),
     random_cases=6,
     rtol=1e-5,

@@ -28,7 +28,9 @@ QUESTION = Question(
     reference=pack_cloud,
     kinds={
         "P": array(
-            *("N 3", -1e6, 1e6),
+            "N 3",
+            -1e6,
+            1e6,
             also=(np.nan, np.inf, -np.inf),
             lengths={"N": (0, None)},
             says=("N may be 0", "NaN or infinite", "up to a million"),
@@ -41,7 +43,7 @@ QUESTION = Question(
         (np.array([[np.nan, 0.0, 0.0], [0.6, -0.4, 0.2]]),),
         (np.array([[0.1, 0.2, np.inf], [0.4, -0.2, 0.3], [0.0, 0.0, 0.0]]),),
         (np.array([[1.0, 2.0, 3.0], [np.nan, 0.0, 0.0]]),),
-        (np.array([[-1e6, 3e5, 0.125], [-np.inf, 1e6, -7e5]]),),
+        (np.array([[-np.inf, 1e6, 0.125], [-1e6, 3e5, -7e5]]),),
         (np.full((2, 3), np.nan),),  # nothing was seen
         (np.zeros((0, 3)),),
         (np.arange(-450.0, 450.0).reshape(300, 3),),  # as many as no byte counts, and no hole

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from labcourse.kinds import array, count
+from labcourse.kinds import count
+from labcourse.questions.t08_node import ascending_stamps
 from labgrader.question import Question, holds, wrong
 
 
@@ -39,27 +40,14 @@ def _streams(rng):
     return np.sort(a), np.sort(b), slop
 
 
-def _ascending(rng, stamps):
-    """Stamps of any size, sorted, none twice."""
-    return np.sort(stamps) + np.arange(len(stamps))
-
-
 _NOW = 1_700_000_000_000_000_000
 
 
 QUESTION = Question(
     reference=pair_stamps,
     kinds={
-        "a": array(
-            "A", 0, dtype="int64", form=_ascending, says=("nanoseconds", "0 or more", "ascending", "A at least 1")
-        ),
-        "b": array(
-            *("B", 0),
-            dtype="int64",
-            form=_ascending,
-            lengths={"B": (0, None)},
-            says=("nanoseconds", "0 or more", "ascending", "b may be empty"),
-        ),
+        "a": ascending_stamps("A", says="A at least 1"),
+        "b": ascending_stamps("B", says="b may be empty", least=0),
         "slop": count(0, says="0 or more"),
     },
     inputs=_streams,

@@ -3,6 +3,7 @@
 import numpy as np
 
 from labcourse.kinds import array, count
+from labcourse.questions.t08_node import ascending_stamps
 from labgrader.question import Question, wrong
 
 
@@ -26,22 +27,22 @@ def turned(axis, angle):
     return np.array([*(np.sin(angle / 2) * axis / np.linalg.norm(axis)), np.cos(angle / 2)])
 
 
-def turns(rng, count):
-    """Any turns, as unit quaternions (count, 4)."""
-    quaternions = rng.normal(size=(count, 4))
+def unit_rows(rng, rows):
+    """Any turns, as unit quaternions, in place of rows (N, 4)."""
+    quaternions = rng.normal(size=np.shape(rows))
     return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
 def _stream(rng):
-    """Five poses at uneven times of this century, each turned far from the last, half of the signs the other way.
+    """Two poses or more at uneven times of this century, each turned far from the last, with either sign.
 
     In some streams they are nanoseconds apart. In some the turns beside t are equal, and of length 1 but for rounding;
     some times are before or after all, some the first or the last one's.
     """
-    stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20, 80, 5)) * rng.choice([1, 1_000_000])
-    quaternions = rng.normal(size=(5, 4))
-    quaternions = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
-    i = int(rng.integers(4))
+    N = int(rng.integers(2, 8))
+    stamps = 1_700_000_000_000_000_000 + np.cumsum(rng.integers(20, 80, N)) * rng.choice([1, 1_000_000])
+    quaternions = unit_rows(rng, np.zeros((N, 4)))
+    i = int(rng.integers(N - 1))
     t = stamps[i] + int(rng.uniform(0.1, 0.4) * (stamps[i + 1] - stamps[i]))
     kind = rng.random()
     if kind < 0.24:
@@ -50,7 +51,7 @@ def _stream(rng):
         t = rng.choice([stamps[0] - rng.integers(1, 10**8), stamps[-1] + rng.integers(1, 10**8)])
     elif kind < 0.68:
         t = rng.choice(stamps[[0, -1]])
-    return stamps, rng.uniform(-1.0, 1.0, (5, 3)), quaternions, int(t)
+    return stamps, rng.uniform(-1.0, 1.0, (N, 3)) * rng.choice([1.0, 100.0]), quaternions, int(t)
 
 
 def one_of_two(output):
@@ -59,47 +60,48 @@ def one_of_two(output):
     return p, q * np.sign(q[np.abs(q).argmax()])
 
 
-_STAMPS = np.array([0, 40, 80, 200])
-_PLACES = np.array([[0.5, 0.0, 0.4], [0.6, 0.2, 0.4], [0.6, 0.2, 0.8], [0.2, 0.0, 0.8]])
+AT_LEAST_2 = {"N": (2, None)}
+_STAMPS = np.array([40, 80, 120, 240])
+_PLACES = np.array([[0.5, 0.0, 0.4], [0.6, 0.2, 0.4], [0.6, 0.2, 0.8], [0.2, 0.0, -0.8]])
 _TURNS = np.array([turned((0, 0, 1), a) for a in (0.0, 1.6, 1.6, 3.0)])
 _TURNS[3] = -_TURNS[3]  # the same rotation
 _TURNS[1:3] *= 1 + 4e-16  # equal, of length 1 but for rounding; the dot product is above 1
 _FURTHER = np.array([turned((0, 0, 1), np.radians(a)) for a in (0.0, 170.0, 190.0, 300.0)])
+_QUARTER = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.5**0.5, 0.5**0.5]])
+_FULL_CIRCLE = np.array([turned((1, 2, 3), 0.02 * k) for k in range(300)])
 _HARDLY = np.array([turned((0, 0, 1), 0.006 * k) for k in range(4)])
 
 
 QUESTION = Question(
     reference=pose_at,
     kinds={
-        "stamps": array(
-            *("N", 0),
-            dtype="int64",
-            form=lambda rng, stamps: np.sort(stamps) + np.arange(len(stamps)),
-            lengths={"N": (2, None)},
-            says=("nanoseconds", "0 or more", "ascending", "N at least 2"),
-        ),
-        "positions": array("N 3", -100.0, 100.0, lengths={"N": (2, None)}, says="within 100 m"),
-        "quaternions": array(
-            *("N 4", -1.0, 1.0),
-            lengths={"N": (2, None)},
-            form=lambda rng, q: turns(rng, len(q)),
-            says=("unit", "of either sign"),
-        ),
+        "stamps": ascending_stamps("N", says="N at least 2", least=2),
+        "positions": array("N 3", -100.0, 100.0, lengths=AT_LEAST_2, says="within 100 m"),
+        "quaternions": array("N 4", -1.0, 1.0, lengths=AT_LEAST_2, form=unit_rows, says=("unit", "of either sign")),
         "t": count(0, says=("nanoseconds", "0 or more")),
     },
     inputs=_stream,
     by_hand=(
-        (_STAMPS, _PLACES, _TURNS, 10),  # a quarter of the first way, and of its turn
-        (_STAMPS, _PLACES, _TURNS, 40),  # one that was published
-        (_STAMPS, _PLACES, _TURNS, 60),  # no turn
-        (_STAMPS, _PLACES, _TURNS, 110),  # the last quaternion has the other sign
-        (_STAMPS, _PLACES, _TURNS, 0),
-        (_STAMPS, _PLACES, _TURNS, 200),
-        (_STAMPS, _PLACES, _TURNS, 201),
-        (_STAMPS, _PLACES, _TURNS, -1),
-        (_STAMPS, _PLACES, _FURTHER, 50),  # from 170 to 190 degrees: as far from the first
-        (_STAMPS, _PLACES, _HARDLY, 50),  # a small turn, but not none
-        (_STAMPS + 1_700_000_000_000_000_000, _PLACES, _TURNS, 1_700_000_000_000_000_010),  # one float64 holds both
+        (_STAMPS, _PLACES, _TURNS, 50),  # a quarter of the first way, and of its turn
+        (_STAMPS, _PLACES, _TURNS, 80),  # one that was published
+        (_STAMPS, _PLACES, _TURNS, 100),  # no turn
+        (_STAMPS, _PLACES, _TURNS, 150),  # the last quaternion has the other sign
+        (_STAMPS, _PLACES, _TURNS, 40),
+        (_STAMPS, _PLACES, _TURNS, 240),
+        (_STAMPS, _PLACES, _TURNS, 241),
+        (_STAMPS, _PLACES, _TURNS, 39),
+        (_STAMPS, _PLACES, _FURTHER, 90),  # from 170 to 190 degrees: as far from the first
+        (_STAMPS, _PLACES, _HARDLY, 150),  # a small turn, but not none
+        (_STAMPS + 1_700_000_000_000_000_000, _PLACES, _TURNS, 1_700_000_000_000_000_050),  # one float64 holds both
+        (np.array([0, 40]), np.array([[0.0, 0.0, 0.0], [0.8, 0.0, 0.0]]), _QUARTER, 10),
+        (_STAMPS - 40, _PLACES, _TURNS, 0),
+        (_STAMPS[:3], 125.0 * _PLACES[:3], -_FULL_CIRCLE[100::70], 60),
+        (
+            40 * np.arange(300),
+            0.3 * np.arange(900.0).reshape(300, 3) % 100.0,
+            _FULL_CIRCLE,
+            11_930,
+        ),  # no byte counts it
     ),
     random_cases=56,
     atol=1e-5,
