@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from labcourse.kinds import MOST_CLASSES, array
+
 RETIRED = ("mean_iou",)  # no lab asks it any more; those that were released when one did are graded all the same
 
 
@@ -15,6 +17,12 @@ def counts(rng):
     if rng.random() < 0.7:
         n[never_true] = 0
     return (n.astype(np.int64),)
+
+
+def counts_of_many_classes(rng):
+    """Draw the matrix of 255 classes in a set of pictures; half of the cells are 0, and the others of any size."""
+    n = np.exp(rng.uniform(0.0, np.log(MOST_COUNTED), (MOST_CLASSES, MOST_CLASSES)))
+    return (np.where(rng.random(n.shape) < 0.5, 0.0, n).astype(np.int64),)
 
 
 def counts_of_frames(rng):
@@ -39,12 +47,18 @@ def counts_of_frames(rng):
     return (n.astype(np.int64),)
 
 
-# Two classes confused with each other; a class in neither image; a class that is predicted but never true; one perfect.
+MOST_COUNTED = 10**12  # pixels of a cell of n: a million pictures of a million pixels
+COUNTS = array("C C", 0, MOST_COUNTED, dtype="int64", says=("C from 1 to 255", "0 to 10 ** 12"))
+
+# One class; two that are perfect; two confused with each other; a class in neither image; one predicted, never true.
 SMALL_COUNTS = (
+    (np.array([[5]]),),
+    (np.array([[3 * MOST_COUNTED // 4, 0], [MOST_COUNTED, 50]]),),
+    (np.array([[6, 2], [0, 4]]),),
     (np.array([[6, 2], [1, 4]]),),
     (np.array([[6, 2, 0], [0, 4, 0], [0, 0, 0]]),),
     (np.array([[5, 0, 3], [1, 2, 0], [0, 0, 0]]),),
-    (np.array([[0, 7], [2, 0]]),),
+    (np.array([[0, 7], [2, 255]]),),
     (np.diag([3, 0, 1]),),
 )
 

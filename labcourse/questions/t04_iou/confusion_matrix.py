@@ -1,7 +1,10 @@
 """04_iou.confusion_matrix: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, MOST_CLASSES, array, count
 from labgrader.question import Question, wrong
 
 
@@ -25,10 +28,28 @@ def _label_pair(rng):
     return y_true, y_pred.astype(np.uint8), num_classes, ignore
 
 
+def _any_classes(rng, shape):
+    """Two images of a shape with any of 255 classes; half of the pixels agree, and as many are ignored."""
+    y_true, y_pred = rng.integers(MOST_CLASSES, size=(2, *shape))
+    y_true, ignore = np.where(rng.random(shape) < 0.5, y_pred, y_true), int(rng.integers(MOST_CLASSES))
+    y_true[rng.random(shape) < 0.5] = ignore
+    return y_true.astype(np.uint8), y_pred.astype(np.uint8), MOST_CLASSES, ignore
+
+
 QUESTION = Question(
     reference=confusion_matrix,
-    inputs=_label_pair,
+    kinds={
+        "y_true": array("H W", 0, 254, also=(255,), dtype="uint8", says=("0 .. num_classes - 1, or `ignore`")),
+        "y_pred": array("H W", 0, 254, dtype="uint8", says="0 .. num_classes - 1"),
+        "num_classes": count(1, MOST_CLASSES, says="1 to 255"),
+        "ignore": count(0, 255, says="0 to 255"),
+    },
+    inputs=(_label_pair, *(partial(_any_classes, shape=shape) for shape in ((LONG, 2), (1, LONG)))),
     by_hand=(
+        (np.array([[0]], np.uint8), np.array([[0]], np.uint8), 1, 255),
+        # An array may lie in memory by columns, and be a part of another.
+        (np.array([[0, 1, 1], [2, 0, 2]], np.uint8, order="F"), np.array([[0, 1, 2], [2, 0, 1]], np.uint8), 3, 255),
+        (np.array([[0, 1], [2, 1]], np.uint8), np.array([[0, 2], [1, 0]], np.uint8), 3, 255),
         (np.array([[0, 0, 1]], np.uint8), np.array([[0, 1, 1]], np.uint8), 2, 255),
         (np.array([[2, 255], [2, 1], [0, 2]], np.uint8), np.array([[1, 0], [1, 1], [0, 2]], np.uint8), 3, 255),
         (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),

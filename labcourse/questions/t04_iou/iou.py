@@ -1,8 +1,10 @@
 """04_iou.iou: the question, and wrong answers with the hints that they earn."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from labcourse.questions.t04_iou import SMALL_COUNTS, counts, divide, iou_of, parts
+from labcourse.questions.t04_iou import COUNTS, SMALL_COUNTS, counts, counts_of_many_classes, divide, iou_of, parts
 from labgrader.question import Question, wrong
 
 
@@ -15,7 +17,8 @@ def iou(n):
 
 QUESTION = Question(
     reference=iou,
-    inputs=counts,
+    kinds={"n": replace(COUNTS, free=("-|x|", "transposed"))},
+    inputs=(counts, counts_of_many_classes, counts),
     by_hand=SMALL_COUNTS,
     random_cases=6,
     forbidden=("sklearn", "torchmetrics"),

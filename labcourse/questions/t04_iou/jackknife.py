@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from labcourse.questions.t04_iou import counts_of_frames, divide, iou_of, parts
+from labcourse.kinds import MOST_CLASSES, array
+from labcourse.questions.t04_iou import MOST_COUNTED, counts_of_frames, divide, iou_of, parts
 from labgrader.question import Question, holds, wrong
 
 
@@ -18,6 +19,19 @@ def jackknife(n_frames):
     return mean, np.sqrt((F - 1) / F * np.square(left - np.mean(left)).sum())
 
 
+def _frames_alike(rng):
+    """Draw a hundred frames that differ in a few of their many pixels: their error is small, and not 0."""
+    n = rng.integers(10**5, 10**6, (2, 2)) // [[1, 20], [20, 1]]
+    return (n + rng.integers(0, 30, (MOST_FRAMES, 2, 2)),)
+
+
+def _many_classes(rng):
+    """Draw two to four frames of up to 255 classes, with up to all the pixels that there may be."""
+    n = np.exp(rng.uniform(0.0, np.log(MOST_COUNTED), (int(rng.integers(2, 5)), MOST_CLASSES, MOST_CLASSES)))
+    return (np.where(rng.random(n.shape) < 0.5, 0.0, n).astype(np.int64),)
+
+
+MOST_FRAMES = 100
 _ONE_PIXEL = np.array(
     [[[5, 0, 1], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]], [[4, 2, 0], [1, 7, 0], [0, 0, 0]]]
 )
@@ -25,8 +39,21 @@ _ONE_PIXEL = np.array(
 
 QUESTION = Question(
     reference=jackknife,
-    inputs=counts_of_frames,
+    kinds={
+        "n_frames": array(
+            "F C C",
+            0,
+            MOST_COUNTED,
+            dtype="int64",
+            lengths={"F": (2, MOST_FRAMES)},
+            says=("F from 2 to 100", "C from 1 to 255", "0 to 10 ** 12"),
+            free=("reversed along F",),
+        )
+    },
+    inputs=(counts_of_frames, _frames_alike, _many_classes),
     by_hand=(
+        (np.array([[[3]], [[5]]]),),  # one class
+        (np.array([[[255, 0], [1, 3]], [[4, 5], [0, 6]]]),),
         (
             np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),
         ),  # without one frame class 1 scores 0/99, without the other 1/1
@@ -35,6 +62,7 @@ QUESTION = Question(
         (np.array([[[30_000, 2_000], [0, 500]]] * 3),),  # no frame differs; more pixels than 16 bits count
     ),
     random_cases=6,
+    atol=1e-7,  # a hundred frames of a million pixels may differ by little more
     points=3,
     forbidden=("sklearn", "torchmetrics", "scipy"),
 )

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from labcourse.kinds import MOST_CLASSES, array
+from labcourse.questions.t04_iou import COUNTS, counts_of_many_classes
 from labgrader.question import Question, wrong
 
 
@@ -18,10 +20,32 @@ def _counts_and_groups(rng):
     return n.astype(np.int64), rng.permutation(np.arange(C) % 3).astype(np.int64)
 
 
+def _many_classes(rng):
+    """Draw 255 classes with counts of any size, and about half as many groups."""
+    (n,) = counts_of_many_classes(rng)
+    return n // MOST_CLASSES, _any_groups(rng, rng.integers(0, int(rng.integers(150, 200)), MOST_CLASSES))
+
+
+def _all_apart(rng):
+    """Draw 255 classes that only change their numbers."""
+    return *counts_of_many_classes(rng), rng.permutation(MOST_CLASSES)
+
+
+def _any_groups(rng, values):
+    """Whole numbers as groups 0 .. G - 1, in any order."""
+    present, group = np.unique(values, return_inverse=True)
+    return rng.permutation(len(present))[group.reshape(values.shape)]
+
+
 QUESTION = Question(
     reference=merge_classes,
-    inputs=_counts_and_groups,
+    kinds={
+        "n": COUNTS,
+        "group": array("C", 0, 254, dtype="int64", form=_any_groups, says=("0 .. G - 1, in any order", "each occurs")),
+    },
+    inputs=(_counts_and_groups, _many_classes, _all_apart),
     by_hand=(
+        (np.array([[5]]), np.array([0])),
         (np.array([[5, 1, 0], [0, 3, 2], [0, 4, 6]]), np.array([0, 1, 1])),
         (np.array([[5, 1, 7], [0, 3, 2], [9, 4, 6]]), np.array([1, 0, 1])),  # groups need not be in order
         (np.array([[5, 1], [2, 3]]), np.array([0, 0])),  # everything is one class

@@ -1,7 +1,10 @@
 """04_iou.trimap_band: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array, count
 from labgrader.question import Question, wrong
 
 
@@ -29,16 +32,29 @@ def _labels(rng):
     return np.roll(y, int(rng.integers(-1, 2)), axis=1), int(rng.integers(1, 4))
 
 
+def _long(rng, shape):
+    """Draw a picture of few pixels across and many along, of any classes, each a few pixels long, and a wide band."""
+    y = np.repeat(LABELS.draw(rng, H=1, W=20)[0], rng.integers(1, 60, 20))
+    y = np.resize(y, LONG * 2).reshape(shape)
+    return y, int(rng.integers(9, MOST_WIDE + 1))
+
+
+MOST_WIDE = 16
+LABELS = array("H W", 0, 254, also=(255,), dtype="uint8", says=("0 .. 254", "255 is no class"))
 QUESTION = Question(
     reference=trimap_band,
-    inputs=_labels,
+    kinds={"y": LABELS, "width": count(1, MOST_WIDE, says="1 to 16")},
+    inputs=(_labels, partial(_long, shape=(2, LONG)), _labels, partial(_long, shape=(LONG, 2))),
     by_hand=(
+        (np.array([[7]], np.uint8), 1),
+        (np.repeat([[4, 4], [9, 4]], 30, axis=0).astype(np.uint8), MOST_WIDE),  # more places than a byte counts
         (np.array([[1, 1, 1, 2, 2], [1, 1, 1, 1, 1]], np.uint8), 1),
         (np.full((4, 7), 3, np.uint8), 2),  # one class: no edge, at the image's border neither
         (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 1),  # one step from 1 nothing was judged
         (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 2),
         (np.array([[0, 0, 255, 255]], np.uint8), 2),  # beside class 0, too, nothing was judged
         (np.array([[4, 4, 4, 9, 9, 254]], np.uint8), 1),  # nor is 3 the last class
+        (np.array([[1, 1, 1], [1, 1, 1], [2, 1, 1]], np.uint8), 1),
         (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
     ),
     random_cases=8,
