@@ -50,7 +50,7 @@ QUESTION = Question(
             free=("reversed along F",),
         )
     },
-    inputs=(counts_of_frames, _frames_alike, _many_classes),
+    inputs=(counts_of_frames, _frames_alike, counts_of_frames, _many_classes, counts_of_frames),
     by_hand=(
         (np.array([[[3]], [[5]]]),),  # one class
         (np.array([[[255, 0], [1, 3]], [[4, 5], [0, 6]]]),),
@@ -70,7 +70,7 @@ QUESTION = Question(
 
 @holds("frames that are all alike have a standard error of 0")
 def alike_frames_say_the_same(n_frames, out):
-    return np.isclose(out[1], 0.0, atol=1e-6) if (n_frames == n_frames[0]).all() else out[1] > 0.0
+    return np.isclose(out[1], 0.0, atol=1e-6) if (n_frames == n_frames[0]).all() else out[1] >= 0.0
 
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
