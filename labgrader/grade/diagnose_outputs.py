@@ -13,11 +13,12 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from labgrader.course import of_topic
 from labgrader.question import Question
+from labgrader.reply.finding import Finding
 from labgrader.run.run import public_cases, verdict_on
 
 SECONDS, MEMORY = 20, 3 << 30  # of a processor, for one answer; bytes of address space, for the process
@@ -25,21 +26,39 @@ SECONDS, MEMORY = 20, 3 << 30  # of a processor, for one answer; bytes of addres
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found about a wrong answer. named: whether the hint names the mistake; failed: why nothing was found."""
+    """What was found about a wrong answer. named: whether the hint names the mistake; failed: why nothing was found.
+
+    shown: the case that is told, and the marked lines. needs_a_look: whether nothing is said before somebody looks at
+    the program.
+    """
 
     hint: str = ""
     named: bool = False
     shown: str = ""
     failed: str = ""
+    needs_a_look: bool = False
 
 
-def diagnosed(topic: str, function: str, outputs: Sequence[object]) -> Diagnosis:
-    """What to tell about outputs on the public cases, found in this process."""
+def diagnosed(
+    topic: str,
+    function: str,
+    outputs: Sequence[object],
+    pieces: Sequence[tuple[str, str]] = (),
+    findings: Sequence[Finding] | None = None,
+) -> Diagnosis:
+    """What to tell about outputs on the public cases, found in this process.
+
+    pieces: the program; findings: what was found in it, None if nobody has looked yet.
+    """
     question = of_topic(topic)[function]
     judged = verdict_on(question, public_cases(question), outputs)
-    sentence = judged.sentence
-    named = sentence is not None and sentence.names_the_mistake
-    return Diagnosis(judged.hint or "", named, "\n".join(judged.shown))
+    if findings is None and judged.needs_a_look:
+        return Diagnosis(needs_a_look=True)
+    sentence = replace(judged, pieces=pieces, findings=findings or ()).sentence
+    if sentence is None:
+        return Diagnosis(shown="\n".join(judged.shown))
+    lines = [*judged.shown, *(line for marked in sentence.marked for line in marked.plain())]
+    return Diagnosis(sentence.says, sentence.names_the_mistake, "\n".join(lines))
 
 
 class Diagnoser:
@@ -57,9 +76,9 @@ class Diagnoser:
             env=os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"},
         )
 
-    def ask(self, topic: str, function: str, outputs: Sequence[object]) -> Diagnosis:
-        """What to tell about outputs, or why that cannot be said; the process may have ended then."""
-        data = pickle.dumps((topic, function, outputs))
+    def ask(self, topic: str, function: str, *outputs_and_program: object) -> Diagnosis:
+        """What `diagnosed` tells, or why that cannot be said; the process may have ended then."""
+        data = pickle.dumps((topic, function, *outputs_and_program))
         try:
             self.process.stdin.write(struct.pack("<Q", len(data)) + data)
             self.process.stdin.flush()
@@ -83,13 +102,13 @@ class Diagnosers:
     def __init__(self):
         self.idle: collections.deque[Diagnoser] = collections.deque()
 
-    def ask(self, question: Question, outputs: Sequence[object]) -> Diagnosis:
-        """What to tell about the outputs of an answer on the public cases."""
+    def ask(self, question: Question, *outputs_and_program: object) -> Diagnosis:
+        """What to tell about an answer on the public cases: arguments after the question as `diagnosed` takes them."""
         try:
             diagnoser = self.idle.pop()
         except IndexError:
             diagnoser = Diagnoser()
-        found = diagnoser.ask(question.topic, question.function, outputs)
+        found = diagnoser.ask(question.topic, question.function, *outputs_and_program)
         if diagnoser.process.poll() is None:
             self.idle.append(diagnoser)
         return found

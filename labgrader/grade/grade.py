@@ -13,7 +13,6 @@ can say of secret arguments on a public page what they were, or answer them from
 """
 
 import hashlib
-import itertools
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
@@ -30,9 +29,7 @@ from labgrader.grade.diagnose_outputs import Diagnosis, diagnosers
 from labgrader.handin.reading import Lab, Submission
 from labgrader.program.slice import Program
 from labgrader.question import Question
-from labgrader.reply.finding import IDLE
 from labgrader.reply.judge import Verdict
-from labgrader.reply.sentences import found_in_the_program, of_kinds
 from labgrader.run.channel import Changed, WorkerLost
 from labgrader.run.run import Answer, Budget, Limits, drawing, public_cases
 from labgrader.sandbox import sandbox
@@ -266,26 +263,17 @@ def secret_cases(question: Question, secret: str, student: str) -> tuple[Case, .
 
 
 def explained(answer: Answer, judged: Verdict) -> Diagnosis:
-    """What to tell about a wrong answer: by its outputs, and if these do not name the mistake, by its program."""
-    found = diagnosers.ask(answer.question, judged.outputs)
-    if found.named or judged.problem.kind == "time":
+    """What to tell about a wrong answer, as its check tells it: its program is looked at where that is needed."""
+    asked = answer.question, judged.outputs, answer.program.pieces
+    found = diagnosers.ask(*asked)
+    if not found.needs_a_look:
         return found
     try:
-        return looked_at(found, answer, judged.problem.kind == "altered")
+        findings, failed = answer.findings(), ""
     except Exception as error:  # of what a stranger wrote: it costs this answer a hint
-        return replace(found, failed=f"its program cannot be looked at: {type(error).__name__}")
-
-
-def looked_at(found: Diagnosis, answer: Answer, values_are_right: bool) -> Diagnosis:
-    """What to tell when the answer's program has been looked at, too: its line and a question, if there is a place."""
-    pieces = answer.program.pieces
-    findings = answer.findings()
-    in_the_program = found_in_the_program(answer.question, pieces, findings, values_are_right)
-    sentence = next(itertools.chain(in_the_program, of_kinds(IDLE, pieces, findings)), None)
-    if sentence is None:
-        return found
-    lines = [line for marked in sentence.marked for line in marked.plain()]
-    return replace(found, hint=sentence.says, named=True, shown="\n".join([found.shown, *lines]).strip("\n"))
+        findings, failed = [], f"its program cannot be looked at: {type(error).__name__}"
+    found = diagnosers.ask(*asked, findings)
+    return replace(found, failed=failed or found.failed)
 
 
 def right_parts(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> tuple[str, ...]:
