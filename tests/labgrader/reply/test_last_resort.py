@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from labgrader.comparison import Case
 from labgrader.question import Question
 from labgrader.reply import repair
-from labgrader.reply.contrast import contrast
 from labgrader.reply.finding import REPAIRS, Finding, Span
 from labgrader.reply.idle import idle
 from labgrader.reply.repair import repairs
@@ -108,40 +106,6 @@ def test_what_is_said_of_two_mistakes_promises_nothing_of_one():
 )
 def test_what_is_never_read_is_found(source, kinds):
     assert [finding.kind for finding in idle([("f", source)], "f")] == kinds
-
-
-# --------------------------------------------------------------------------------------------- what cases share
-
-
-def contrasted(right, *values):
-    """What is told of cases of one argument."""
-    question = Question(name="0.f", reference=lambda y: y, inputs=lambda rng: ())
-    return contrast(question, [Case((value,), value, False) for value in values], right)
-
-
-SOME, IGNORED = np.array([[1, 2], [3, 4]], np.uint8), np.array([[1, 255], [3, 4]], np.uint8)
-WIDE = np.ones((2, 3))
-
-
-def test_the_kind_of_the_wrong_cases_is_told_if_none_of_it_is_right():
-    assert "wrong whenever y holds 255, and right in the 2 other cases" in contrasted(
-        [True, False, True, False], SOME, IGNORED, SOME + 1, IGNORED + 0
-    )
-    assert "wrong whenever y is not square" in contrasted([True, True, False, False], SOME, SOME, WIDE, WIDE)
-    assert "wrong whenever y is negative" in contrasted([True, True, False, False], 1.0, 2.0, -1.0, -3.0)
-
-
-def test_a_kind_of_which_some_are_right_is_told_if_most_others_are():
-    assert "wrong only when y holds 255: in the 4 cases" in contrasted(
-        [True] * 5 + [False] * 2, *[SOME] * 4, *[IGNORED] * 3
-    )
-
-
-def test_nothing_is_told_where_no_kind_tells_them_apart():
-    assert contrasted([True, False, True], SOME, SOME, SOME) == ""
-    assert contrasted([True, True, False], SOME, SOME, IGNORED) == ""  # one may be wrong for another reason
-    assert contrasted([False, False], IGNORED, IGNORED) == ""
-    assert contrasted([True, True], SOME, IGNORED) == ""
 
 
 def test_rows_that_are_one_list_are_told_before_anything_else_and_an_unread_argument_before_a_repair():
