@@ -10,7 +10,6 @@ watches     an answer runs again under a watch that shows where something goes w
 idle        what stands idle in a program
 repair      the place that, written otherwise, makes every case right: `mutation` by `recipes`
 repair_job  one look at a program, in its worker: watches, then repair
-steps       the last step that is right
 syntax      places in a syntax tree
 alarm       a limit on the CPU time of a call in this process
 """

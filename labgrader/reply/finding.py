@@ -28,11 +28,6 @@ IDLE = {
     "unread": "Your function never reads the marked argument. What is it for in this task?",
     "unused": "Nothing uses what the marked line computes. Where does it belong?",
 }
-# What is right in a wrong program, which is told where nothing is known of its mistake (`steps`).
-RIGHT = {
-    "reached": "The marked part gives numbers that a right answer has on its way, too. Look at what comes after it, "
-    "and at what it is put together with.",
-}
 # Kinds of repairs, and what is said of each: with the marked part written otherwise, every case is right. Of repairs
 # that change equally much, the kind that stands first here is told. A copy comes first, since nothing else explains
 # what it mends; then what can be left out, since any other change of such a part is right by accident; the order of
@@ -94,7 +89,7 @@ class Span:
 class Finding:
     """What a watch or a repair found, or what stands idle.
 
-    kind: of WATCHES, IDLE, RIGHT or REPAIRS. piece: number of the program's piece; spans: the places in its text.
+    kind: of WATCHES, IDLE or REPAIRS. piece: number of the program's piece; spans: the places in its text.
     value: a number that was met there, if any. of_two: whether another place has to be changed, too, or a listed
     mistake is the other one, of which value is the number.
     """
@@ -131,7 +126,7 @@ def read(text: str, pieces: Sequence[tuple[str, str]]) -> list[Finding]:
 def checked(entry: dict, pieces: Sequence[tuple[str, str]]) -> Finding:
     """One finding; raises ValueError, TypeError or KeyError for one that cannot be."""
     kind, piece, value = entry["kind"], entry["piece"], entry["value"]
-    if kind not in (*WATCHES, *IDLE, *RIGHT, *REPAIRS) or type(piece) is not int or not 0 <= piece < len(pieces):
+    if kind not in (*WATCHES, *IDLE, *REPAIRS) or type(piece) is not int or not 0 <= piece < len(pieces):
         raise ValueError("no such kind or piece")
     if value is not None and not math.isfinite(value):
         raise ValueError("no such number")

@@ -10,7 +10,7 @@ import numpy as np
 
 from labgrader.comparison import Case, Problem, canonical, differences, different, parts
 from labgrader.question import Question
-from labgrader.reply.finding import IDLE, REPAIRS, RIGHT, WATCHES, Finding
+from labgrader.reply.finding import IDLE, REPAIRS, WATCHES, Finding
 
 LONGEST = 100  # characters of a line
 LONGEST_CALL = 180  # of a call's arguments; they wrap, and whoever does a case by hand needs them all
@@ -129,7 +129,7 @@ def said(finding: Finding) -> str:
     if finding.kind == "overflow" and finding.value is not None:
         value = f": a number as large as {finding.value:.4g} goes into it"
     several = "s" if len(finding.spans) > 1 else ""
-    says = (WATCHES | IDLE | RIGHT | REPAIRS)[finding.kind].replace("{value}", value).replace("{s}", several)
+    says = (WATCHES | IDLE | REPAIRS)[finding.kind].replace("{value}", value).replace("{s}", several)
     if not finding.of_two or finding.value is not None:
         return says
     return "Two things are wrong. First: " + says.replace(": every case is right without it", "").replace(

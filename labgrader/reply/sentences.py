@@ -2,8 +2,7 @@
 
 `sentences` asks in this order: is it a listed misconception; does it run (what an exception means in this task); what
 do instruments and repair find in the student's own program; which relation of the outputs would a student see at once;
-what stands idle in the program; which property of right answers does it lack; up
-to which step is it right; and at last, which cases are wrong.
+what stands idle in the program; which property of right answers does it lack; and at last, which cases are wrong.
 """
 
 import copy
@@ -16,7 +15,7 @@ import numpy as np
 from labgrader.comparison import Case, Problem, alike, parts, trusted
 from labgrader.question import Misconception, Property, Question
 from labgrader.reply.errors import explain
-from labgrader.reply.finding import IDLE, REPAIRS, RIGHT, WATCHES, Finding
+from labgrader.reply.finding import IDLE, REPAIRS, WATCHES, Finding
 from labgrader.reply.messages import Marked, marked, said
 from labgrader.reply.relations import View, related
 from labgrader.reply.repair import Listed, fingerprint
@@ -29,7 +28,7 @@ class Sentence:
     """Something true of a wrong answer.
 
     kind: "exception", "misconception", a kind of finding (`finding.WATCHES`, `finding.IDLE`, `finding.REPAIRS`) or
-    "relation" name a mistake; "property", "reached" and "case" are true of more mistakes than one. marked:
+    "relation" name a mistake; "property" and "case" are true of more mistakes than one. marked:
     lines of the student's that it is about.
     """
 
@@ -40,7 +39,7 @@ class Sentence:
     @property
     def names_the_mistake(self) -> bool:
         """Whether one knows from it what to change."""
-        return self.kind not in ("property", "reached", "case")
+        return self.kind not in ("property", "case")
 
 
 def diagnose(
@@ -81,7 +80,6 @@ def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sent
     yield from broken_properties(question, pairs[:1])  # that is the case that is shown, as a rule
     for sentence in broken_properties(question, pairs[1:]):
         yield replace(sentence, says=f"In another wrong case: {sentence.says[0].lower()}{sentence.says[1:]}")
-    yield from of_kinds(RIGHT, pieces, findings)
     yield which_cases(cases, right)
 
 

@@ -35,9 +35,7 @@ from labgrader.program.cell import Cell
 from labgrader.program.fingerprint import fingerprints
 from labgrader.program.live import LiveProgram, altered, own_entry
 from labgrader.program.slice import program
-from labgrader.reply.finding import write
 from labgrader.reply.repair_job import Job
-from labgrader.reply.steps import last_right_step
 
 DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
 MOST_PARTS = 16
@@ -151,10 +149,6 @@ class Session:
     def repair(self, *job: object) -> bytes:
         """Look for the place of a program's mistake."""
         return b"J" + Job(*job).repair(self.more).encode()
-
-    def steps(self, *arguments: object) -> bytes:
-        """Look for the last step that is right: arguments are those of `steps.last_right_step`."""
-        return b"J" + write(last_right_step(*arguments)).encode()
 
 
 def message_of(error: BaseException) -> str:

@@ -11,9 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from labgrader.comparison import Case, Problem, alike, expected_cases
+from labgrader.comparison import Case, Problem, expected_cases
 from labgrader.course import course
 from labgrader.program.slice import Program
 from labgrader.question import PUBLIC_SEED, Question
@@ -22,7 +20,6 @@ from labgrader.reply.judge import Verdict, verdict
 from labgrader.reply.repair import Listed
 from labgrader.reply.repair_job import comparing_of, fresh_cases, pairs
 from labgrader.reply.sentences import listed_in
-from labgrader.reply.steps import MOST_CASES, MOST_NUMBERS, Values, values_of_a_right_answer
 from labgrader.reply.watches import MOST_S as WATCH_S
 from labgrader.run.channel import MOST_FOUND, Changed, Worker, WorkerLost
 from labgrader.run.process import MORE
@@ -78,13 +75,6 @@ def listed_mistakes(question: Question) -> list[Listed]:
     """What the listed mistakes give in the public cases; computed once in a process."""
     with drawing:
         return listed_in(question, public_cases(question))
-
-
-@functools.cache
-def right_steps(question: Question, number: int) -> Values:
-    """What the question's own answer computes on its way in a public case; computed once in a process."""
-    with drawing:
-        return values_of_a_right_answer(question.reference, public_cases(question)[number].args)
 
 
 @dataclass
@@ -202,11 +192,6 @@ class Answer:
                 if reply == MORE[1:].decode():
                     reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S - stopwatch.used(), MOST_FOUND)
                 found += read(reply, pieces) if isinstance(reply, str) else []
-            if not found:
-                wrong = wrong_and_small(question, public_cases(question), self.worded)[:MOST_CASES]
-                cases = [(public_cases(question)[k].args, right_steps(question, k)) for k in wrong]
-                reply = self.worker.ask(("steps", pieces, self.name, cases), LOOK_S, MOST_FOUND)
-                found += read(reply, pieces) if isinstance(reply, str) else []
         return found[:MOST_FINDINGS]
 
     def with_line(self, output: object) -> object:
@@ -218,13 +203,6 @@ class Answer:
         lines = pieces[int(piece)][1].split("\n") if int(piece) < len(pieces) else []
         own = ((number, lines[number - 1].strip()),) if 1 <= number <= len(lines) else ()
         return replace(output, says=output.says.removeprefix("it raises "), lines=own)
-
-
-def wrong_and_small(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[int]:
-    """The numbers of wrong cases that are not large, those by hand last."""
-    told = enumerate(zip(cases, outputs, strict=False))
-    wrong = [k for k, (case, got) in told if not alike(question, case.expected, got)]
-    return [k for k in reversed(wrong) if sum(map(np.size, cases[k].args)) <= MOST_NUMBERS]
 
 
 def packages_of(question: Question, program: Program) -> tuple[str, ...]:

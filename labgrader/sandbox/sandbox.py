@@ -42,7 +42,7 @@ FAREWELL_S = 10.0  # for the server to kill a child
 MODULES = ["labgrader/__init__.py", "labgrader/question.py", "labgrader/comparison.py"]
 for room, names in {
     "program": "cell effects fingerprint live slice",
-    "reply": "alarm finding idle mutation recipes repair repair_job steps syntax watches",
+    "reply": "alarm finding idle mutation recipes repair repair_job syntax watches",
     "run": "process",
     "sandbox": "fork_server",
 }.items():
