@@ -16,8 +16,6 @@ WATCHES = {
     "overflow": "The marked part grows beyond what a float can hold{value}. What keeps it small?",
     "division": "The marked part divides by 0, or takes the logarithm of 0. When is that, and what is right then?",
     "no number": "The marked part has no result (0 / 0, for example). In which case is that, and what is right then?",
-    "wraps": "The marked part is computed in bytes or other small integers. Behind their largest number they begin "
-    "again. Which type is wide enough?",
     "aliased": "All rows of this list are one and the same list: what is written into one row is in all of them. How "
     "is a new list made for each row?",
     "writes": "This line changes an argument, perhaps through another name for it or for a part of it. Whoever calls "

@@ -7,8 +7,7 @@ this runs in a worker.
 
 import ast
 import contextlib
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import FrameType, TracebackType
 
 import numpy as np
@@ -33,7 +32,7 @@ def readings(
         program = LiveProgram(name, pieces)
         outputs = [outcome(program, args) for args, _ in cases]
         wrong = [(a, e, out) for (a, e), out in zip(cases, outputs, strict=True) if not right(e, out)]
-        for watch in (floating_point, byte_arithmetic, written_argument):
+        for watch in (floating_point, written_argument):
             if reading := watch(program, cases, wrong, right):
                 found.append(reading)
     return found
@@ -136,95 +135,3 @@ def written_argument(program: LiveProgram, cases, wrong, right) -> Finding | Non
         except Exception:
             return None
     return None
-
-
-# ------------------------------------------------------------------------------------------------------ bytes
-
-
-def byte_arithmetic(program: LiveProgram, cases, wrong, right) -> Finding | None:
-    """The line where small integers wrap round: with wide ones every case is right."""
-    if not wrong or not any(is_small(a) for args, _ in cases for a in args):
-        return None
-    if not all(right_when_wide(program, args, expected, right) for args, expected in cases):
-        return None
-    for args, _, _ in sorted(wrong, key=lambda case: sum(np.size(a) for a in case[0])):
-        if reading := first_difference(program, args):
-            return reading
-    return None
-
-
-def is_small(value: object) -> bool:
-    """Whether an argument is an array of small integers."""
-    return isinstance(value, np.ndarray) and value.dtype.name in SMALL
-
-
-def wide(args: tuple) -> tuple:
-    """The arguments with small integers as wide ones."""
-    return tuple(a.astype(np.int64) if is_small(a) else a for a in copied(args))
-
-
-def right_when_wide(program: LiveProgram, args: tuple, expected: object, right: Callable) -> bool:
-    """Whether a case is right with wide integers."""
-    try:
-        return right(expected, program.answer(*wide(args)))
-    except Exception:
-        return False
-
-
-def first_difference(program: LiveProgram, args: tuple) -> Finding | None:
-    """The first line after which a variable has another value with wide integers."""
-    narrow, broad = (lines_of(program, given) for given in (copied(args), wide(args)))
-    line = None
-    for (at, before), (other, after) in zip(narrow, broad, strict=False):
-        if at != other:
-            break
-        if line is not None and any(not equal(before[k], after.get(k)) for k in before):
-            break
-        line = at
-    if line is None:
-        return None
-    piece, number = line
-    statement = statement_at(program.pieces[piece][1], number)
-    return None if statement is None else Finding("wraps", piece, (statement,))
-
-
-def lines_of(program: LiveProgram, args: tuple) -> list[tuple[tuple[int, int], dict]]:
-    """The student's lines in the order in which they run, each with the variables before it."""
-    names = program.files
-    found: list = []
-
-    def trace(frame, event, _):
-        if frame.f_code.co_filename not in names:
-            return None
-        if event in ("line", "return") and len(found) < MOST_EVENTS:
-            kept = {
-                k: np.array(v)
-                for k, v in frame.f_locals.items()
-                if isinstance(v, np.ndarray | np.generic | int | float)
-            }
-            found.append(((names.index(frame.f_code.co_filename), frame.f_lineno), kept))
-        return trace
-
-    sys.settrace(trace)
-    try:
-        program.answer(*args)
-    finally:
-        sys.settrace(None)
-    return found
-
-
-def equal(a: np.ndarray, b: np.ndarray | None) -> bool:
-    """Whether two variables have the same values."""
-    return (
-        b is not None and a.shape == b.shape and bool(np.array_equal(a.astype(float), b.astype(float), equal_nan=True))
-    )
-
-
-def statement_at(text: str, line: int) -> Span | None:
-    """What a statement that begins in a line computes."""
-    found = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.stmt) and n.lineno <= line <= n.end_lineno]
-    found = [n for n in found if getattr(n, "value", None) is not None]
-    if not found:
-        return None
-    value = max(found, key=lambda n: n.lineno).value
-    return Span(value.lineno, value.col_offset, value.end_lineno, value.end_col_offset)
