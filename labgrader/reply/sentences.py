@@ -7,7 +7,7 @@ what stands idle in the program; which property of right answers does it lack; a
 
 import copy
 import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,7 +75,7 @@ def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sent
     yield from outputs_exchanged(question, cases, outputs)
     for name, view in views_of(question, cases, outputs):
         yield from (Sentence("relation", name + says) for says in related(view))
-    yield from of_kinds(IDLE, pieces, findings)
+    yield from idle_in_the_program(pieces, findings)
     right = [alike(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)]
     yield from broken_properties(question, pairs[:1])  # that is the case that is shown, as a rule
     for sentence in broken_properties(question, pairs[1:]):
@@ -177,12 +177,10 @@ def found_in_the_program(
         yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
 
 
-def of_kinds(
-    kinds: Collection[str], pieces: Sequence[tuple[str, str]], findings: Sequence[Finding]
-) -> Iterator[Sentence]:
-    """What stands idle: an argument that is never read, what is computed and never used; or the last right step."""
+def idle_in_the_program(pieces: Sequence[tuple[str, str]], findings: Sequence[Finding]) -> Iterator[Sentence]:
+    """What stands idle, but for an argument that is never read, which is told before repairs."""
     for finding in findings:
-        if finding.kind in kinds and finding.kind != "unread":  # which is told before
+        if finding.kind in IDLE and finding.kind != "unread":
             yield Sentence(finding.kind, said(finding), marked([finding], pieces))
 
 

@@ -1,8 +1,7 @@
 """Instruments: an answer runs again under a watch that shows where something goes wrong.
 
-Three watches: floating-point errors raise, arguments cannot be written, and integers are wide, so that bytes do not
-wrap round. Each finds a line of the student's own, and says nothing unless a wrong output hangs on it. Like `repair`,
-this runs in a worker.
+Two watches: floating-point errors raise, and arguments cannot be written. Each finds a line of the student's own, and
+says nothing unless a wrong output hangs on it. Like `repair`, this runs in a worker.
 """
 
 import ast
@@ -19,8 +18,6 @@ from labgrader.reply.finding import Finding, Span
 from labgrader.reply.repair import ENDS
 
 MOST_S = 2.0  # CPU seconds of all watches together
-MOST_EVENTS = 4000  # lines of which the variables are kept
-SMALL = ("uint8", "int8", "uint16", "int16")
 
 
 def readings(
@@ -32,8 +29,8 @@ def readings(
         program = LiveProgram(name, pieces)
         outputs = [outcome(program, args) for args, _ in cases]
         wrong = [(a, e, out) for (a, e), out in zip(cases, outputs, strict=True) if not right(e, out)]
-        for watch in (floating_point, written_argument):
-            if reading := watch(program, cases, wrong, right):
+        for watch, tried in ((floating_point, wrong), (written_argument, cases)):
+            if reading := watch(program, tried):
                 found.append(reading)
     return found
 
@@ -49,8 +46,11 @@ def outcome(program: LiveProgram, args: tuple) -> object:
 # ---------------------------------------------------------------------------------------- floating-point errors
 
 
-def floating_point(program: LiveProgram, cases, wrong, right) -> Finding | None:
-    """The first operation that overflows, divides by zero or has no result, where NaN or infinity comes out wrongly."""
+def floating_point(program: LiveProgram, wrong: Sequence[tuple[tuple, object, object]]) -> Finding | None:
+    """The first operation that overflows, divides by zero or has no result, where NaN or infinity comes out wrongly.
+
+    wrong: the arguments of wrong cases, what is expected, and what came.
+    """
     for args, expected, got in wrong:
         if not bad_numbers(expected, got):
             continue
@@ -113,7 +113,7 @@ def extreme(text: str, span: Span, frame: FrameType, kind: str) -> float | None:
 # ------------------------------------------------------------------------------------------------- arguments
 
 
-def written_argument(program: LiveProgram, cases, wrong, right) -> Finding | None:
+def written_argument(program: LiveProgram, cases: Sequence[tuple[tuple, object]]) -> Finding | None:
     """The line that changes an argument."""
     for args, _ in cases:
         given = copied(args)

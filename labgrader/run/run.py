@@ -96,7 +96,6 @@ class Answer:
 
     budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took,
     called_s: the last cases alone.
-    worded: the outputs that were judged last, none where they could not be.
     """
 
     def __init__(
@@ -106,7 +105,7 @@ class Answer:
         self.budget = Budget(limits) if budget is None else budget
         self.name, self.seconds = program.name or question.function, self.budget.for_one
         self.used_s = self.called_s = 0.0
-        self.starting, self.worded = start(packages_of(question, program), limits), []
+        self.starting = start(packages_of(question, program), limits)
 
     def __enter__(self) -> "Answer":
         self.worker = self.starting.__enter__()
@@ -173,7 +172,6 @@ class Answer:
             return Verdict(worded[0], None, "", outputs=worded), outputs
         try:
             judged = verdict_on(self.question, cases, worded)
-            self.worded = worded
             return replace(judged, pieces=self.program.pieces), outputs
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
