@@ -13,7 +13,7 @@ MOST_FINDINGS = 8
 MOST_SPANS = 6
 # What a watch shows, and what is said of it: these are no repairs, so they say what happens there.
 WATCHES = {
-    "overflow": "The marked part grows beyond what a float can hold{value}. What keeps it small?",
+    "overflow": "The marked part grows beyond what a float can hold{exponent}. What keeps it small?",
     "division": "The marked part divides by 0, or takes the logarithm of 0. When is that, and what is right then?",
     "no number": "The marked part has no result (0 / 0, for example). In which case is that, and what is right then?",
     "aliased": "All rows of this list are one and the same list: what is written into one row is in all of them. How "
@@ -88,15 +88,15 @@ class Finding:
     """What a watch or a repair found, or what stands idle.
 
     kind: of WATCHES, IDLE or REPAIRS. piece: number of the program's piece; spans: the places in its text.
-    value: a number that was met there, if any. of_two: whether another place has to be changed, too, or a listed
-    mistake is the other one, of which value is the number.
+    exponent: the largest one, where an exponential overflows. listed: the number of a listed mistake, where it is wrong
+    beside this place.
     """
 
     kind: str
     piece: int
     spans: tuple[Span, ...]
-    value: float | None = None
-    of_two: bool = False
+    exponent: float | None = None
+    listed: int | None = None
 
     @property
     def width(self) -> int:
@@ -112,7 +112,7 @@ def write(findings: Sequence[Finding]) -> str:
 def read(text: str, pieces: Sequence[tuple[str, str]]) -> list[Finding]:
     """Findings of JSON that anybody may have written; none if anything in it is not as `write` makes it.
 
-    >>> read('[{"kind": "axis", "piece": 0, "spans": [[1, 0, 1, 3]], "value": 1}]', [("f", "def f(): 0")])
+    >>> read('[{"kind": "axis", "piece": 0, "spans": [[1, 0, 1, 3]], "exponent": 1}]', [("f", "def f(): 0")])
     []
     """
     try:
@@ -123,11 +123,13 @@ def read(text: str, pieces: Sequence[tuple[str, str]]) -> list[Finding]:
 
 def checked(entry: dict, pieces: Sequence[tuple[str, str]]) -> Finding:
     """One finding; raises ValueError, TypeError or KeyError for one that cannot be."""
-    kind, piece, value = entry["kind"], entry["piece"], entry["value"]
+    kind, piece, exponent, listed = (entry[name] for name in ("kind", "piece", "exponent", "listed"))
     if kind not in (*WATCHES, *IDLE, *REPAIRS) or type(piece) is not int or not 0 <= piece < len(pieces):
         raise ValueError("no such kind or piece")
-    if value is not None and not math.isfinite(value):
+    if exponent is not None and not math.isfinite(exponent):
         raise ValueError("no such number")
+    if listed is not None and (type(listed) is not int or listed < 0):
+        raise ValueError("no such mistake")
     lines = pieces[piece][1].split("\n")
     spans = tuple(Span(**span) for span in entry["spans"][:MOST_SPANS])
     for span in spans:
@@ -141,4 +143,4 @@ def checked(entry: dict, pieces: Sequence[tuple[str, str]]) -> Finding:
             raise ValueError("no such column")
     if not spans:
         raise ValueError("no place")
-    return Finding(kind, piece, spans, value, entry.get("of_two") is True)
+    return Finding(kind, piece, spans, exponent, listed)

@@ -125,16 +125,9 @@ class Marked:
 
 def said(finding: Finding) -> str:
     """The sentence about a finding."""
-    value = ""
-    if finding.kind == "overflow" and finding.value is not None:
-        value = f": a number as large as {finding.value:.4g} goes into it"
+    size = "" if finding.exponent is None else f": a number as large as {finding.exponent:.4g} goes into it"
     several = "s" if len(finding.spans) > 1 else ""
-    says = (WATCHES | IDLE | REPAIRS)[finding.kind].replace("{value}", value).replace("{s}", several)
-    if not finding.of_two or finding.value is not None:
-        return says
-    return "Two things are wrong. First: " + says.replace(": every case is right without it", "").replace(
-        "Without the marked line every case is right", "The marked line does harm"
-    )
+    return (WATCHES | IDLE | REPAIRS)[finding.kind].replace("{exponent}", size).replace("{s}", several)
 
 
 def marked(findings: Sequence[Finding], pieces: Sequence[tuple[str, str]]) -> tuple[Marked, ...]:

@@ -1,12 +1,11 @@
-"""Repair: the place of a student's own program that, written otherwise, makes every case right; or two such places.
+"""Repair: the place of a student's own program that, written otherwise, makes every case right.
 
     repairs(pieces, "iou", cases, fresh, right)      what was found, the best first
 
 Every mutation of the program (`mutation`) runs on the cases until one is wrong. What survives is right on every public
-case and on fresh ones, drawn wider, so that what is said about its place is true. Where none survives, a mutation is
-told with which the program gives what a listed mistake gives, since then both are known; or else mutations that make
-some numbers right and none wrong are each tried together with a second one (`two_repairs`). The mutated text is never
-shown: a student reads where to look, and is asked what belongs there.
+case and on fresh ones, so that what is said about its place is true. Where none survives, a mutation is told with which
+the program gives what a listed mistake gives, since then both are known. The mutated text is never shown: a student
+reads where to look, and is asked what belongs there.
 
 Of several repairs the nearest to what the student wrote is told: the one that changes the fewest nodes, of these the
 kind that stands first in `finding.REPAIRS`, of these the one that marks least.
@@ -31,10 +30,7 @@ from labgrader.reply.mutation import Mutation, mutations
 
 RANK = {kind: number for number, kind in enumerate(REPAIRS)}
 MOST_MUTATIONS = 6000  # of one program
-MOST_FIRSTS = 4  # mutations with which others are tried together
-MOST_SECONDS = 1000  # others that are tried together with the best first one; half as many with the next one ...
-MOST_GAINERS = 60  # second ones that are tried because they make something right themselves
-DEAREST_OF_TWO = 2.0  # nodes that each of two changes at most
+DEAREST_BESIDE = 2.0  # nodes that a mutation beside a listed mistake changes at most
 MOST_S = 4.0  # CPU seconds of the whole search: then what has been found is told, if there is something
 MOST_S_OF_ALL = 2.0  # for all cases once: of a program that takes longer, too few mutations could be tried
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
@@ -45,7 +41,6 @@ LEFT_OUT = (
     "call too many",
     "moved",
 )  # what a mistake beside which is no mistake of its own
-PROBES = 4  # wrong cases on which it is seen what a mutation makes right
 
 Cases = Sequence[tuple[tuple, object]]  # (arguments, expected) each
 Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
@@ -123,10 +118,8 @@ def repairs(
                 return []
             trials = [Trial(k, statement, m) for k, statement in program.functions() for m in mutations(statement)]
             trials.sort(key=lambda trial: trial.rank[:2])
-            firsts = Firsts(search, by_use)
-            more = Asked(fresh)
-            found, beside = one_repair(search, trials[:MOST_MUTATIONS], by_use, more, firsts)
-            return found or beside or two_repairs(search, trials, by_use, more, firsts)
+            found, with_listed = one_repair(search, trials[:MOST_MUTATIONS], by_use, LazyCases(fresh))
+            return found or with_listed
         except ENDS:  # nothing can be said about such a program
             return []
 
@@ -142,7 +135,7 @@ def sorted_by_use(search: Search, cases: Cases) -> list[tuple[tuple, object]]:
     return [case for *_, case in sorted(kept, key=lambda entry: entry[:2])]
 
 
-class Asked:
+class LazyCases:
     """More cases, asked for once, when they are needed."""
 
     def __init__(self, ask: Callable[[], Cases]):
@@ -155,16 +148,16 @@ class Asked:
 
 
 def one_repair(
-    search: Search, trials: Sequence[Trial], cases: Cases, more: Asked, firsts: "Firsts"
+    search: Search, trials: Sequence[Trial], cases: Cases, more: LazyCases
 ) -> tuple[list[Finding], list[Finding]]:
     """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs.
 
     Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does.
     """
     found: dict[Finding, tuple] = {}  # with what decides which one is told first
-    beside: dict[Finding, tuple] = {}
+    with_listed: dict[Finding, tuple] = {}
     before = rightness(search, cases)
-    with over_if(found, beside):
+    with over_if(found, with_listed):
         for trial in trials:
             if found and trial.mutation.cost > min(found.values())[0] + MORE_COST:
                 break
@@ -173,12 +166,11 @@ def one_repair(
             with tried(search, trial) as runs:
                 if runs and repaired(search, cases, more):
                     found[trial.finding] = trial.rank
-                elif runs and not found and trial.mutation.cost <= DEAREST_OF_TWO:
-                    firsts.look(trial)
-                    number = listed_mistake(search, cases) if not leaves_out(trial.mutation) else None
+                elif runs and not found and trial.mutation.cost <= DEAREST_BESIDE and not leaves_out(trial.mutation):
+                    number = listed_mistake(search, cases)
                     if number is not None and rightness(search, cases) > before:  # one mistake is less than two
-                        beside[replace(trial.finding, value=float(number), of_two=True)] = trial.rank
-    return sorted(found, key=found.get), sorted(beside, key=beside.get)[:1]
+                        with_listed[replace(trial.finding, listed=number)] = trial.rank
+    return sorted(found, key=found.get), sorted(with_listed, key=with_listed.get)[:1]
 
 
 def leaves_out(mutation: Mutation) -> bool:
@@ -247,7 +239,7 @@ def compiled(search: Search, statement: ast.stmt) -> bool:
         return False
 
 
-def repaired(search: Search, cases: Cases, more: Asked) -> bool:
+def repaired(search: Search, cases: Cases, more: LazyCases) -> bool:
     """Whether the program is right in all cases, and then in more."""
     return all(passes(search, case) for case in cases) and all(passes(search, case) for case in more())
 
@@ -272,79 +264,3 @@ def outcome(search: Search, args: tuple) -> tuple[object, bool | None]:
         return None, None
     except (Exception, SystemExit):
         return None, False
-
-
-# ------------------------------------------------------------------------------------------------- two mistakes
-
-
-class Firsts:
-    """Mutations that make some numbers of wrong cases right and none of them wrong: perhaps one of two repairs."""
-
-    def __init__(self, search: Search, cases: Cases):
-        self.search = search
-        self.probes: list[tuple[tuple, object, bytes, np.ndarray]] = []  # a case, its output, which numbers are right
-        for args, expected in cases[:PROBES]:
-            output, _ = outcome(search, args)
-            entries = search.entries(expected, output)
-            if entries is None or not entries.all():
-                none = np.zeros(1, bool)
-                self.probes.append((args, expected, bits(output), none if entries is None else entries))
-        self.found: dict[bytes, tuple[int, Trial]] = {}  # by what they give: the best one, and how much it makes right
-
-    def look(self, trial: Trial) -> None:
-        """Keep a mutation, which is applied now, if it makes something right."""
-        gained, given = 0, []
-        for args, expected, before, right_before in self.probes:
-            output, unaltered = outcome(self.search, args)
-            given.append(bits(output))
-            if given[-1] == before:
-                continue
-            now = self.search.entries(expected, output) if unaltered else None
-            if now is None:
-                return
-            lost = right_before & ~now if right_before.shape == now.shape else right_before
-            if lost.any():
-                return
-            gained += int(now.sum()) - int(right_before.sum())
-        if gained > 0:
-            key = b"|".join(given)
-            if key not in self.found or trial.rank < self.found[key][1].rank:
-                self.found[key] = gained, trial
-
-    def best(self) -> list[Trial]:
-        """Those that make the most right, of these the nearest; one of those that give the same."""
-        ordered = sorted(self.found.values(), key=lambda entry: (-entry[0], entry[1].rank))
-        return [trial for _, trial in ordered[:MOST_GAINERS]]
-
-
-def bits(output: object) -> bytes:
-    """An output as bytes."""
-    parts = output if isinstance(output, tuple | list) else (output,)
-    return b",".join(np.asarray(part).tobytes() for part in parts)
-
-
-def two_repairs(search: Search, trials: Sequence[Trial], cases: Cases, more: Asked, firsts: Firsts) -> list[Finding]:
-    """Try second mutations beside each of the best first ones: the first of the nearest pair, as one of two.
-
-    Second ones are those that make something right themselves, then the smallest ones.
-    """
-    best = firsts.best()
-    seconds = [*best, *(trial for trial in trials if trial.mutation.cost <= DEAREST_OF_TWO)]
-    found: dict[Finding, tuple] = {}
-    for number, first in enumerate(best[:MOST_FIRSTS]):
-        with over_if(found), tried(search, first):
-            for second in seconds[: MOST_SECONDS >> number]:
-                if overlap(first, second):
-                    continue
-                with tried(search, second) as runs:
-                    if runs and repaired(search, cases, more):
-                        pair = first.mutation.cost + second.mutation.cost, first.rank, second.rank
-                        found[replace(first.finding, of_two=True)] = pair
-                        break
-    return sorted(found, key=found.get)[:1]
-
-
-def overlap(first: Trial, second: Trial) -> bool:
-    """Whether two mutations change the same place."""
-    places = {(id(place.parent), place.field, place.index) for place in first.mutation.places}
-    return any((id(place.parent), place.field, place.index) in places for place in second.mutation.places)

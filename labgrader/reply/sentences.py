@@ -171,8 +171,8 @@ def found_in_the_program(
         says = said(replace(finding, kind="type") if changes_values else finding)
         if finding in repairs and equal:
             says = f"Change one of the two marked places, not both. {says}"
-        if finding.of_two and finding.value is not None and 0 <= finding.value < len(question.misconceptions):
-            one = question.misconceptions[int(finding.value)].hint
+        if finding.listed is not None and finding.listed < len(question.misconceptions):
+            one = question.misconceptions[finding.listed].hint
             says = f"Perhaps two things are wrong. One is this: {one} And is the marked part as it should be?"
         yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
 

@@ -7,14 +7,20 @@ import pytest
 from labgrader.reply.finding import MOST_FINDINGS, Finding, Span, read, write
 
 PIECES = (("quiet", "import numpy as np"), ("f", "def f(größe):\n    return größe"))
-GOOD = {"kind": "axis", "piece": 1, "spans": [{"line": 2, "column": 11, "last_line": 2, "end": 18}], "value": 0.0}
+GOOD = {
+    "kind": "axis",
+    "piece": 1,
+    "spans": [{"line": 2, "column": 11, "last_line": 2, "end": 18}],
+    "exponent": 0.0,
+    "listed": None,
+}
 SPAN = GOOD["spans"][0]
 
 
 def test_findings_come_back_as_they_were_written():
     findings = [
         Finding("overflow", 1, (Span(1, 0, 2, 18), Span(2, 4, 2, 10)), 1000.0),
-        Finding("axis", 0, (Span(1, 0, 1, 0),), of_two=True),
+        Finding("axis", 0, (Span(1, 0, 1, 0),), listed=2),
     ]
     assert read(write(findings), PIECES) == findings
     assert len(read(write(findings * 9), PIECES)) == MOST_FINDINGS
@@ -27,7 +33,8 @@ def test_findings_come_back_as_they_were_written():
         *(json.dumps([GOOD | change]) for change in (
             {"kind": "riddle"}, {"kind": ["axis"]}, {"kind": None},
             {"piece": 2}, {"piece": -1}, {"piece": 1.0}, {"piece": True}, {"piece": "1"},
-            {"value": "<b>"}, {"value": [1]}, {"value": float("nan")}, {"value": 10**400},
+            {"exponent": "<b>"}, {"exponent": [1]}, {"exponent": float("nan")}, {"exponent": 10**400},
+            {"listed": -1}, {"listed": 1.0}, {"listed": True}, {"listed": "1"},
             {"spans": []}, {"spans": None}, {"spans": {}}, {"spans": "2"}, {"spans": [[2, 0, 2, 1]]}, {"spans": [{}]},
             *({"spans": [SPAN | wrong]} for wrong in (
                 {"line": 0}, {"line": 3}, {"last_line": 3}, {"line": 2, "last_line": 1}, {"line": 2.0}, {"line": True},

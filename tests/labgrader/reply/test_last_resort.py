@@ -1,11 +1,11 @@
-"""Where no single change mends an answer: two, what stands idle in it, and what its wrong cases have in common."""
+"""What a single change mends, and where none does: what stands idle in an answer."""
 
 import numpy as np
 import pytest
 
 from labgrader.question import Question
 from labgrader.reply import repair
-from labgrader.reply.finding import REPAIRS, Finding, Span
+from labgrader.reply.finding import Finding, Span
 from labgrader.reply.idle import idle
 from labgrader.reply.repair import repairs
 from labgrader.reply.sentences import found_in_the_program
@@ -29,12 +29,12 @@ def found(reference, source, shown=CASES, fresh=FRESH):
     pieces = ("quiet", "import numpy as np"), ("f", source)
     lines = source.split("\n")
     return [
-        (f.kind, f.of_two, [lines[s.line - 1][s.column : s.end].strip() for s in f.spans])
+        (f.kind, [lines[s.line - 1][s.column : s.end].strip() for s in f.spans])
         for f in repairs(pieces, "f", cases, lambda: more, right, entries)
     ]
 
 
-# --------------------------------------------------------------------------------------------- one repair, or two
+# --------------------------------------------------------------------------------------------- one repair
 
 
 def test_a_repair_counts_if_it_mends_cases_that_are_not_shown():
@@ -42,13 +42,8 @@ def test_a_repair_counts_if_it_mends_cases_that_are_not_shown():
     source, shown = "def f(a, b):\n    return a + b", [(np.array([2.0]), np.array([1.0]))]
     by_shown = found(np.multiply, source, shown, fresh=[])
     by_more = found(np.multiply, source, shown, fresh=[(np.array([3.0]), np.array([5.0]))])
-    assert ("operator", False, ["+"]) in by_shown and ("too much", False, ["b"]) in by_shown
-    assert ("operator", False, ["+"]) in by_more and ("too much", False, ["b"]) not in by_more
-
-
-def test_of_two_mistakes_the_one_that_makes_more_right_is_told():
-    source = "def f(a, b):\n    low = np.maximum(a, b)\n    return np.append(low - a, -b.sum())"
-    assert found(lambda a, b: np.append(np.minimum(a, b) - a, b.sum()), source) == [("function", True, ["np.maximum"])]
+    assert ("operator", ["+"]) in by_shown and ("too much", ["b"]) in by_shown
+    assert ("operator", ["+"]) in by_more and ("too much", ["b"]) not in by_more
 
 
 def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
@@ -58,7 +53,7 @@ def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
     assert found(np.multiply, source) == []
 
 
-def test_three_mistakes_are_not_found():
+def test_what_no_single_change_mends_is_not_found():
     source = "def f(a, b):\n    return np.stack([a + 1.3, b * 1.7, a * b - 0.9 * a])[:, :2].sum(axis=0) ** 3"
     assert found(lambda a, b: np.stack([a, b, a - b])[:, :2].prod(axis=0), source) == []
 
@@ -80,12 +75,6 @@ def test_at_most_two_places_are_offered_to_choose_from():
     )
     assert said(one, other)[0].startswith("Change one of the two") and said(one, other)[1] == 2
     assert "one of the two" not in said(both, others)[0]
-
-
-def test_what_is_said_of_two_mistakes_promises_nothing_of_one():
-    for kind in REPAIRS:
-        says, _ = said(Finding(kind, 0, (Span(2, 11, 2, 12),), of_two=True))
-        assert says.startswith("Two things are wrong. First: ") and "every case is right" not in says
 
 
 # --------------------------------------------------------------------------------------------- what stands idle

@@ -21,8 +21,8 @@ import numpy as np
 def iou(n):
     module = sys.modules["labgrader.reply.repair_job"]
     span = {"line": 1, "column": 0, "last_line": 1, "end": 9999}
-    entry = {"kind": "axis", "piece": 0, "spans": [span], "value": 0}
-    module.write = lambda found: json.dumps([entry, {"kind": "<b>", "piece": 0, "spans": [], "value": 0}])
+    entry = {"kind": "axis", "piece": 0, "spans": [span], "exponent": None, "listed": None}
+    module.write = lambda found: json.dumps([entry, entry | {"kind": "<b>"}])
     return n.sum(axis=0)
 """
 LEAVES = "import os\n\ndef iou(n):\n    os._exit(0)\n"
