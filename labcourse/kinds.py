@@ -24,12 +24,13 @@ class Kind:
     """What a statement allows for one argument.
 
     shape: the names of its axes, "H W 3"; "..." are none to three; "" is a number. dtype: NumPy's name, or names;
-    "int", "float" and "bool" are Python's own where it is a number. least, most: the ends of its numbers, both allowed.
-    also: what it may hold beside these, 255 or NaN. lengths: (shortest, longest) of axes by name; (1, None) if it is
-    not said, None where there is no end, and of C (1, 255). form: function (rng, array) that makes a value of the kind
-    from any numbers in its range. choices: all its values, where it has few. says: phrases of the statement that say
-    this, beside the shape, which it says anyhow. free: simplifications that the answer does not depend on, as patterns
-    of `fnmatch`. digits: how many of its numbers count; with more than 7 float32 is too short.
+    "int", "float" and "bool" are Python's own where it is a number; of "int" with axes it is a tuple. least, most: the
+    ends of its numbers, both allowed. also: what it may hold beside these, 255 or NaN. lengths: (shortest, longest) of
+    axes by name; (1, None) if it is not said, None where there is no end, and of C (1, 255). form: function (rng,
+    array) that makes a value of the kind from any numbers in its range. choices: all its values, where it has few.
+    says: phrases of the statement that say this, beside the shape, which it says anyhow. free: simplifications that
+    the answer does not depend on, as patterns of `fnmatch`. digits: how many of its numbers count; with more than 7
+    float32 is too short.
     """
 
     shape: str = ""
@@ -53,6 +54,11 @@ class Kind:
     def dtypes(self) -> tuple[str, ...]:
         """The types that it may have."""
         return tuple(self.dtype.split())
+
+    @property
+    def is_tuple(self) -> bool:
+        """Whether it is a tuple of Python's whole numbers, like a size."""
+        return self.dtype == "int" and bool(self.axes)
 
     @property
     def whole(self) -> bool:
@@ -84,6 +90,8 @@ class Kind:
                 shape.append(sides.get(axis, rng.integers(first, min(first + 5, last or np.inf) + 1)))
         values = self._numbers(rng, tuple(map(int, shape)), self.most if most is None else most)
         values = self.form(rng, values) if self.form else values
+        if self.is_tuple:
+            return tuple(map(int, values))
         if self.axes:
             return np.ascontiguousarray(values, np.dtype(rng.choice(self.dtypes)))
         return {"int": int, "bool": bool}.get(self.dtype, float)(values)
@@ -110,8 +118,8 @@ class Kind:
         """
         if self.choices:
             return "" if value in self.choices else f"{value}, none of {self.choices}"
-        if not self.axes:
-            python = {"int": int, "bool": bool}.get(self.dtype, float)
+        if not self.axes or self.is_tuple:
+            python = tuple if self.is_tuple else {"int": int, "bool": bool}.get(self.dtype, float)
             if type(value) is not python:
                 return f"{type(value).__name__}, not {python.__name__}"
         elif not isinstance(value, np.ndarray) or value.dtype not in [np.dtype(name) for name in self.dtypes]:

@@ -252,7 +252,8 @@ def edges(kind: Kind) -> dict[str, Callable[[object], bool]]:
     """The ends of what a kind allows, each with the question whether a value has it."""
     if kind.choices:
         return {repr(choice): (lambda v, c=choice: v == c) for choice in kind.choices}
-    found: dict[str, Callable] = {f"of {d}": (lambda v, d=d: v.dtype == d) for d in kind.dtypes if kind.axes}
+    types = kind.dtypes if kind.axes and not kind.is_tuple else ()
+    found: dict[str, Callable] = {f"of {d}": (lambda v, d=d: v.dtype == d) for d in types}
     if kind.axes[:1] == ("...",):
         extra = len(kind.axes) - 1
         found |= {f"{n} axes in the place of ...": (lambda v, n=n: np.ndim(v) == n + extra) for n in range(4)}
@@ -282,7 +283,7 @@ def unsaid(question: Question, statement: str) -> Iterator[str]:
     text = " ".join(statement.split())
     for name, kind in question.kinds.items():
         words = [*kind.says]
-        if kind.axes:
+        if kind.axes and not kind.is_tuple:
             shape = ", ".join(kind.axes).replace("-1", " - 1")
             words.append(f"({shape},)" if len(kind.axes) == 1 and shape != "..." else f"({shape})")
         yield from (f"{name}: {word!r}" for word in words if word not in text)

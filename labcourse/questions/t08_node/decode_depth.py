@@ -38,9 +38,9 @@ QUESTION = Question(
     reference=decode_depth,
     kinds={
         "data": array("n", 0, 255, dtype="uint8", lengths={"n": (2, None)}),
-        "height": count(1, 4000, says="1 to 4000", free=("-|x|",)),  # how many rows are left, `data` says
+        "height": count(1, 4000, says="1 to 4000"),
         "width": count(1, 4000, says="1 to 4000"),
-        "step": count(2, 10_000, says=("at least 2 * width", "at most 10000"), free=("-|x|",)),
+        "step": count(2, 10_000, says=("at least 2 * width", "at most 10000")),
         "is_bigendian": Kind(dtype="int", choices=(0, 1)),
     },
     inputs=_depth_message,

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import LONG, array, truth
 from labgrader.question import Question, wrong
 
 
@@ -13,20 +14,24 @@ def choose_region(features, mean, covariance, allowed):
     return squared.argmin() + 1 if allowed.any() else 0
 
 
+def _covariance(rng):
+    A = rng.normal(size=(3, 3)) * (3.0, 0.4, 1.0)
+    return A.T @ A + np.diag((0.3, 0.02, 0.1))
+
+
 def _features(rng):
     """Draw pieces that are nearly equally far from the mean, so that any other distance chooses another one.
 
-    In some draws all features are small, in some all pieces are far away, and in some no piece is allowed.
+    In some draws all features are small or large, in some all pieces are far away, and in some no piece is allowed.
     """
-    n, unit = int(rng.integers(5, 9)), rng.choice([1.0, 1e-4])
-    A = rng.normal(size=(3, 3)) * (3.0, 0.4, 1.0)
-    covariance = (A.T @ A + np.diag((0.3, 0.02, 0.1))) * unit**2
+    n, unit = int(rng.integers(5, 9)), rng.choice([1.0, 1e-4, 1e6])
+    covariance = _covariance(rng) * unit**2
     mean = rng.normal(size=3) * (4.0, 1.0, 2.0) * unit
     off = rng.normal(size=(n, 3))
     off *= rng.uniform(1.0, 1.2, (n, 1)) / np.linalg.norm(off, axis=1, keepdims=True) * rng.choice([1.0, 50.0])
     allowed = rng.random(n) < 0.5
     allowed[rng.integers(n)] = True
-    allowed &= rng.random() < 0.65
+    allowed &= rng.random() < 0.8
     return mean + off @ np.linalg.cholesky(covariance).T, mean, covariance, allowed
 
 
@@ -36,11 +41,40 @@ _LINE = np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.9, 1.9, 0.0]])
 _TILTED = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
+def _star(mean, scale, first):
+    """A piece near the mean, first or last, and others round it on six sides: with any other mean another one is it."""
+    off = np.vstack([[[0.1, -0.1, 0.05]], np.eye(3), -np.eye(3)])
+    return mean + scale * off[:: 1 if first else -1], mean, _OBLIQUE * scale**2, np.ones(7, bool)
+
+
+_OBLIQUE = np.array([[1.0, 0.2, -0.3], [0.2, 1.0, -0.4], [-0.3, -0.4, 1.0]])
+# Millimetres, say: of these two covariances and five pieces each entry counts, and so does its sign.
+_SPREADS = (
+    1e6 * np.array([[9.0, 0.9, -3.0], [0.9, 1.0, -0.8], [-3.0, -0.8, 4.0]]),
+    1e6 * np.array([[9.0, -1.2, 3.0], [-1.2, 1.0, 0.6], [3.0, 0.6, 4.0]]),
+)
+_FIVE = 1e3 * np.array([[4.0, 3.0, -2.0], [3.0, 4.0, -2.0], [-2.0, 0.0, -4.0], [0.0, -2.0, 4.0], [4.0, -2.0, 0.0]])
+_AWAY = np.array([8e5, -7e5, 9e5])
+
+
+# The nearest allowed is number 288, which no byte holds; the nearest, 289, is not allowed.
+_MANY = (np.abs(np.arange(LONG) - 288.0)[:, None] * (1.0, -0.5, 2.0), np.zeros(3), np.eye(3), np.arange(LONG) < 288)
+
+
 QUESTION = Question(
     reference=choose_region,
+    kinds={
+        "features": array("n 3"),
+        "mean": array("3"),
+        "covariance": array(
+            "3 3", form=lambda rng, _: _covariance(rng) * rng.choice([1e-8, 1.0, 1e12]), says="symmetric and invertible"
+        ),
+        "allowed": truth("n"),
+    },
     inputs=_features,
     by_hand=(
         (_LINE, np.zeros(3), np.eye(3), np.array([True, True, True])),
+        (_LINE[:2], np.zeros(3), np.eye(3), np.array([True, True])),
         (1e10 * _LINE[::-1], np.zeros(3), np.eye(3), np.array([True, False, True])),  # all very far away
         (_LINE, np.zeros(3), np.diag([9.0, 0.1, 1.0]), np.array([True, True, True])),
         (_LINE, np.zeros(3), _TILTED, np.array([True, True, True])),
@@ -48,6 +82,11 @@ QUESTION = Question(
         (0.01 * _LINE, np.zeros(3), np.diag([1e-4, 2e-5, 1e-4]), np.ones(3, bool)),  # 1, small as all variances are
         (_LINE, np.zeros(3), np.eye(3), np.array([True, False, True])),
         (_LINE, np.zeros(3), np.eye(3), np.array([False, False, False])),
+        (_LINE[:1], np.zeros(3), np.eye(3), np.array([True])),
+        _MANY,
+        *(_star(mean, 1.0, first) for mean in (_AWAY, -_AWAY) for first in (True, False)),
+        *((_FIVE, np.zeros(3), spread, np.ones(5, bool)) for spread in _SPREADS),
+        _star(np.array([0.0, 1.23e-4, -2.34e-4]), 1e-4, True),
         (_LINE + 1.0, np.ones(3), np.eye(3), np.array([False, False, True])),
         (
             _LINE - _LINE[0],

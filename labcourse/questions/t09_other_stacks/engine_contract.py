@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import LONG, array, number
 from labgrader.question import Question, wrong
 
 
@@ -19,7 +20,7 @@ def _two_engines(rng):
     The worst logit of all is too high or too low by the tolerance or more; or the logits are large and it is off by a
     little more than the tolerance; or three are NaN.
     """
-    C, H, W = (int(rng.integers(low, low + 3)) for low in (3, 6, 9))
+    C, H, W = (int(rng.integers(low, low + 4)) for low in (2, 6, 9))
     tolerance, kind = float(rng.choice([0.25, 0.5])), rng.random()
     reference = rng.integers(-24, 24, (C, H, W)) * (128.0 if kind < 0.3 else 0.125)
     other = reference + rng.uniform(-0.9, 0.9, (C, H, W)) * tolerance
@@ -39,8 +40,27 @@ def _logits(*classes):
 
 _BEST_AND_SECOND = _logits((4, 1, 2, -3), (1, 3, 2.5, -1), (0, 2, -9, -2))
 
+_DIGITS = _logits((0.12345678, -3.1415927, 1e6 + 0.0625), (0.7654321, 2.7182817, 3e5 + 0.03125))
+
+
+def _engines_of(C, H, W):
+    """Two engines' logits of some shape, which differ by at most 0.25."""
+    rng = np.random.default_rng(1)
+    reference = rng.integers(-24, 24, (C, H, W)) / 8.0
+    other = reference + rng.integers(-2, 3, (C, H, W)) / 8.0
+    return reference.astype(np.float32), other.astype(np.float32), 0.25
+
+
+AT_LEAST_2 = {"C": (2, 255)}
+
+
 QUESTION = Question(
     reference=engine_contract,
+    kinds={
+        "reference": array("C H W", dtype="float32", lengths=AT_LEAST_2, says=("float32", "C at least 2")),
+        "other": array("C H W", dtype="float32", lengths=AT_LEAST_2, also=(np.nan,), says=("float32", "NaN")),
+        "tolerance": number(1e-6, 1e6, says="1e-6 to 1e6"),
+    },
     inputs=_two_engines,
     by_hand=(
         (_BEST_AND_SECOND, _BEST_AND_SECOND, 0.25),  # equal; one margin is 2 * 0.25
@@ -56,6 +76,12 @@ QUESTION = Question(
             1024 * _BEST_AND_SECOND + _logits((1 / 64, 0, 0, 0), (0, 0, 0, 0), (0, 0, 0, 0)),
             1 / 128,
         ),
+        (_logits((4, 1), (1, 1.5)), _logits((3.5, 1.5), (1, 1.25)), 0.5),
+        (_logits((1e6, -7e5), (3e5, 1e6)), _logits((3e5, -1e5), (1e6, 1e6)), 1e6),  # the largest numbers
+        (2**18 * _BEST_AND_SECOND, 2**18 * _BEST_AND_SECOND - np.float32(0.25), 0.25),
+        (_logits((0, 1.5e-6, 5), (1, 0, -5)), _logits((1.005e-6, 1.5e-6, 5), (1, 0, -5)), 1e-6),  # and the smallest
+        (_DIGITS, _DIGITS.copy(), 1e-6),
+        *(_engines_of(*shape) for shape in ((255, 1, 1), (2, LONG, 1), (2, 1, LONG), (3, 3, 2))),
     ),
     random_cases=24,
     points=3,

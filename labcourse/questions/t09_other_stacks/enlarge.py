@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import LONG, array
 from labcourse.questions.t01_labels.resize_labels import copied, labels_and_sizes
 from labgrader.question import Question, holds, wrong
 
@@ -15,15 +16,21 @@ def enlarge(labels, size):
 
 
 def _labels_and_size(rng):
+    """Draw labels, of either sign in half of the draws, and a size at which rounding tells."""
     labels, H, W = labels_and_sizes(rng, 400)
-    return labels, (W, H)
+    return labels * rng.choice([-1, 1]), (W, H)
 
 
 QUESTION = Question(
     reference=enlarge,
+    kinds={
+        "labels": array("h w", -(2**31), 2**31 - 1, dtype="int64 uint8", says=("any values of 32 bits", "any size")),
+        "size": array("2", 1, 10_000, dtype="int", says=("a tuple (W, H)", "1 to 10000")),
+    },
     inputs=_labels_and_size,
     by_hand=(
         (np.array([[0, 2], [1, 3]], np.uint8), (6, 4)),
+        (np.array([[0, 1, 2, 3]]), (2, 1)),
         (np.array([[0, 3, 0], [2, 0, 1]], np.uint8), (4, 5)),
         (np.array([[1, 2, 3, 0]], np.uint8), (2, 3)),
         (np.array([[0], [3]], np.uint8), (1, 49)),  # 24.5 * (2 / 49) is less than 1 in floating point
@@ -33,6 +40,10 @@ QUESTION = Question(
         (np.arange(14)[:, None], (1, 9)),  # in floats 4.5 / (9 / 14) is not 7
         (np.arange(6000)[:, None], (1, 4129)),  # in float32 3419.5 * 6000 / 4129 is off
         (np.array([[300, 2]]), (4, 1)),  # labels need not be bytes
+        (np.array([[-(2**31), 2**31 - 1], [-1, 255], [0, 70_000]]), (3, 4)),
+        (np.arange(5) + np.arange(LONG)[:, None] % 7, (1, 1)),
+        ((np.arange(LONG) % 11)[None], (10_000, 1)),
+        (np.array([[0, 1, 2], [1, 2, 0]], np.uint8), (1, 9000)),
         (np.arange(100, dtype=np.uint8).reshape(10, 10), (20, 20)),  # and 19.5 * 10 * 2 is no byte
     ),
     random_cases=8,

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import LONG, array, image
 from labgrader.question import Question, wrong
 
 
@@ -13,7 +14,13 @@ def hsv_mask(hsv, lower, upper):
     return hue & rest.all(axis=-1)
 
 
+def hue_up_to_179(rng, hsv):
+    """Bytes (..., 3) whose first is one of 180 hues."""
+    return np.concatenate([hsv[..., :1] % 180, hsv[..., 1:]], axis=-1)
+
+
 def _colours_and_bounds(rng):
+    """Draw colours, and bounds that some of them equal; the hue goes round in half of the draws."""
     hsv = np.stack([rng.integers(0, n, (7, 12)) for n in (180, 256, 256)], axis=-1).astype(np.uint8)
     ends = np.sort(rng.integers((0, 10, 10), (180, 246, 246), (2, 3)), axis=0)
     ends[1, 1:] = np.maximum(ends[1, 1:], ends[0, 1:] + 60).clip(max=255)
@@ -33,8 +40,22 @@ def _pixels(*pixels):
     return np.array([pixels], np.uint8)
 
 
+def _all_hues(shape):
+    """A picture of one row or column: 180 hues, and any saturation and value."""
+    k = np.arange(LONG)
+    return np.stack([k % 180, (77 * k) % 256, k % 101], axis=1).astype(np.uint8).reshape(*shape, 3)
+
+
+_LONG = ((1, LONG), (LONG, 1))
+
+
 QUESTION = Question(
     reference=hsv_mask,
+    kinds={
+        "hsv": image(form=hue_up_to_179, says="hue 0..179, saturation and value 0..255"),
+        "lower": array("3", 0, 255, dtype="uint8", form=hue_up_to_179, says="uint8"),
+        "upper": array("3", 0, 255, dtype="uint8", form=hue_up_to_179, says="uint8"),
+    },
     inputs=_colours_and_bounds,
     by_hand=(
         (
@@ -60,6 +81,22 @@ QUESTION = Question(
             np.array([5, 200, 50], np.uint8),
             np.array([20, 100, 255], np.uint8),
         ),
+        (
+            _pixels((175, 90, 90), (3, 90, 90), (90, 90, 90)),
+            np.array([170, 50, 50], np.uint8),
+            np.array([10, 255, 255], np.uint8),
+        ),
+        (
+            _pixels((10, 255, 255), (10, 100, 255), (10, 255, 100), (0, 255, 255)).reshape(2, 2, 3),
+            np.array([5, 255, 0], np.uint8),
+            np.array([20, 255, 255], np.uint8),
+        ),
+        (
+            _pixels((0, 90, 0), (0, 90, 9), (90, 90, 0), (0, 255, 0)).reshape(2, 2, 3),
+            np.array([0, 50, 0], np.uint8),
+            np.array([0, 255, 0], np.uint8),
+        ),
+        *((_all_hues(shape), np.array([160, 0, 9], np.uint8), np.array([20, 255, 99], np.uint8)) for shape in _LONG),
     ),
     random_cases=24,
     forbidden=("cv2",),

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import array, count
 from labgrader.question import Question, holds, wrong
 
 
@@ -33,21 +34,51 @@ def _buffer(rng):
     return written(scores, block, step, rng), C, H, W, block, step
 
 
+def _any_floats(rng, C=None, H=None, W=None, block=None, step=None):
+    """Draw an engine's buffer of any finite scores, up to 65504 and down to -65504, and of any layout."""
+    C, H, W = C or int(rng.integers(1, 8)), H or int(rng.integers(1, 5)), W or int(rng.integers(1, 6))
+    block = block or int(rng.integers(1, 9))
+    step = step or 2 * (block * W + int(rng.integers(0, 5)))
+    finite = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    finite = finite[np.isfinite(finite) & (finite != 0.0)]
+    scores = np.stack([rng.choice(finite, C, replace=False) for _ in range(H * W)], axis=1).reshape(C, H, W)
+    return written(scores, block, step, rng), C, H, W, block, step
+
+
 def _by_hand(rows, C, W, block):
     """The arguments of a case whose rows of numbers, all that lies between two steps, are given."""
     rows = np.array(rows, "<f2")
     return rows.view(np.uint8).ravel(), C, len(rows) // -(-C // block), W, block, 2 * rows.shape[1]
 
 
+_EDGES = (
+    {"C": 255, "H": 1, "W": 2, "block": 64},
+    {"C": 2, "H": 1000, "W": 1, "block": 1, "step": 4},
+    {"C": 2, "H": 1, "W": 1000, "block": 2},
+    {"C": 5, "H": 2, "W": 3, "block": 4, "step": 10_000},
+)
+
 QUESTION = Question(
     reference=labels_of_buffer,
-    inputs=_buffer,
+    kinds={
+        "buffer": array("n", 0, 255, dtype="uint8", lengths={"n": (2, None)}),
+        "C": count(1, 255, says="1 to 255"),
+        "H": count(1, 1000, says="1 to 1000"),
+        "W": count(1, 1000, says="1 to 1000"),
+        "block": count(1, 64, says="1 to 64"),
+        "step": count(2, 10_000, says=("an even number", "at most 10000")),
+    },
+    inputs=(_buffer, _any_floats),
     by_hand=(
         _by_hand([[3, 1, 2, 5]], C=2, W=2, block=2),  # pixel after pixel
         _by_hand([[3, 2], [1, 5]], C=2, W=2, block=1),  # plane after plane
         _by_hand([[3, 1, 2, 5, 9, 9], [1, 7, 6, 4, 9, 9]], C=2, W=2, block=2),  # rows are filled up
         _by_hand([[3, 1, 2, 5], [4, 9, 0, 9]], C=3, W=2, block=2),  # the last block is filled up
         _by_hand([[-3, -1, -2, -0.5, 2047, 2048, 0, 0]], C=2, W=3, block=2),  # 2047 and 2048 are neighbours in 16 bits
+        _by_hand([[3, 1, 2, 5, 9, 9]], C=2, W=2, block=2),
+        _by_hand([[-65504, -65472, -1, 1, 65504, 65472]], C=2, W=3, block=2),  # as low and as high as 16 bits go
+        _by_hand([[-7]], C=1, W=1, block=1),  # one pixel, and one class
+        *(_any_floats(np.random.default_rng(1), **edge) for edge in _EDGES),
     ),
     random_cases=12,
     points=3,

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import LONG, count, image
 from labgrader.question import Question, wrong
 
 
@@ -16,7 +17,7 @@ def make_blob(bgr, multiple):
 def _image(rng):
     multiple = int(rng.integers(3, 6))
     H, W = int(rng.integers(4, 9)), int(rng.integers(10, 17))
-    return rng.integers(1, 256, (H, W, 3)).astype(np.uint8), multiple
+    return rng.integers(0, 256, (H, W, 3)).astype(np.uint8), multiple
 
 
 _SIX = np.array([[[0, 0, 255], [255, 0, 0]], [[10, 20, 30], [40, 50, 60]], [[1, 2, 3], [4, 5, 6]]], np.uint8)
@@ -24,12 +25,16 @@ _SIX = np.array([[[0, 0, 255], [255, 0, 0]], [[10, 20, 30], [40, 50, 60]], [[1, 
 
 QUESTION = Question(
     reference=make_blob,
+    kinds={"bgr": image(says="uint8"), "multiple": count(1, 64, says="1 to 64")},
     inputs=_image,
     by_hand=(
         (np.array([[[255, 0, 51]]], np.uint8), 1),
         (_SIX, 1),
         (_SIX, 2),
+        (np.array([[[255, 0, 51]]], np.uint8), 2),
+        (_SIX[:2], 3),
         (_SIX // 255, 4),  # bytes of 0 and 1: what the largest is does not count
+        *(((np.arange(3 * LONG) % 256).astype(np.uint8).reshape(*shape, 3), 64) for shape in ((LONG, 1), (1, LONG))),
     ),
     random_cases=10,
     rtol=1e-6,
