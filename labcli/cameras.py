@@ -1,149 +1,151 @@
-"""A camera as its user knows it: a matrix K in a file of any usual kind, a lens to undo, a pose in words (topic 06)."""
+"""The camera of a picture: a matrix in words or in a file of any usual kind, the right one of several, a lens to undo.
 
-import json
+`labcli.camera_formats` has the formats; docs/cameras.md lists them. Topic 06.
+"""
+
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
-import cv2
 import numpy as np
-from jaxtyping import Float
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from jaxtyping import Shaped
 
-from labkit.node.convert import rigid
+from labcli.arrays import read_npy
+from labcli.camera_formats import Intrinsics, camera_of, matrix_of
+from labcli.documents import numbers_of, parsed, text_of
+from labkit.geometry.lens import rectified
 from labkit.support.validation import require
 
-OPENCV = re.compile(r"^%YAML:1\.0|!!opencv-matrix", re.MULTILINE)  # what OpenCV writes and YAML does not know
+FOUND_NONE = (
+    "intrinsics: found no camera matrix in {}; expected fx, fy, cx, cy (or ppx, ppy, fl_x), cam_K, K, "
+    "intrinsic_matrix, camera_matrix, Kalibr's or COLMAP's cameras, or a matrix of 3x3 or 4x4; docs/cameras.md lists "
+    "what is read"
+)
+COLOURS = re.compile("colou?r|rgb", re.IGNORECASE)
+COLMAP_LINE = re.compile(r"^\s*(\d+)\s+([A-Z_]+)\s+(\d+)\s+(\d+)((?:\s+[-+.\deE]+)+)\s*$", re.MULTILINE)
 
 
-def numbers_of(text: str) -> list[float]:
-    """The numbers of a text that holds nothing else; none if it does.
+def read_intrinsics(text: str, picture=None, name: str | None = None) -> Intrinsics:
+    """Read a camera: "fx fy cx cy" itself, or a file of one of the usual kinds (`labcli.camera_formats`).
 
-    >>> numbers_of("[1, 2.5; 3]"), numbers_of("camera.json")
-    ([1.0, 2.5, 3.0], [])
-    """
-    try:
-        return [float(word) for word in re.split(r"[\s,;]+", text.strip(" \t\r\n[]"))]
-    except ValueError:
-        return []
-
-
-def read_pose(text: str) -> Float[np.ndarray, "4 4"]:
-    """Read a camera's pose in the base frame, "x y z qx qy qz qw"; raises ValueError for anything else.
-
-    >>> read_pose("0.5 0 0.8 1 0 0 0")[:3, 3].tolist()
-    [0.5, 0.0, 0.8]
-    """
-    numbers = numbers_of(text)
-    require("camera_pose", len(numbers) == 7, "seven numbers, x y z qx qy qz qw", repr(text))
-    return rigid(numbers[:3], numbers[3:])
-
-
-@dataclass(frozen=True, eq=False)
-class Intrinsics:
-    """A camera's matrix K, (3, 3), and if the file says them its depth unit in metres, size and lens coefficients.
-
-    size: width and height of the pictures that it is the camera of.
-    """
-
-    K: Float[np.ndarray, "3 3"]
-    depth_scale: float | None = None
-    size: tuple[int, int] | None = None
-    distortion: tuple[float, ...] = ()
-
-
-def read_intrinsics(text: str) -> Intrinsics:
-    """Read a camera matrix: "fx fy cx cy" itself, or a file of one of the usual kinds.
-
-    JSON of librealsense (fx, fy, ppx, ppy), of BOP (fx, fy, cx, cy, or cam_K of scene_camera.json, whose first camera
-    counts; depth_scale in millimetres), of Open3D (intrinsic_matrix, column by column); the YAML of ROS or OpenCV
-    (camera_matrix); or a text file of four or nine numbers. Raises ValueError if there is none of these,
-    FileNotFoundError for a missing file. Topic 06.
+    picture: the colour picture's path: where a file has a camera for each frame (BOP), it is the one of its name. name:
+    which of several cameras. Raises ValueError if there is none, or several and no way to choose; FileNotFoundError for
+    a missing file. Topic 06.
 
     >>> read_intrinsics("600 601 320 240").K.tolist()
     [[600.0, 0.0, 320.0], [0.0, 601.0, 240.0], [0.0, 0.0, 1.0]]
     """
-    numbers = numbers_of(text)
-    if len(numbers) in (4, 9):
-        return Intrinsics(_matrix(numbers))
+    if (K := matrix_of(numbers_of(text))) is not None:
+        return Intrinsics(K)
     path = Path(text)
     if not path.is_file():
-        raise FileNotFoundError(f'intrinsics: expected "fx fy cx cy" or a file, got {text!r}')
-    content = path.read_text(encoding="utf-8", errors="replace")
-    if len(numbers := numbers_of(content)) in (4, 9):
-        return Intrinsics(_matrix(numbers))
+        raise FileNotFoundError(f'intrinsics: expected "fx fy cx cy" or a file, got {text[:200]!r}')
+    found = _cameras(path, path.stat().st_mtime_ns)
+    if not found:
+        raise ValueError(FOUND_NONE.format(path))
     try:
-        facts = _parsed(content)
-        camera = _camera(facts)
-    except (YAMLError, AttributeError, KeyError, TypeError, ValueError):
+        return _chosen(found, None if picture is None else Path(picture).stem, name)
+    except ValueError as error:
+        raise ValueError(f"{error}, in {path}") from None
+
+
+@lru_cache(maxsize=4)  # a folder of pictures asks for each
+def _cameras(path: Path, changed: int) -> dict[str, Intrinsics | ValueError]:
+    """All cameras that a file tells of, by name; one that cannot be followed is its ValueError."""
+    if path.suffix == ".npy":
+        K = matrix_of(read_npy("intrinsics", path.read_bytes(), path).ravel()[:16].tolist())
+        return {} if K is None else {"": Intrinsics(K)}
+    content = text_of("intrinsics", path)
+    if (K := matrix_of(numbers_of(content))) is not None:
+        return {"": Intrinsics(K, same_view=path.name == "camera_matrix.csv")}  # Stray Scanner's
+    lines = COLMAP_LINE.findall(content) if not content.lstrip().startswith(("{", "[")) else []
+    if lines:
+        facts = {
+            f"camera {number}": {"colmap": model, "width": int(w), "height": int(h), "parameters": numbers_of(rest)}
+            for number, model, w, h, rest in lines
+        }
+    else:
+        try:
+            facts = parsed("intrinsics", content)
+        except ValueError as error:
+            raise ValueError(f"{error}, in {path}") from None
+    return dict(_found(facts, {}, ""))
+
+
+def _found(facts, outer: dict, name: str):
+    """Yield each camera that facts tell of, with its name; what stands around it, such as depth_scale, holds for it."""
+    if isinstance(facts, list):
+        named = [(str(item.get("name", i)), item) for i, item in enumerate(facts) if isinstance(item, dict)]
+        facts, own = dict(named), {}
+    elif isinstance(facts, dict):
+        try:
+            camera = camera_of(outer | facts)
+        except ValueError as error:
+            camera = error
+        if camera is not None:
+            yield name, camera
+            return
+        own = {key: value for key, value in facts.items() if not isinstance(value, dict) or "distort" in key.lower()}
+    else:
+        return
+    for key, value in facts.items():
+        if key == "frames" and isinstance(value, list):  # NeRF's, each with a lens of its own
+            value = {Path(str(frame.get("file_path", i))).stem: frame for i, frame in enumerate(value)}
+        yield from _found(value, outer | own, f"{name}.{key}" if name else key)
+
+
+def _chosen(found: dict[str, Intrinsics | ValueError], picture: str | None, name: str | None) -> Intrinsics:
+    """The camera of a colour picture among several."""
+    names = list(found)
+    if name is not None:
+        fitting = [one for one in names if one == name] or [one for one in names if name.lower() in one.lower()]
+        require("camera_name", len(fitting) == 1, f"one of {_listed(names)}", repr(name))
+        return _whole(found[fitting[0]])
+    if len(names) == 1:
+        return _whole(found[names[0]])
+    last = {one.rpartition(".")[2]: one for one in names}
+    own = last.get(picture) or next((last[n] for n in last if _same_number(n, picture)), None)
+    if own is not None:
+        return _whole(found[own])
+    first, *others = found.values()
+    if isinstance(first, Intrinsics) and all(_equal(first, other) for other in others):
+        return first
+    if all(n.isdigit() for n in last):
         raise ValueError(
-            f"intrinsics: found no camera matrix in {path}; expected fx, fy, cx, cy (or ppx, ppy), cam_K, "
-            "intrinsic_matrix, camera_matrix, or four or nine numbers"
-        ) from None
-    return replace(camera, distortion=_lens(camera.distortion, facts.get("model", facts.get("distortion_model", ""))))
+            f"intrinsics: expected one camera, or one for the picture {picture!r}, got {len(names)} frames whose K "
+            "differ; --camera-name says which"
+        )
+    colours = [one for one in names if COLOURS.search(one)]
+    if len(colours) != 1:
+        raise ValueError(f"intrinsics: expected one camera, got {_listed(names)}; --camera-name says which")
+    camera = _whole(found[colours[0]])
+    return replace(camera, said=(f"intrinsics: of {_listed(names)}, {colours[0]} is taken", *camera.said))
 
 
-def _parsed(content: str) -> dict:
-    try:
-        return json.loads(content)
-    except json.JSONDecodeError:
-        return YAML(typ="safe").load(OPENCV.sub("", content))
+def _whole(camera: Intrinsics | ValueError) -> Intrinsics:
+    if isinstance(camera, ValueError):
+        raise camera
+    return camera
 
 
-def _matrix(numbers: Sequence) -> Float[np.ndarray, "3 3"]:
-    if len(numbers) == 9:
-        return np.array(numbers, float).reshape(3, 3)
-    fx, fy, cx, cy = map(float, numbers)
-    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+def _listed(names: list[str]) -> str:
+    return f"{', '.join(names[:8])}{' ...' if len(names) > 8 else ''}"
 
 
-def _camera(facts: dict) -> Intrinsics:
-    """The camera that a file tells of; of several frames (BOP) the first one's."""
-    match facts:
-        case {"cam_K": K} | {"camera_matrix": {"data": K}}:
-            K = _matrix(K)
-        case {"intrinsic_matrix": columns}:
-            K = _matrix(columns).T
-        case {"fx": fx, "fy": fy, "cx": cx, "cy": cy} | {"fx": fx, "fy": fy, "ppx": cx, "ppy": cy}:
-            K = _matrix((fx, fy, cx, cy))
-        case _:
-            first = min(facts, key=lambda name: (len(name), name))
-            return _camera(facts[first])
-    scale = facts.get("depth_scale")
-    sides = [facts.get(name, facts.get(f"image_{name}")) for name in ("width", "height")]
-    lens = facts.get("coeffs", facts.get("distortion_coefficients", {}).get("data", ()))
-    return Intrinsics(
-        K,
-        depth_scale=None if scale is None else 0.001 * float(scale),  # BOP says it in millimetres
-        size=None if None in sides else tuple(map(int, sides)),
-        distortion=tuple(map(float, lens)),
-    )
+def _same_number(name: str, picture: str | None) -> bool:
+    return picture is not None and name.isdigit() and picture.isdigit() and int(name) == int(picture)
 
 
-def _lens(coefficients: tuple[float, ...], model: str) -> tuple[float, ...]:
-    """Coefficients that `rectify` can undo; of a lens that does nothing, none."""
-    if not any(coefficients):
-        return ()
-    known = not re.search("inverse|equidistant|fisheye|kannala|theta", model, re.IGNORECASE)
-    require(
-        "intrinsics",
-        known and len(coefficients) in (4, 5, 8, 12, 14),
-        "a lens of 4, 5, 8, 12 or 14 coefficients k1, k2, p1, p2, ... (plumb_bob)",
-        f"{len(coefficients)} of {model or 'no named model'}; rectify the pictures first",
-    )
-    return coefficients
+def _equal(one: Intrinsics, other: Intrinsics | ValueError) -> bool:
+    def key(camera):
+        return camera.K.tolist(), camera.depth_scale, camera.size, camera.lens
+
+    return isinstance(other, Intrinsics) and key(one) == key(other)
 
 
-def rectify(image: np.ndarray, camera: Intrinsics, smooth: bool = False, outside: int = 0) -> np.ndarray:
-    """Undo the camera's lens: the picture, (H, W) or (H, W, 3), that a pinhole with the same K would have taken.
-
-    smooth: mix neighbours, for colours; depth and labels take the nearest pixel. outside: what stands where the lens
-    saw nothing. A picture of a lens without distortion is given back as it is. Topic 06.
-    """
-    if not camera.distortion:
-        return image
-    lens, size = np.array(camera.distortion), image.shape[1::-1]
-    maps = cv2.initUndistortRectifyMap(camera.K, lens, None, camera.K, size, cv2.CV_32FC1)
-    return cv2.remap(image, *maps, cv2.INTER_LINEAR if smooth else cv2.INTER_NEAREST, borderValue=(outside,) * 3)
+def rectify(
+    image: Shaped[np.ndarray, "H W *channels"], camera: Intrinsics, smooth: bool = False, outside: int = 0
+) -> Shaped[np.ndarray, "H W *channels"]:
+    """Undo the camera's lens, as `labkit.geometry.lens.rectified`; a picture of a lens that does nothing stays."""
+    return image if camera.lens is None else rectified(image, camera.K, camera.lens, smooth, outside)

@@ -12,10 +12,11 @@ from jaxtyping import Integer, UInt8
 from matplotlib import colormaps
 from tqdm.auto import tqdm
 
-from labcli.cameras import read_intrinsics, rectify
-from labcli.perceive import on_table, read_frame
+from labcli.cameras import read_intrinsics
+from labcli.perceive import on_table
+from labcli.pictures import NOTHING_SAID, Reading, camera_file, depth_beside, pictures_in, read_numbers, read_shot
 from labcli.report import PAGE, figures
-from labkit.frame import RGBDFrame, read_image
+from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base
 from labkit.instance_metrics import InstanceScores, pool, score_instances
 from labkit.labels import OBSTACLE, TARGET
@@ -77,26 +78,25 @@ class TrueThings(Sequence):
 
     A mask has 8 or 16 bits: 0 where there is no thing, the greatest number, 255 or 65535, where nobody knows, and
     another number for each thing. Masks of 0 and one other number alone do not tell things apart, and neither does a
-    folder foreground/ in place of mask/, not 0 where a thing is: then `alone` is True. depth_scale and the camera's
-    file as for `labcli.own_data.PictureFolder`.
+    folder foreground/ in place of mask/, not 0 where a thing is: then `alone` is True. reading and
+    the camera's file as for `labcli.own_data.PictureFolder`; `said` is what there is to say of the files.
 
     An item is a frame in the camera's own frame, whose instances are the true things. Raises FileNotFoundError or
     ValueError naming the file that is missing or does not fit.
     """
 
-    def __init__(self, folder, depth_scale: float | None = None):
+    def __init__(self, folder, reading: Reading = NOTHING_SAID):
         folder = Path(folder)
-        self.depth_scale = depth_scale
-        self.colors = sorted(path for path in (folder / "color").glob("*") if path.is_file())
+        self.reading = reading
+        self.colors, self.said = pictures_in(folder / "color")
         kind = "mask" if (folder / "mask").is_dir() else "foreground"
         self.masks = [folder / kind / f"{path.stem}.png" for path in self.colors]
-        cameras = [path for end in (".json", ".yaml", ".txt") if (path := folder / f"camera{end}").is_file()]
-        if not self.colors or not self.masks[0].parent.is_dir() or not cameras:
+        self.camera = camera_file(folder)
+        if not self.colors or not self.masks[0].parent.is_dir() or self.camera is None:
             raise FileNotFoundError(
                 f"folder: expected pictures in color/, depth/ and mask/ (or foreground/), and camera.json, in {folder}"
             )
-        self.camera = read_intrinsics(str(cameras[0]))
-        numbers = {*np.concatenate([np.unique(_numbers(path)) for path in self.masks]).tolist()} - {0}
+        numbers = {*np.concatenate([np.unique(read_numbers(path)) for path in self.masks]).tolist()} - {0}
         self.alone = kind == "foreground" or len(numbers) <= 1
 
     def __len__(self) -> int:
@@ -104,23 +104,19 @@ class TrueThings(Sequence):
 
     def __getitem__(self, index: int) -> RGBDFrame:
         color, mask = self.colors[index], self.masks[index]
-        depth = mask.parent.parent / "depth" / f"{color.stem}.png"
-        frame, true = read_frame(color, depth, self.camera, self.depth_scale), _numbers(mask)
-        if true.shape[::-1] != frame.size:
-            (h, w), (width, height) = true.shape, frame.size
+        camera = read_intrinsics(str(self.camera), color, self.reading.camera_name)
+        shot, true = read_shot(color, depth_beside(color), camera, self.reading), read_numbers(mask)
+        if true.shape[::-1] != shot.file_size:
+            (h, w), (width, height) = true.shape, shot.file_size
             raise ValueError(f"mask: expected the colour picture's size, {width} x {height}, in {mask}, got {w} x {h}")
+        self.said += [sentence for sentence in shot.said if sentence not in self.said]
         if self.alone:
             true = (true > 0).astype(np.uint8)
-        return replace(frame, instances=rectify(true, self.camera, outside=self.ignore(index)))
+        return replace(shot.frame, instances=shot.labels_like(true, self.ignore(index)))
 
     def ignore(self, index: int) -> int:
         """The number of the mask's pixels that nobody knows, the greatest of its kind."""
-        return 255 if self.alone else int(np.iinfo(_numbers(self.masks[index]).dtype).max)
-
-
-def _numbers(path: Path) -> Integer[np.ndarray, "H W"]:
-    """The numbers of things in a file of 8 or 16 bits."""
-    return read_image("mask", path, (np.uint8, np.uint16))
+        return 255 if self.alone else int(np.iinfo(read_numbers(self.masks[index]).dtype).max)
 
 
 def judge(things: TrueThings, find: Finder) -> list[Judged]:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from tqdm.auto import tqdm
 
-from labcli.cameras import Intrinsics, read_intrinsics, rectify
-from labcli.perceive import on_table, read_frame, taken_for_target
+from labcli.cameras import read_intrinsics
+from labcli.perceive import on_table, taken_for_target
+from labcli.pictures import NOTHING_SAID, Reading, camera_file, depth_beside, pictures_in, read_shot
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import back_project_to_base
 from labkit.labels import BACKGROUND, CLASSES, IGNORE, SURFACE, TARGET
@@ -23,29 +24,33 @@ FLAT = 0.010  # metres: what is nearer to the table's plane is table
 class PictureFolder(Sequence):
     """FOLDER/color/NAME.png (or .jpg), depth/NAME.png and mask/NAME.png, with the camera in FOLDER/camera.json.
 
-    Depth is aligned to colour, 16 bit, 0 where there is no reading; depth_scale: metres per unit, if None what the
-    camera's file says, or else 0.001. A mask has its picture's name and holds the kit's classes, 0 to 3, or 255 where
-    nobody knows. If all masks together hold 0 and one other value alone, such as 255 or 1, that value is the target, as
-    in `labkit perceive --mask`. camera.json (or .yaml, .txt) is anything that `labkit perceive --intrinsics` reads. The
-    table is found in each depth picture, and the base frame laid on it. If no mask has a pixel of surface, 0 does not
-    say what is table: there what lies on the table's plane is surface, and what has no depth is ignored.
+    Depth is aligned to colour, of any kind that `labkit perceive` reads, 0 where there is no reading; reading: what is
+    known of its unit and size, and of the camera's file. A mask has its picture's name and holds the kit's classes, 0
+    to 3, or 255 where nobody knows. If all masks together hold 0 and one other value alone, such as 255 or 1, that
+    value is the target, as in `labkit perceive --mask`. camera.json (or .yaml, .txt) is anything that `labkit perceive
+    --intrinsics` reads. The table is found in each depth picture, and the base frame laid on it. If no mask has a pixel
+    of surface, 0 does not say what is table: there what lies on the table's plane is surface, and what has no depth is
+    ignored.
 
     An item is an RGBDFrame with labels. All pictures are read once when the folder is opened: on stderr stands which
     are left out and why, what looks wrong about the others, and the share of each class. Raises FileNotFoundError or
     ValueError naming the file if the camera is missing or no picture is left. Topics 01 and 06.
     """
 
-    def __init__(self, folder, depth_scale: float | None = None):
-        self.folder, self.depth_scale = Path(folder), depth_scale
-        found = sorted(path for path in (self.folder / "color").glob("*") if path.is_file())
+    def __init__(self, folder, reading: Reading = NOTHING_SAID):
+        self.folder, self.reading = Path(folder), reading
+        found, said = pictures_in(self.folder / "color")
         if not found:
             raise FileNotFoundError(
                 f"data: expected a data set of data_gen, or pictures in color/, depth/ and mask/, in {self.folder}"
             )
-        cameras = [path for end in (".json", ".yaml", ".txt") if (path := self.folder / f"camera{end}").is_file()]
-        if not cameras:
+        self.camera = camera_file(self.folder)
+        if self.camera is None:
             raise FileNotFoundError(f"data: expected {self.folder / 'camera.json'}, the camera of these pictures")
-        self.camera: Intrinsics = read_intrinsics(str(cameras[0]))
+        read_intrinsics(str(self.camera), found[0], reading.camera_name)  # what is wrong with it is said of no picture
+        for sentence in said:
+            _say(sentence)
+        self._told = set()
         values = self._values(found)
         self.target = next(iter(values)) if len(values) == 1 else None
         self.says_surface = SURFACE in values and self.target is None
@@ -85,15 +90,24 @@ class PictureFolder(Sequence):
 
     def _read(self, color: Path) -> RGBDFrame:
         """A picture with its labels, in the camera's own frame."""
-        depth, mask = (self.folder / kind / f"{color.stem}.png" for kind in ("depth", "mask"))
+        mask = self.folder / "mask" / f"{color.stem}.png"
         try:
-            frame = read_frame(color, depth, self.camera, self.depth_scale)
+            camera = read_intrinsics(str(self.camera), color, self.reading.camera_name)
+            shot = read_shot(color, depth_beside(color), camera, self.reading)
             labels = read_image("mask", mask, (np.uint8, np.uint16))
         except FileNotFoundError as error:
             missing = Path(error.filename)
             raise FileNotFoundError(f"{missing.parent.name}: expected {missing}, named as its picture is") from None
+        frame, (w, h) = shot.frame, shot.file_size
         if self.size not in (None, frame.size):
             raise ValueError(f"color: expected pictures of one size, {self.size} as before, got {frame.size}")
+        if labels.shape != (h, w):
+            raise ValueError(
+                f"mask: expected the colour picture's size, {w} x {h}, in {mask}, got {labels.shape[::-1]}"
+            )
+        for sentence in {*shot.said} - self._told:
+            _say(f"{color}: {sentence}")
+        self._told |= {*shot.said}
         values = np.unique(labels).tolist()
         if values == [IGNORE]:
             raise ValueError(f"mask: expected a labelled pixel in {mask}, got {IGNORE} alone")
@@ -103,7 +117,7 @@ class PictureFolder(Sequence):
             raise ValueError(
                 f"mask: expected classes 0 to {len(CLASSES) - 1}, or {IGNORE}, in {mask}, got {values[:6]}"
             )
-        return replace(frame, labels=rectify(labels.astype(np.uint8), self.camera, outside=IGNORE))
+        return replace(frame, labels=shot.labels_like(labels.astype(np.uint8), IGNORE))
 
     def _values(self, found: list[Path]) -> set[int]:
         """All values above 0 of all masks that can be read; what cannot is said when the picture is."""

@@ -3,15 +3,16 @@
 Without a camera pose the table is found in the depth picture (`on_table`), and the base frame is laid on it.
 """
 
-import json
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
 
-from labcli.cameras import Intrinsics, numbers_of, rectify
+from labcli.documents import numbers_of, parsed, text_of
+from labcli.pictures import Shot, read_frame, read_numbers  # noqa: F401, labs look for read_frame here
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import Plane, Table, back_project, base_on_table, find_tables, invert_transform
+from labkit.geometry.depth_units import LIKELY, fitting_units
 from labkit.geometry.tables import height_of, table_at
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, TARGET
@@ -32,14 +33,11 @@ def read_gripper(text: str) -> Gripper:
     """
     names = [measure.name for measure in fields(Gripper)]
     try:
-        words = (
-            json.loads(Path(text).read_text(encoding="utf-8"))
-            if Path(text).is_file()
-            else text.replace(",", " ").split()
-        )
+        of_file = len(text) < 4000 and Path(text).is_file()
+        words = parsed("gripper", text_of("gripper", text)) if of_file else text.replace(",", " ").split()
         given = words if isinstance(words, dict) else dict(word.split("=") for word in words)
         measures = {name: float(metres) for name, metres in given.items()}
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f'gripper: expected "NAME=METRES ..." or a JSON file of them, got {text!r}') from None
     unknown = ", ".join(sorted(measures.keys() - set(names)))
     require("gripper", not unknown, f"measures of {', '.join(names)}", unknown)
@@ -67,17 +65,17 @@ def read_pixel(text: str) -> tuple[float, float]:
     return tuple(numbers)
 
 
-def read_mask(path, size: tuple[int, int], target: int | None = None, instances: bool = False, camera=None):
+def read_mask(path, shot: Shot, target: int | None = None, instances: bool = False):
     """Read somebody's mask: labels, uint8 (H, W), the numbers of the objects or None, and what is to be said of it.
 
-    8 or 16 bit. If it holds 0 and one other value alone, such as 255 or 1, that value means "target"; else the values
-    are the kit's own classes. size: width and height that it must have. target: the value that means "target", whatever
-    the others mean. instances: each value above 0 is an object, and a target. camera: whose lens is undone, as
-    `read_frame` does. Raises ValueError for an image of another kind or size, and for values that no class has.
+    8 or 16 bit, of the size of the shot's colour file; its lens is undone as the shot's. If it holds 0 and one other
+    value alone, such as 255 or 1, that value means "target"; else the values are the kit's own classes. target: the
+    value that means "target", whatever the others mean. instances: each value above 0 is an object, and a target.
+    Raises ValueError for an image of another kind or size, and for values that no class has.
     """
-    mask = read_image("mask", path, (np.uint8, np.uint16))
+    mask, size = read_numbers(path) if instances else read_image("mask", path, (np.uint8, np.uint16)), shot.file_size
     require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
-    mask = mask if camera is None else rectify(mask, camera)
+    mask = shot.labels_like(mask)
     if instances or target is not None:
         chosen = mask > 0 if target is None else mask == target
         return np.where(chosen, TARGET, 0).astype(np.uint8), mask if instances else None, ""
@@ -105,39 +103,6 @@ def taken_for_target(value: int) -> str:
     return f"the mask holds 0 and {value} alone: {value} is taken for the target, not for the class {CLASSES[value]}"
 
 
-def read_frame(color, depth, intrinsics: Intrinsics, depth_scale: float | None = None) -> RGBDFrame:
-    """Read the two pictures as one frame, in the camera's own frame (T_base_cam is the identity), the lens undone.
-
-    depth_scale: metres per unit of the depth file; if None, what the intrinsics' file says, or else 0.001. Raises
-    ValueError with the likely cause if the files are swapped, their sizes differ, or the depths cannot be metres.
-    """
-    scale = next(given for given in (depth_scale, intrinsics.depth_scale, 0.001) if given is not None)
-    require("depth_scale", 0.0 < scale < np.inf, "metres per unit of the depth file, above 0", scale)
-    rgb = read_image("color", color, np.uint8, colour=True)
-    raw = read_image("depth", depth, np.uint16)
-    if raw.shape != rgb.shape[:2]:
-        sizes = " and ".join(f"{w} x {h}" for h, w in (rgb.shape[:2], raw.shape))
-        raise ValueError(f"depth: expected the size of the colour picture, got {sizes}; align depth to colour first")
-    size = rgb.shape[1::-1]
-    if intrinsics.size not in (None, size):
-        raise ValueError(
-            f"intrinsics: expected a calibration of pictures of {size[0]} x {size[1]}, got one of "
-            f"{intrinsics.size[0]} x {intrinsics.size[1]}"
-        )
-    metres = raw.astype(np.float32) * np.float32(scale)
-    seen = metres[raw > 0]
-    if not seen.size:
-        raise ValueError(f"depth: {depth} holds no reading, only zeros")
-    middle = float(np.median(seen))
-    if not 0.05 <= middle <= 20.0:
-        raise ValueError(
-            f"depth_scale: with {scale:g} metres per unit the median depth is {middle:.3g} m; the file's values are "
-            f"around {np.median(raw[raw > 0]):.0f}: 0.001 is right for millimetres, 0.0001 for tenths of them"
-        )
-    pictures = rectify(rgb, intrinsics, smooth=True), rectify(metres, intrinsics)
-    return RGBDFrame(*pictures, intrinsics.K, np.eye(4))
-
-
 def on_table(frame: RGBDFrame, table_z: float = 0.0) -> tuple[RGBDFrame, Plane]:
     """Find the table in a frame's depth, and lay the base frame on it, or so that the table is at height `table_z`.
 
@@ -146,10 +111,20 @@ def on_table(frame: RGBDFrame, table_z: float = 0.0) -> tuple[RGBDFrame, Plane]:
     """
     tables = find_tables(back_project(frame.depth, frame.K))
     if not tables:
-        raise ValueError("depth: expected a plane that may be the table, got none; --camera-pose says where it is")
+        raise ValueError(f"depth: expected a plane that may be the table, got none{_why_none(frame)}")
     T = base_on_table(tables[0].plane)
     T[2, 3] += table_z
     return replace(frame, T_base_cam=T, table_z=table_z), tables[0].plane
+
+
+def _why_none(frame: RGBDFrame) -> str:
+    """Say how far away depth is, and which unit would bring it to where tables are, if it is not there."""
+    seen = frame.depth[frame.depth > 0.0]
+    middle = float(np.median(seen)) if seen.size else 0.0
+    if not seen.size or middle <= LIKELY[1]:
+        return "; --camera-pose says where it is"
+    units = [f"{factor:g} times the unit makes it {factor * middle:.2g} m" for factor in fitting_units(middle)]
+    return f"; the median depth is {middle:.2g} m, and {' or '.join(units) or 'no usual unit fits'}: see --depth-scale"
 
 
 # ---------------------------------------------------------------------------------------------- what is made of it

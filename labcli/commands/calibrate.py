@@ -47,6 +47,8 @@ def calibrate(
     else:
         known = read_intrinsics(str(camera))
         K, lens = known.K, known.distortion
+        way = "brown_conrady" if known.lens is None else known.lens.model
+        require("camera", way == "brown_conrady", "a lens of OpenCV's kind", way)
         require("camera", known.size in (None, views.size), f"one of pictures of {views.size}", known.size)
     poses = own.on_arm(views, own.read_arm(arm), K, lens) if arm else None
     for line in views.said:

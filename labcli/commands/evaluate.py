@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from labcli.commands.options import Dask, Model, Refine, Workers
+from labcli.commands.options import Aligned, CameraName, Dask, DepthScale, Model, Refine, Workers
 
 
 def evaluate(
@@ -28,9 +28,9 @@ def evaluate(
     worst: Annotated[int, typer.Option(help="Show so many of the worst in OUT/worst.html.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for worst.html.")] = Path("out"),
     anything: Annotated[bool, typer.Option("--anything", help="With FOLDER: things of any class, each apart.")] = False,
-    depth_scale: Annotated[
-        float | None, typer.Option(help="Metres per unit of FOLDER's depth; else the camera file's, or 0.001.")
-    ] = None,
+    depth_scale: DepthScale = None,
+    aligned: Aligned = False,
+    camera_name: CameraName = None,
     workers: Workers = 1,
     dask: Dask = None,
 ) -> None:
@@ -41,11 +41,13 @@ def evaluate(
     options = inspect.signature(evaluate).parameters
     given = {name for name, value in locals().items() if name in options and value != options[name].default}
     of_scenes = {"scenes", "first_seed", "config", "masks", "crf", "perturb", "workers", "dask"}
-    wrong = sorted(given & ({"anything", "depth_scale"} if folder is None else of_scenes))
+    of_pictures = {"anything", "depth_scale", "aligned", "camera_name"}
+    wrong = sorted(given & (of_pictures if folder is None else of_scenes))
     if wrong:
         raise ValueError(f"{wrong[0]}: expected {'FOLDER beside it' if folder is None else 'no FOLDER beside it'}")
     if folder is not None:
-        _of_a_folder(folder, model, anything, depth_scale, json, worst, out)
+        reading = depth_scale, aligned, camera_name
+        _of_a_folder(folder, model, anything, reading, json, worst, out)
         return
     from data_gen import sample_scene
     from labcli.evaluation import as_json, run_trials, summarise, table
@@ -67,14 +69,17 @@ def evaluate(
         typer.echo(f"wrote {out / 'worst.html'}")
 
 
-def _of_a_folder(folder: Path, model: str, things: bool, depth_scale, json: Path | None, worst: int, out: Path) -> None:
+def _of_a_folder(folder: Path, model: str, things: bool, reading, json: Path | None, worst: int, out: Path) -> None:
     from labcli import evaluate_folder as own
+    from labcli.pictures import Reading
     from labkit.learning.network import load_model, weights_path
     from labkit.pipeline import anything
     from labkit.support.files import write_atomically
 
-    true, network = own.TrueThings(folder, depth_scale), load_model(weights_path(model))
+    true, network = own.TrueThings(folder, Reading(*reading)), load_model(weights_path(model))
     judged = own.judge(true, anything(network) if things else own.things_by_class(network))
+    for sentence in true.said:
+        typer.echo(sentence, err=True)
     typer.echo(own.table(judged, true.alone))
     if json is not None:
         write_atomically(json, own.as_json(judged, true.alone).encode())

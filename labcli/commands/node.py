@@ -11,7 +11,7 @@ from typing import Annotated, get_args, get_type_hints
 import typer
 from typer.core import TyperGroup
 
-from labcli.commands.options import Model, Refine
+from labcli.commands.options import Gripper, Model, Refine
 
 KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 SIMULATED_RATE = 5.0  # frames per second of `ros --sim`
@@ -34,16 +34,15 @@ class Settings:
     anything: Annotated[
         bool, typer.Option("--anything", help="Whatever stands on the table is a target, of any class.")
     ] = False
-    gripper: Annotated[
-        str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON file.')
-    ] = ""
+    gripper: Gripper = ""
     workspace: Annotated[
         str, typer.Option(help="What the arm can meet: from and to in x, y and z, z from the table; else the Panda's.")
     ] = ""
     target: Annotated[int, typer.Option(help="The class to grasp.")] = 2
     table_z: Annotated[float | None, typer.Option(help="Height of the table in the base frame, metres; else 0.")] = None
     camera_pose: Annotated[
-        str | None, typer.Option(help='Where the camera stands in the base frame, "x y z qx qy qz qw"; else /tf says.')
+        str | None,
+        typer.Option(help='Where the camera stands: "x y z qx qy qz qw", or T_base_cam=FILE; else /tf says.'),
     ] = None
     base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link"
     slop: Annotated[float, typer.Option(help="How far the stamps of a frame may lie apart, seconds.")] = 0.02
@@ -94,7 +93,7 @@ class Settings:
         >>> options["topics"].rgb, options["T_base_cam"][:3, 3].tolist()
         ('/left/image', [0.5, 0.0, 0.8])
         """
-        from labcli.cameras import read_pose
+        from labcli.poses import read_pose
         from labkit.node.messages import DEFAULT_TOPICS
         from labkit.support.validation import require
 
@@ -103,7 +102,9 @@ class Settings:
             known = name in vars(topics) and given
             require("topic", known, f"NAME=TOPIC with NAME of {', '.join(vars(topics))}", f"{name}={given}")
             topics = replace(topics, **{name: given})
-        T_base_cam = read_pose(self.camera_pose) if self.camera_pose else None
+        T_base_cam, said = read_pose(self.camera_pose).in_base() if self.camera_pose else (None, ())
+        for sentence in said:
+            typer.echo(sentence, err=True)
         given = {"base_frame": self.base_frame, "slop": self.slop, "depth_scale": self.depth_scale}
         return given | {"T_base_cam": T_base_cam, "topics": topics}
 

@@ -10,6 +10,17 @@ Refine = Annotated[bool | None, typer.Option("--crf/--no-crf", help="Refine a ne
 Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 Dask = Annotated[str | None, typer.Option(help="Run on the workers of this Dask scheduler, tcp://host:8786.")]
 
+Gripper = Annotated[
+    str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON or YAML file.')
+]
+DepthScale = Annotated[
+    float | None, typer.Option(help="Metres per unit of depth; else what the camera's file says, or what fits.")
+]
+Aligned = Annotated[
+    bool, typer.Option("--aligned", help="Depth of another size is of the same view as colour, as of a phone.")
+]
+CameraName = Annotated[str | None, typer.Option(help="Which camera of a file that has several.")]
+
 MeasuredMm = Annotated[
     float, typer.Option(help="How long the sheet's line of 150 mm is as printed, millimetres.", min=30.0, max=750.0)
 ]

@@ -5,25 +5,28 @@ from typing import Annotated, Literal
 
 import typer
 
-from labcli.commands.options import Model
+from labcli.commands.options import Aligned, CameraName, DepthScale, Gripper, Model
 
 
 def perceive(
-    color: Annotated[Path, typer.Argument(help="Colour picture, 8 bit.")],
-    depth: Annotated[Path, typer.Argument(help="Depth picture aligned to it, 16-bit PNG; 0 is no reading.")],
+    color: Annotated[Path, typer.Argument(help="Colour picture.")],
+    depth: Annotated[
+        Path, typer.Argument(help="Depth aligned to it: 16-bit PNG, TIFF, PFM, NPY, NPZ, EXR; 0 and NaN: no reading.")
+    ],
     intrinsics: Annotated[
-        str, typer.Option(help='The camera: "fx fy cx cy", or a file of librealsense, BOP, Open3D or ROS.')
+        str, typer.Option(help='The camera: "fx fy cx cy", or a file of any usual kind (docs/cameras.md).')
     ],
     camera_pose: Annotated[
-        str | None, typer.Option(help='Where the camera stands in the base frame: "x y z qx qy qz qw".')
+        str | None,
+        typer.Option(help='Where the camera stands in the base frame: "x y z qx qy qz qw", a 4x4 matrix, or a file.'),
     ] = None,
     plane: Annotated[
         Literal["auto"] | None, typer.Option(help="Find the table and lay the base frame on it; so without a pose.")
     ] = None,
     table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
-    depth_scale: Annotated[
-        float | None, typer.Option(help="Metres per unit of the depth file; else the camera file's, or 0.001.")
-    ] = None,
+    depth_scale: DepthScale = None,
+    aligned: Aligned = False,
+    camera_name: CameraName = None,
     model: Model = "unet_rgbd",
     mask: Annotated[
         Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
@@ -41,9 +44,7 @@ def perceive(
         int | None,
         typer.Option(help="The class to grasp, 2 if none is given; with --mask, the value that means target."),
     ] = None,
-    gripper: Annotated[
-        str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON file.')
-    ] = "",
+    gripper: Gripper = "",
     workspace: Annotated[
         str,
         typer.Option(
@@ -59,7 +60,9 @@ def perceive(
     from dataclasses import replace
 
     from labcli import perceive as own
-    from labcli.cameras import read_intrinsics, read_pose
+    from labcli.cameras import read_intrinsics
+    from labcli.pictures import Reading, read_shot
+    from labcli.poses import read_pose
     from labcli.report import save
     from labkit.labels import TARGET
     from labkit.learning.network import load_model, weights_path
@@ -74,25 +77,27 @@ def perceive(
     if instances and (mask is None or target is not None):
         raise ValueError("instances: expected --mask FILE beside it, and no --target; each value is one")
     check_writable(out)  # before anything that takes its time
-    T_base_cam = read_pose(camera_pose) if camera_pose else None
-    camera = read_intrinsics(intrinsics)
-    frame = own.read_frame(color, depth, camera, depth_scale)
-    if camera.distortion:
-        typer.echo("the lens's distortion is undone first: what is written is of the rectified picture")
+    pose = read_pose(camera_pose, color) if camera_pose else None
+    shot = read_shot(
+        color, depth, read_intrinsics(intrinsics, color, camera_name), Reading(depth_scale, aligned, camera_name)
+    )
+    T_base_cam, said_of_pose = (None, ()) if pose is None else pose.in_base(shot.frame)
+    for sentence in (*shot.said, *said_of_pose):
+        typer.echo(sentence)
     planning = {"gripper": own.read_gripper(gripper)}
     planning["workspace"] = own.read_workspace(workspace) if workspace else None
-    pixel = own.read_pixel(at) if at else None
+    pixel = shot.pixel(*own.read_pixel(at)) if at else None
     labels, numbers, said = None, None, ""
     if mask is not None:
         pipeline = Pipeline(**planning)
-        labels, numbers, said = own.read_mask(mask, frame.size, target, instances, camera)
+        labels, numbers, said = own.read_mask(mask, shot, target, instances)
     elif anything:
         pipeline = Pipeline(find_objects=things_of(load_model(weights_path(model))), **planning)
     else:
         pipeline = Pipeline(
             load_model(weights_path(model)), target_class=TARGET if target is None else target, **planning
         )
-    seen = own.perceive(frame, pipeline, labels, numbers, T_base_cam, table_z, pixel)
+    seen = own.perceive(shot.frame, pipeline, labels, numbers, T_base_cam, table_z, pixel)
     seen = replace(seen, notices=(said, *seen.notices)) if said else seen
     typer.echo(own.describe(seen))
     for path in save(seen, out):

@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from labcli.commands.options import Aligned, CameraName, DepthScale
+
 
 def train(
     data: Annotated[
@@ -24,9 +26,9 @@ def train(
     epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
     lr: Annotated[float | None, typer.Option(help="Highest learning rate; the model's recipe if not given.")] = None,
     batch: Annotated[int | None, typer.Option(help="Images in a batch; the model's recipe if not given.")] = None,
-    depth_scale: Annotated[
-        float | None, typer.Option(help="Metres per unit of a folder's depth; else the camera file's, or 0.001.")
-    ] = None,
+    depth_scale: DepthScale = None,
+    aligned: Aligned = False,
+    camera_name: CameraName = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
     workers: Annotated[
         int, typer.Option(help="Processes that make batches ahead, for a GPU; the run is the same.", min=0)
@@ -40,6 +42,7 @@ def train(
 
     import data_gen
     from labcli.own_data import PictureFolder
+    from labcli.pictures import Reading
     from labkit.learning.network import architecture_of, load_model, weights_path, with_things
     from labtrain import ranks, training
 
@@ -60,8 +63,10 @@ def train(
     asked = {name: value for name, value in given.items() if value is not None}
     config = replace(recipe, seed=seed, **asked)
 
+    reading = Reading(depth_scale, aligned, camera_name)
+
     def opened(path: Path):
-        return PictureFolder(path, depth_scale) if (path / "color").is_dir() else data_gen.load(path)
+        return PictureFolder(path, reading) if (path / "color").is_dir() else data_gen.load(path)
 
     val_set = None if val is None else opened(val)
     train_set = data_gen.Joined([opened(path) for path in data], each=scenes)

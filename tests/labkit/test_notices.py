@@ -248,6 +248,8 @@ def test_a_lens_is_undone_before_anything_else(frame, tmp_path):
     unbent = RGBDFrame(frame.rgb, frame.depth, K, np.eye(4))
     assert np.abs(read.rgb.astype(float) - unbent.rgb)[inner].mean() < 4
 
-    (tmp_path / "camera.json").write_text(json.dumps(facts | {"model": "inverse_brown_conrady"}))
-    with pytest.raises(ValueError, match="got 5 of inverse_brown_conrady; rectify the pictures first"):
+    (tmp_path / "camera.json").write_text(json.dumps(facts | {"model": "kannala_brandt4"}))
+    with pytest.raises(
+        ValueError, match=r"got a fisheye or other wide lens \(kannala_brandt4\); rectify the pictures first"
+    ):
         cameras.read_intrinsics(str(tmp_path / "camera.json"))
