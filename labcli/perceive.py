@@ -12,7 +12,7 @@ from labcli.documents import numbers_of, parsed, text_of
 from labcli.pictures import Shot, read_frame, read_numbers  # noqa: F401, labs look for read_frame here
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import Plane, Table, back_project, base_on_table, find_tables, invert_transform
-from labkit.geometry.depth_units import LIKELY, fitting_units
+from labkit.geometry.depth_units import LIKELY
 from labkit.geometry.tables import height_of, table_at
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, TARGET
@@ -121,10 +121,13 @@ def _why_none(frame: RGBDFrame) -> str:
     """Say how far away depth is, and which unit would bring it to where tables are, if it is not there."""
     seen = frame.depth[frame.depth > 0.0]
     middle = float(np.median(seen)) if seen.size else 0.0
-    if not seen.size or middle <= LIKELY[1]:
+    if middle <= LIKELY[1]:
         return "; --camera-pose says where it is"
-    units = [f"{factor:g} times the unit makes it {factor * middle:.2g} m" for factor in fitting_units(middle)]
-    return f"; the median depth is {middle:.2g} m, and {' or '.join(units) or 'no usual unit fits'}: see --depth-scale"
+    said = f"; the median depth is {middle:.2g} m"
+    for words, factor in (("a tenth", 0.1), ("a thousandth", 0.001)):
+        if LIKELY[0] <= factor * middle <= LIKELY[1]:
+            return f"{said}; {words} of the unit makes it {factor * middle:.2g} m: see --depth-scale"
+    return f"{said}: see --depth-scale"
 
 
 # ---------------------------------------------------------------------------------------------- what is made of it
