@@ -161,11 +161,17 @@ class Trial:
         self.strata = len(question.inputs) if isinstance(question.inputs, tuple) else 1
         drawn = question.draws(np.random.default_rng(7), rounds * self.strata)
         self.by_hand, self.drawn = list(question.by_hand), drawn
+        self.simple: dict[tuple[int, int], dict] = {}  # by argument and case
+
+    @property
+    def cases(self) -> list[tuple]:
+        """All arguments, those by hand first."""
+        return [*self.by_hand, *self.drawn]
 
     @cached_property
     def expected(self) -> list[object]:
         """What the reference makes of each case, those by hand first."""
-        return [trusted(self.question.reference, args) for args in (*self.by_hand, *self.drawn)]
+        return [trusted(self.question.reference, args) for args in self.cases]
 
     def told(self, tells: Callable[[int, tuple], bool]) -> bool:
         """Whether a case by hand tells it, or so many draws that a grader's miss it with a chance under MISSED."""
@@ -186,15 +192,18 @@ class Trial:
         """The simplifications of arguments that change a value of its kind, go unnoticed, and are not declared."""
         rng = np.random.default_rng(11)
         for k, (name, kind) in enumerate(self.kinds.items()):
-            values = [args[k] for args in (*self.by_hand, *self.drawn)]
-            samples = [kind.draw(rng) for _ in range(SAMPLES)]
-            names = {n: None for value in (*values, *samples) for n in simplifications(kind, value)}
-            for simple in names:
-                free = any(fnmatch.fnmatch(simple, pattern) for pattern in kind.free)
-                told = self.told(partial(self.shows, {k: simple}))
-                if told and free:
-                    yield f"{name}: {simple} is declared to be free, and cases tell it"
-                elif not told and not free and any(changes(kind, simple, v) for v in (*samples, *values)):
+            values = [*(args[k] for args in self.cases), *(kind.draw(rng) for _ in range(SAMPLES))]
+            for i, value in enumerate(values):
+                self.simple[k, i] = simplifications(kind, value)
+            of_values = [self.simple[k, i] for i in range(len(values))]
+            for simple in dict.fromkeys(itertools.chain(*of_values)):
+                if any(fnmatch.fnmatch(simple, pattern) for pattern in kind.free):
+                    if any(self.shows({k: simple}, i, args) for i, args in enumerate(self.cases)):
+                        yield f"{name}: {simple} is declared to be free, and a case tells it"
+                elif not self.told(partial(self.shows, {k: simple})) and any(
+                    simple in found and changed(found[simple], value)
+                    for found, value in zip(of_values, values, strict=True)
+                ):
                     yield f"{name}: {simple}"
         for axis, places in self.shared_axes().items():
             both = dict.fromkeys(places, f"first alone along {axis}")
@@ -209,9 +218,9 @@ class Trial:
 
     def shows(self, simple: dict[int, str], i: int, args: tuple) -> bool:
         """Whether the reference gives something else in a case where arguments are simplified."""
-        kinds, new = list(self.kinds.values()), list(args)
+        new = list(args)
         for k, name in simple.items():
-            change = simplifications(kinds[k], args[k]).get(name)
+            change = self.simple[k, i].get(name)
             if change is None:
                 return False
             with quiet():
@@ -235,17 +244,16 @@ class Trial:
 
     def of_no_kind(self) -> Iterator[str]:
         """The arguments of cases that are not of their kinds."""
-        for args in (*self.by_hand, *self.drawn):
+        for args in self.cases:
             for (name, kind), value in zip(self.kinds.items(), args, strict=True):
                 if why := kind.refuses(value):
                     yield f"{name}: {why}"
 
 
-def changes(kind: Kind, name: str, value: object) -> bool:
-    """Whether a simplification changes a value."""
-    change = simplifications(kind, value).get(name)
+def changed(change: Callable[[], object], value: object) -> bool:
+    """Whether a simplification changes its value."""
     with quiet():
-        return change is not None and not same(change(), value)
+        return not same(change(), value)
 
 
 def edges(kind: Kind) -> dict[str, Callable[[object], bool]]:

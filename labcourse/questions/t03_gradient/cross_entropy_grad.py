@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from labcourse.questions.t03_gradient import (
-    LOGITS,
     SMOOTHED_DRAWS,
     SMOOTHED_PIXELS,
     SURE,
@@ -32,11 +31,7 @@ _AT_SIZE = (np.stack([_U % 7, _V % 5, (_U + _V) % 3, _U % 2], axis=-1) / 2, (_U 
 
 QUESTION = Question(
     reference=cross_entropy_grad,
-    kinds={  # nothing is as fine as the tolerance below
-        "z": replace(LOGITS, free=("thousandths",)),
-        "y": SMOOTHED_PIXELS["y"],
-        "s": replace(SMOOTHED_PIXELS["s"], free=("float16",)),
-    },
+    kinds=SMOOTHED_PIXELS | {"s": replace(SMOOTHED_PIXELS["s"], free=("float16",))},  # as fine as the tolerance below
     inputs=SMOOTHED_DRAWS,
     by_hand=(
         (np.zeros((1, 4)), np.array([2], np.uint8), 0.0),
@@ -44,6 +39,7 @@ QUESTION = Question(
         (TOY[None], np.array([1], np.uint8), 0.0),
         (TOY[None], np.array([0], np.uint8), 0.3),
         (np.array([[-2.0, 1.0]]), np.array([0], np.uint8), 0.0),
+        (np.array([[4.9e-4, -4.9e-4]]), np.array([0], np.uint8), 0.99),
         (SURE, np.array([0, 2], np.uint8), 0.1),  # the darker pixel counts: one maximum for both is not enough
         _AT_SIZE,
     ),

@@ -26,9 +26,9 @@ def votes_loss(votes, instances, beta):
 ONE_ROW = np.array([[3, 3, 3, 0, 255]], np.uint8)
 
 
-def _many_things(rng, shape, size, beta):
-    """Draw votes of a size, as many things as bytes number, in a picture of a shape, and beta from a range."""
-    instances = rng.permutation(np.resize(np.arange(256), np.prod(shape))).reshape(shape)
+def _scattered_things(rng, shape, size, beta, numbers=(0, 1, 9, 128, 254, 255)):
+    """Draw votes of a size, scattered things of some numbers in a picture of a shape, and beta from a range."""
+    instances = rng.permutation(np.resize(numbers, np.prod(shape))).reshape(shape)
     votes = np.clip(size * rng.normal(size=(*shape, 2)), -1e6, 1e6)
     return votes, instances.astype(np.uint8), float(rng.uniform(*beta))
 
@@ -45,13 +45,13 @@ QUESTION = Question(
     inputs=(
         random_votes,
         random_votes,
-        partial(_many_things, shape=(1, 2 * LONG), size=500.0, beta=(600.0, 1000.0)),
-        partial(_many_things, shape=(2 * LONG, 1), size=5e5, beta=(10.0, 1000.0)),
-        partial(_many_things, shape=(20, 20), size=0.1, beta=(0.01, 0.011)),
+        partial(_scattered_things, shape=(1, LONG), size=500.0, beta=(600.0, 1000.0), numbers=range(256)),
+        partial(_scattered_things, shape=(LONG, 1), size=5e5, beta=(10.0, 1000.0)),
+        partial(_scattered_things, shape=(20, 20), size=0.1, beta=(0.01, 0.011)),
     ),
     by_hand=(
         (np.zeros((1, 3, 2)), np.array([[3, 3, 3]], np.uint8), 2.0),
-        (np.array([[[0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
+        (np.array([[[-0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
         (np.zeros((1, 5, 2)), ONE_ROW, 2.0),
         (np.array([[[1.0, 0.0], [3.0, 4.0], [-1.0, 0.0], [9.0, 9.0], [9.0, 9.0]]]), ONE_ROW, 2.0),
         (np.ones((2, 6, 2)) * [2.0, -1.0], TOUCHING, 1.0),

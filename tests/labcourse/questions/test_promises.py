@@ -102,7 +102,7 @@ def test_what_no_case_tells_is_named_and_what_no_answer_depends_on_is_declared()
     found = [
         *Trial(replace(SPACE, kinds={"x": kinds.array("3", 0.0, free=("0 at *", "bytes"))}, **positive), 8).unnoticed()
     ]
-    assert "x: 0 at [1] is declared to be free, and cases tell it" in found and "x: bytes" not in " ".join(found)
+    assert "x: 0 at [1] is declared to be free, and a case tells it" in found and "x: bytes" not in " ".join(found)
     assert not [simple for simple in found if "|x|" in simple], "no number of the kind is negative"
 
 
