@@ -43,7 +43,7 @@ class Kind:
     choices: tuple = ()
     says: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
-    digits: int = 4
+    digits: int = 7
 
     @property
     def axes(self) -> tuple[str, ...]:
