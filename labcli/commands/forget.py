@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from labcli.commands.options import of_course
+from labcli.commands.options import needs_linux, of_course
 
 
 def forget(
@@ -15,6 +15,7 @@ def forget(
     ] = Path("."),
 ) -> None:
     """Remove a student from submissions, grades, gradebook, roster and extensions, and say where that was."""
+    needs_linux("forget")
     from labgrader.grade_course import private
     from labgrader.report.forget import forget as forget_student
 

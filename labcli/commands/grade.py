@@ -1,12 +1,11 @@
 """`labkit grade`: submissions of a lab, in a sandbox."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from labcli.commands.options import of_course
+from labcli.commands.options import needs_linux, of_course
 
 
 def grade(
@@ -49,8 +48,7 @@ def grade(
     """Grade submissions of a lab in a sandbox; exit status 1 if something needs a look, 2 if it could not be done."""
     import os
 
-    if sys.platform != "linux":
-        raise ValueError(f"labkit grade needs Linux, this is {sys.platform}: grade on Linux, in WSL or in a container")
+    needs_linux("grade")
     from labgrader.grade.changes import change_of
     from labgrader.grade_course import grade_course
     from labgrader.report.second_look import second_look

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from labcli.commands.options import of_course, tell_written
+from labcli.commands.options import needs_linux, of_course, tell_written
 
 
 def grades(
@@ -21,6 +21,7 @@ def grades(
 
     Exit status 1 if somebody is still to be graded by hand; it says in what.
     """
+    needs_linux("grades")
     from labgrader.grade_course import private
     from labgrader.report.course_page import FOLDER, write_course
     from labgrader.report.gradescope import write_autograder

@@ -1,5 +1,6 @@
 """Options that several commands share, and how they say what they wrote."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -32,6 +33,13 @@ def of_course(folder: Path) -> Path:
 
     use(folder)
     return folder
+
+
+def needs_linux(command: str) -> None:
+    """Raise ValueError unless this is Linux, whose kernel keeps submissions apart."""
+    if sys.platform != "linux":
+        where = "use Linux, WSL or a container"
+        raise ValueError(f"labkit {command} needs Linux, and this is {sys.platform}: {where} (docs/install.md)")
 
 
 def tell_written(paths: list[Path]) -> None:

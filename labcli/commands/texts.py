@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from labcli.commands.options import of_course
+from labcli.commands.options import needs_linux, of_course
 
 
 def texts(
@@ -16,6 +16,7 @@ def texts(
     port: Annotated[int, typer.Option(help="Port of the page; a free one if not given.", min=0, max=65535)] = 0,
 ) -> None:
     """Grade answers in words in a browser, all students' answers to a question on one page, without names."""
+    needs_linux("texts")
     from labgrader.grade_course import private
     from labgrader.handin.reading import read_lab
     from labgrader.report.texts_server import TextsServer

@@ -170,7 +170,8 @@ def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(thread_name_prefix="grasps")
 
 
-os.register_at_fork(after_in_child=_threads.cache_clear)  # a child process has none of its parent's threads
+if hasattr(os, "register_at_fork"):  # Windows has no fork
+    os.register_at_fork(after_in_child=_threads.cache_clear)  # a child process has none of its parent's threads
 
 
 def top_down_grasp(
