@@ -243,3 +243,15 @@ def arctan_of_the_quotient(Sigma, now, how):
 @wrong("Modulo pi / 2 takes closing along x for closing along y: which turn brings an axis back to itself?")
 def modulo_a_right_angle(Sigma, now):
     return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) % (np.pi / 2)
+
+
+@wrong(FEW_TURNS, turns=((-1, 0, 1), (-2, -1, 0, 1, 2), (0, 1), (-1, 0)))
+def fixed_half_turns_from_0(Sigma, now, turns):
+    yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) % np.pi
+    return min((yaw + turn * np.pi for turn in turns), key=lambda angle: abs(angle - now))
+
+
+@wrong("`now` is in radians, and radians are asked for: where do degrees come in?", nearest=(False, True))
+def in_degrees(Sigma, now, nearest):
+    yaw = np.degrees(yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]))
+    return yaw + 180 * np.round((now - yaw) / 180) if nearest else yaw

@@ -154,3 +154,17 @@ def closing_made_level_and_x_a_unit(position, approach, closing):
 def approach_left_long(position, approach, closing):
     y = unit(closing - (closing @ approach) / (approach @ approach) * approach)
     return pose(np.cross(y, approach), y, approach, position)
+
+
+@wrong("QR gives each direction but for its sign: does your z point along the approach, or against it?", sign=(1, -1))
+def directions_of_any_sign(position, approach, closing, sign):
+    Q, _ = np.linalg.qr(np.column_stack([approach, closing]))
+    z, y = sign * Q[:, 0], Q[:, 1]
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("The hand may come from below as well: which z has an approach that points up?")
+def always_downwards(position, approach, closing):
+    z = unit(approach) * (1.0 if approach[2] <= 0.0 else -1.0)
+    y = unit(closing - (closing @ z) * z)
+    return pose(np.cross(y, z), y, z, position)

@@ -194,3 +194,13 @@ def edges_left_out(P, T_base_grasp, half):
 def one_edge_alone(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[x <= half])
+
+
+@wrong("The hand may lean: its pads need not be level. Which number of the x axis is left out?", by_yaw=(False, True))
+def pads_taken_as_level(P, T_base_grasp, half, by_yaw):
+    _, y, _ = in_grasp(P, T_base_grasp)
+    pads = T_base_grasp[:2, 0]
+    if by_yaw:
+        yaw = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1])
+        pads = np.array([-np.sin(yaw), np.cos(yaw)])
+    return middle_and_width(y[np.abs((P - T_base_grasp[:3, 3])[:, :2] @ pads) <= half])

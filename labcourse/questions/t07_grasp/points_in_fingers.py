@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcourse.kinds import array, poses, rotation
+from labcourse.kinds import array, number, poses, rotation
 from labcourse.questions.t07_grasp import (
     FACING_X,
     FROM_BELOW,
@@ -74,7 +74,7 @@ QUESTION = Question(
     kinds={
         "P": array("N 3", **PLACES, lengths={"N": (0, None)}, says=("N may be 0", WITHIN), free=("reversed along N",)),
         "T_base_grasp": poses(free=(LAST_ROW,)),
-        "width": LENGTH,
+        "width": number(0.01, 1.0, says="0.01 to 1"),
         "half": LENGTH,
         "thickness": LENGTH,
         "tips": LENGTH,
@@ -88,7 +88,8 @@ QUESTION = Question(
         (np.tile(_IN + _OUT, (300, 1)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # as many points as a cloud has
         *((moved(_BESIDE, T).T.round(6), T, 0.48, 0.22, 0.28, 0.12) for T in (FROM_BELOW, TURNED, TURNED_OVER)),
         (np.array([[0.0, 0.6, 0.0], [0.0, 0.4, 0.0]]), np.diag([-1.0, 1.0, -1.0, 1.0]), 1.0, 0.25, 0.25, 0.1),
-        (np.array([[2.0, 1.0, 0.5], [2.0, 1.0, 0.375]]), FACING_X, 0.0, 0.0, 0.0, 0.0),  # all it has is one point
+        (np.array([[2.125, 1.0, 0.5], [2.0, 1.0, 0.375]]), FACING_X, 0.25, 0.0, 0.0, 0.0),  # lines for fingers
+        (np.array([[2.0075, 1.0, 0.5], [2.0, 1.0, 0.5]]), FACING_X, 0.01, 0.1, 0.1, 0.1),  # hardly open
         (moved(_FAR, _HIGH_UP).T, _HIGH_UP, 1.0, 1.0, 1.0, 1.0),  # the largest numbers
         *((moved(_CLOSE, _HALF_OFF).T, _HALF_OFF, *boxes) for boxes in _FINE),  # few digits do not hold these
     ),
@@ -133,7 +134,7 @@ def below_the_tips_alone(P, T_base_grasp, width, half, thickness, tips):
 @wrong("There are two fingers, at y and at -y.")
 def one_finger(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
-    return in_boxes(x, np.maximum(y, 0.0), z, width, half, thickness, tips)
+    return in_boxes(x, np.where(y >= 0.0, y, np.nan), z, width, half, thickness, tips)
 
 
 @wrong("What stands between the pads is what you want to hold: it is not in the way.")
@@ -202,3 +203,9 @@ def or_after_and(P, T_base_grasp, width, half, thickness, tips, first):
     out, near = first * y - width / 2, (np.abs(x) <= half) & (z <= tips)
     other = -first * y - width / 2
     return int((((out >= 0.0) & (out <= thickness)) | ((other >= 0.0) & (other <= thickness) & near)).sum())
+
+
+@wrong("The hand may lean: its pads need not be level. Which number of the x axis is left out?")
+def pads_taken_as_level(P, T_base_grasp, *boxes):
+    _, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes((P - T_base_grasp[:3, 3])[:, :2] @ T_base_grasp[:2, 0], y, z, *boxes)

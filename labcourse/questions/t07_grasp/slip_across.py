@@ -122,3 +122,9 @@ def with_signs(T_base_grasp, middle):
 def middle_taken_as_it_is(T_base_grasp, middle):
     x, y = T_base_grasp[:3, 0], T_base_grasp[:3, 1]
     return 1000 * abs(middle @ y), 1000 * abs(middle @ x)
+
+
+@wrong("The hand may lean: its pads need not be level. Which number of the x axis is left out?")
+def pads_taken_as_level(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    return np.abs(off @ T_base_grasp[:3, 1]), np.abs(off[:2] @ T_base_grasp[:2, 0])

@@ -78,6 +78,11 @@ def metres(numbers):
     return np.where(numbers > 0, numbers * 0.001, np.nan)
 
 
+@wrong("A metre has 1000 millimetres: by what do you divide, or multiply?", factor=(0.01, 0.1, 1.0, 10.0))
+def another_unit(data, height, width, step, is_bigendian, factor):
+    return 1000 * factor * decode_depth(data, height, width, step, is_bigendian)
+
+
 @wrong("From the second row on the image slides sideways: at which byte does row r begin?")
 def padding_as_pixels(data, height, width, step, is_bigendian):
     pixels = data[: 2 * height * width]

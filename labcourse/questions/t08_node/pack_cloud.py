@@ -65,7 +65,7 @@ def finite(P):
 
 def packed(P, kind="<f4", padding=4):
     """Rows of x, y, z in a number type, each with padding behind it."""
-    rows = np.ascontiguousarray(P, kind).view(np.uint8).reshape(len(P), -1)
+    rows = np.ascontiguousarray(P, kind).view(np.uint8).reshape(len(P), 3 * np.dtype(kind).itemsize)
     return np.hstack([rows, np.zeros((len(P), padding), np.uint8)])
 
 

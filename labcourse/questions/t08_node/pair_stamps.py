@@ -96,6 +96,12 @@ def pairs(a, b, slop, distance):
     return np.where(mutual & (apart.min(axis=1) <= slop), best, -1)
 
 
+@wrong("b may be empty: what is argmin of nothing? And two of a may not share a partner: whose nearest is it?")
+def one_partner_for_two_and_some_b(a, b, slop):
+    apart = np.abs(a[:, None] - b[None, :])
+    return np.where(apart.min(axis=1) <= slop, apart.argmin(axis=1), -1)  # raises if b is empty
+
+
 @wrong("Two stamps of a have the same partner. Is each of the two stamps in a pair the nearest of the other?")
 def one_partner_for_two(a, b, slop):
     return np.concatenate([pair_stamps(alone, b, slop) for alone in a[:, None]])

@@ -226,6 +226,24 @@ def stamps_in_seconds(stamps, positions, quaternions, t):
         return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
 
 
+@wrong("The turns are right. np.interp makes floats of stamps, which keep 16 of 19 digits: what do you subtract first?")
+def places_by_floats(stamps, positions, quaternions, t):
+    place = np.array([np.interp(t, stamps, column, np.nan, np.nan) for column in positions.T])
+    unknown = np.isnan(place).any()
+    return place, np.full(4, np.nan) if unknown else pose_at(stamps, positions, quaternions, t)[1]
+
+
+@wrong("A float keeps 16 of a stamp's 19 digits, so that two stamps may become one: what can be subtracted first?")
+def share_of_floats(stamps, positions, quaternions, t):
+    if outside(stamps, t):
+        return outside(stamps, t)
+    i = neighbours(stamps, t)[0]
+    before, after = float(stamps[i]), float(stamps[i + 1])
+    share = (float(t) - before) / (after - before)  # raises if they have become one
+    a, b = quaternions[i], quaternions[i + 1]
+    return (1 - share) * positions[i] + share * positions[i + 1], arc(a, nearer(a, b), 1 - share, share)
+
+
 @wrong("The places are right. The turn is that of a published pose: which turn lies between the two poses?")
 def turn_of_the_one_before(*given):
     return with_turn(*given, lambda a, b, share: b if share >= 1 else a)

@@ -43,7 +43,7 @@ _TILTED = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 def _star(mean, scale, first):
     """A piece near the mean, first or last, and others round it on six sides: with any other mean another one is it."""
-    off = np.vstack([[[0.1, -0.1, 0.05]], np.eye(3), -np.eye(3)])
+    off = np.vstack([[[0.1, -0.1, 0.05]], np.diag([1.0, 1.1, 1.2]), np.diag([-1.3, -1.4, -1.5])])
     return mean + scale * off[:: 1 if first else -1], mean, _OBLIQUE * scale**2, np.ones(7, bool)
 
 
@@ -184,7 +184,7 @@ def covariance_without_its_inverse(features, mean, covariance, allowed):
     return chosen(((features - mean) @ covariance * (features - mean)).sum(axis=1), allowed)
 
 
-@wrong("What is the covariance for? Area and hue have units of their own, and your distance adds them up.")
+@wrong("What is the covariance for? Area and elongation have units of their own, and your distance adds them up.")
 def euclidean(features, mean, covariance, allowed):
     return chosen(((features - mean) ** 2).sum(axis=1), allowed)
 

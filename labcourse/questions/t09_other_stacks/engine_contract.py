@@ -107,7 +107,7 @@ def kept_upwards_alone(reference, other, tolerance):
     return (other - reference).max() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
 
-@wrong("NaN is neither above nor below: is a comparison with it true the way you ask?")
+@wrong("NaN keeps no contract, and is neither above nor below a number: which step of yours lets it through?")
 def kept_unless_above(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance
     return not broken.any(), *engine_contract(reference, other, tolerance)[1:]
@@ -165,7 +165,7 @@ def nan_for_the_worst(reference, other, tolerance):
     return kept, *nan_for_the_best(reference, np.where(np.isnan(other), -np.inf, other), tolerance)[1:]
 
 
-@wrong("NaN is neither above nor below: is a comparison with it true the way you ask?")
+@wrong("NaN keeps no contract, and is neither above nor below a number: which step of yours lets it through?")
 def kept_unless_above_and_nan_for_the_best(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance
     return not broken.any(), *nan_for_the_best(reference, other, tolerance)[1:]

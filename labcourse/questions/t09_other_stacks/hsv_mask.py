@@ -209,8 +209,54 @@ def all_along_the_rows(hsv, lower, upper):
     return inside(hsv, lower, upper).all(axis=0)
 
 
-@wrong("A hue that equals a bound is inside: what does your `not` make of `>=` and `<=` there?")
+@wrong("Where the hue goes round, one that equals a bound is inside, too: does yours leave the bounds out there?")
 def not_between_the_bounds(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     above, below = h >= lower[0], h <= upper[0]
     return (above & below if lower[0] <= upper[0] else ~((h >= upper[0]) & (h <= lower[0]))) & rest
+
+
+@wrong(
+    "170 to 10 is no range from 170 to 190 in your picture: a hue begins again at 0. Which hues are inside from 0 on?",
+    kind=(int, np.uint8),
+)
+def upper_hue_beyond_the_circle(hsv, lower, upper, kind):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    with np.errstate(over="ignore"):
+        above = upper[0].astype(kind) + kind(180) if lower[0] > upper[0] else upper[0]
+    return (h >= lower[0]) & (h <= above) & rest
+
+
+@wrong("You move a bound by 180, from 170 to -10. A hue of 175 stays where it is: is it inside in yours?")
+def lower_hue_below_0(hsv, lower, upper):
+    h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
+    low = int(lower[0]) - 180 * (lower[0] > upper[0])
+    return (h >= low) & (h <= upper[0]) & rest
+
+
+@wrong(
+    "Turned by 90, the circle still has an end, at hue 90: and is 170 + 90 a byte? Which ranges go across that end?",
+    kind=(int, np.uint8),
+)
+def circle_turned_by_half(hsv, lower, upper, kind):
+    h, (low, high) = hsv[..., 0].astype(int), (kind(lower[0]), kind(upper[0]))
+    if low > high:
+        with np.errstate(over="ignore"):
+            low, high = (low + kind(90)) % 180, (high + kind(90)) % 180
+        h = (h + 90) % 180
+    return (h >= low) & (h <= high) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong("From 170 to 10 are 20 steps round the circle, not 160: how far is it from the middle to a bound there?")
+def half_width_without_the_circle(hsv, lower, upper):
+    low, high = int(lower[0]), int(upper[0])
+    middle = ((low + high) / 2 + 90 * (low > high)) % 180
+    off = np.abs(hsv[..., 0] - middle)
+    near = np.minimum(off, 180 - off) <= abs(high - low) / 2
+    return near & between(hsv, lower, upper)[..., 1:].all(axis=-1)
+
+
+@wrong("A saturation or a value that equals its bound is inside, as in OpenCV: do you ask with < or with <=?")
+def strict_but_for_the_hue(hsv, lower, upper):
+    hue = inside(hsv, lower, upper)[..., 0]
+    return hue & ((hsv[..., 1:] > lower[1:]) & (hsv[..., 1:] < upper[1:])).all(axis=-1)
