@@ -24,7 +24,7 @@ from labcli.evaluate_folder import TrueThings, judge
 from labkit.frame import RGBDFrame
 from labkit.instance_metrics import pool, score_instances
 from labkit.learning.network import load_model, weights_path, with_things
-from labkit.learning.things import find_things
+from labkit.learning.things import segment_instances
 from labtrain import augment_depth
 from labtrain.training import THINGS_RECIPE, train
 
@@ -41,7 +41,7 @@ def as_it_is(first, *rest, **how):
 LEFT_OUT: dict[str, tuple[str, ...]] = {  # the parts of the augmentation that a training goes without
     "all": (),
     "no paint": ("painted",),
-    "no noise": ("random_sensor", "random_calibration", "hidden_things", "bent", "without_depth"),
+    "no noise": ("random_sensor", "random_calibration", "hidden_things", "random_bend", "random_depth_loss"),
     "one size": ("random_size",),
     "no heaps": (),
 }
@@ -61,7 +61,7 @@ def main(scenes: str = "data", photographs: str = str(PHOTOGRAPHS)) -> str:
             config = replace(THINGS_RECIPE, steps=STEPS, seed=3)
             train(data_gen.Joined(chosen), None, config, out, model=model)
             network = load_model(Path(out) / "unet_rgbd.pt")
-        lines.append([name, *scores(partial(find_things, network, sizes=()), clutter, Path(photographs))])
+        lines.append([name, *scores(partial(segment_instances, network, sizes=()), clutter, Path(photographs))])
     return table("training | tables: as one piece | foreground IoU | overhead, on the board | bin | clutter", lines)
 
 

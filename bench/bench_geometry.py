@@ -17,11 +17,11 @@ from bench.measure import in_turns, table
 from labkit.geometry import (
     back_project,
     back_project_to_base,
-    backproject_to_base,
-    cluster,
+    cluster_indices,
+    inlier_indices,
     invert_transform,
+    masked_cloud_to_base,
     principal_axes,
-    remove_outliers,
 )
 from labkit.sim.spec import Camera
 
@@ -136,19 +136,23 @@ def frame_table() -> str:
 def cloud_table() -> str:
     """Turn the points of three targets into three clouds in every way."""
     depth, mask, K, T_base_cam = scene(320, 240)
-    P = backproject_to_base(mask, depth, K, T_base_cam, 2)
+    P = masked_cloud_to_base(mask, depth, K, T_base_cam, 2)
+
+    def clouds(P):
+        P = P[inlier_indices(P, RADIUS, MIN_NEIGHBOURS)]
+        return [P[group] for group in cluster_indices(P, GAP)]
 
     def whole():
         points = back_project_to_base(depth, K, T_base_cam)[mask == 2]
-        return [principal_axes(cloud) for cloud in cluster(remove_outliers(points, RADIUS, MIN_NEIGHBOURS), GAP)]
+        return [principal_axes(cloud) for cloud in clouds(points)]
 
     ways = {
-        "labkit, remove_outliers and cluster": lambda: cluster(remove_outliers(P, RADIUS, MIN_NEIGHBOURS), GAP),
+        "labkit, inlier_indices and cluster_indices": lambda: clouds(P),
         "SciPy, k-d trees and connected_components": lambda: with_scipy(P),
         "Open3D remove_radius_outlier and cluster_dbscan": lambda: clouds_with_open3d(P),
         "labkit, all geometry of a frame: depth to three clouds with axes": whole,
     }
-    expected = [len(cloud) for cloud in ways["labkit, remove_outliers and cluster"]()]
+    expected = [len(cloud) for cloud in ways["labkit, inlier_indices and cluster_indices"]()]
     assert len(expected) == 3
     assert [len(cloud) for cloud in with_scipy(P)] == expected
     return against_the_first(f"320x240, three targets, {len(P)} points in all", ways, {})

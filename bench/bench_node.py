@@ -52,7 +52,7 @@ def memory() -> str:
     """Resident memory over many frames of several scenes, by tenths."""
     frames = [render(sample_scene(seed, "test"), (80, 60)) for seed in range(700_000, 700_010)]
     bus = Bus()
-    node, camera = SegmentationNode(Pipeline(load_model(weights_path("smallsegnet")), mirror=False), bus), Camera(bus)
+    node, camera = SegmentationNode(Pipeline(load_model(weights_path("smallsegnet")), flip_tta=False), bus), Camera(bus)
     resident = []
     for number in range(FRAMES):
         camera.publish(frames[number % len(frames)], 33_000_000 * number)

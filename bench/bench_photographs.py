@@ -30,7 +30,8 @@ from labcli.perceive import perceive
 from labkit.instance_metrics import pool, score_instances
 from labkit.labels import IGNORE
 from labkit.learning.network import load_model, weights_path
-from labkit.pipeline import Pipeline, anything
+from labkit.learning.things import instance_finder
+from labkit.pipeline import Pipeline
 
 PHOTOGRAPHS = Path(__file__).resolve().parents[2] / "shared" / "real"
 
@@ -38,10 +39,10 @@ PHOTOGRAPHS = Path(__file__).resolve().parents[2] / "shared" / "real"
 def main(photographs: Path = PHOTOGRAPHS, weights: str = "unet_rgbd") -> str:
     """Score each way on a folder's frames; returns the tables. weights: of a network that tells things apart."""
     network = load_model(weights_path(weights))
-    apart = anything(network)
+    apart = instance_finder(network)
     ways = {  # the finder of things, and what plans grasps of its targets
-        "`unet_rgbd`, target or obstacle": (things_by_class(network), Pipeline(network, workspace=None)),
-        "`unet_rgbd`, its things": (apart, Pipeline(find_objects=apart, workspace=None)),
+        "`unet_rgbd`, target or obstacle": (things_by_class(network), Pipeline(network, workspace="table")),
+        "`unet_rgbd`, its things": (apart, Pipeline(find_objects=apart, workspace="table")),
     }
     with TemporaryDirectory() as scratch:
         sets = {"tabletop": with_outlines(photographs / "tabletop", Path(scratch))}

@@ -61,7 +61,7 @@ def score(model, seeds: Iterable[int], ways: dict[str, dict | None], method: str
     scores = {name: Score() for name in ways}
     for seed in seeds:
         frame = render(sample_scene(seed, "test"))
-        probabilities = open_engine(model)(frame.rgb, mirror=True)
+        probabilities = open_engine(model)(frame.rgb, flip_tta=True)
         for name, options in ways.items():
             start = time.process_time()
             if options is None:

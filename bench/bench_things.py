@@ -17,7 +17,7 @@ import data_gen
 from bench.measure import table
 from labkit.instance_metrics import pool, score_instances
 from labkit.learning.network import load_model, weights_path
-from labkit.learning.things import find_things
+from labkit.learning.things import segment_instances
 from labkit.metrics import reliability_counts
 
 SEEDS, CONFIGS = range(810_000, 810_020), ("clutter", "bin")
@@ -29,7 +29,7 @@ def main(picture: str = "", weights: str = "unet_rgbd") -> str:
     rows, counts = [], np.zeros((10, 3))
     for config in CONFIGS:
         frames = [data_gen.render(data_gen.sample_scene(seed, config)) for seed in SEEDS]
-        seen = [find_things(network, frame) for frame in frames]
+        seen = [segment_instances(network, frame) for frame in frames]
         s = pool([score_instances(f.instances, t.instances) for f, t in zip(frames, seen, strict=True)])
         share = f"{s.over_half} of {s.true} ({100.0 * s.over_half / s.true:.0f} %)"
         rows.append([config, share, s.found, f"{s.foreground_iou:.2f}"])

@@ -20,12 +20,13 @@ from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base
 from labkit.instance_metrics import InstanceScores, pool, score_instances
 from labkit.labels import OBSTACLE, TARGET
-from labkit.learning.things import Things
+from labkit.learning.things import Instances
 from labkit.metrics import wilson_interval
-from labkit.pipeline import Pipeline, separate_objects
+from labkit.pipeline import Pipeline
+from labkit.targets import separate_objects
 
 # The number of the thing at each pixel, 0 for none; or an object with such `instances`, as `Pipeline(find_objects)`.
-Finder = Callable[[RGBDFrame], Integer[np.ndarray, "H W"] | Things]
+Finder = Callable[[RGBDFrame], Integer[np.ndarray, "H W"] | Instances]
 HALF = 0.5  # of the picture: a larger thing is more likely a table, and the mask one of classes
 COLOURS = np.rint(255 * np.array(colormaps["tab20"].colors)).astype(np.uint8)
 

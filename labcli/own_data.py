@@ -58,7 +58,7 @@ class PictureFolder(Sequence):
             _say(f"{self.folder}: of all masks together, {said}")
         self.pictures, self.poses, self.size, why = [], [], None, ""
         counts = np.zeros(256, np.int64)
-        for color in tqdm(found, desc=f"checking {self.folder}", unit="picture", disable=not ranks.leads()):
+        for color in tqdm(found, desc=f"checking {self.folder}", unit="picture", disable=not ranks.is_main()):
             try:
                 frame = self._with_surface(on_table(self._read(color))[0])
             except (ValueError, OSError) as error:
@@ -140,5 +140,5 @@ class PictureFolder(Sequence):
 
 
 def _say(sentence: str) -> None:
-    if ranks.leads():
+    if ranks.is_main():
         tqdm.write(sentence, file=sys.stderr)

@@ -70,7 +70,7 @@ class NearTable:
     """What depth shows near the table's stated height, and the table in it.
 
     P: the points near its stated height, (N, 3); plane: the likeliest table, or the largest plane among them. table_z:
-    the stated height. rise: how far the plane lies over that; away: its median depth; metres. labels: those of the
+    the stated height. rise: how far the plane lies over that; distance: its median depth; metres. labels: those of the
     plane's pixels, if known.
     """
 
@@ -78,7 +78,7 @@ class NearTable:
     plane: Plane
     table_z: float
     rise: float
-    away: float
+    distance: float
     labels: UInt8[np.ndarray, "_"] | None
 
 
@@ -116,9 +116,9 @@ def _table(frame: RGBDFrame, perception) -> list[str]:
             said = f"only {share:.0%} of the points near the table's height lie on one plane"
             return [f"{said}: is it noise, or no table?"]
     rise = float(P[plane.inliers, 2].mean()) - table_z
-    away = float(np.median(frame.depth[thinned].reshape(-1)[near][plane.inliers]))
+    distance = float(np.median(frame.depth[thinned].reshape(-1)[near][plane.inliers]))
     labels = None if perception is None else perception.labels[thinned].reshape(-1)[near][plane.inliers]
-    table = NearTable(P, plane, table_z, rise, away, labels)
+    table = NearTable(P, plane, table_z, rise, distance, labels)
     wrong = [_off_the_pose(plane.normal, rise, table_z), _too_near_or_far(table)]
     wrong += [_not_the_likeliest(chosen, tables)]
     if any(wrong) or perception is None or perception.probabilities is None:
@@ -177,9 +177,11 @@ NEAREST, FAR = 0.2, 1.6  # metres from which, and up to which, depth cameras see
 
 
 def _too_near_or_far(table: NearTable) -> str:
-    if NEAREST < table.away < FAR:
+    if NEAREST < table.distance < FAR:
         return ""
-    return f"the table is {table.away:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
+    return (
+        f"the table is {table.distance:.2f} m away: is depth in another unit (depth_scale), or the plane not the table?"
+    )
 
 
 USUAL = {  # from least to most, of 200 scenes of the kinds train, any, test and hard
@@ -197,7 +199,7 @@ def _unlike_training(frame: RGBDFrame, table: NearTable) -> str:
         return ""
     saturation = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2HSV)[..., 1].mean()
     noise = 1000.0 * table.plane.residual
-    facts = zip(USUAL, (1000.0 * table.away / frame.K[0, 0], noise, frame.rgb.mean(), saturation), strict=True)
+    facts = zip(USUAL, (1000.0 * table.distance / frame.K[0, 0], noise, frame.rgb.mean(), saturation), strict=True)
     outside = [
         f"{value:.1f} {what} (training's are {USUAL[what][0]} to {USUAL[what][1]})"
         for what, value in facts

@@ -21,7 +21,7 @@ from labkit.node.segmentation import SegmentationNode
 from labkit.node.transforms import TransformTree
 from labkit.pipeline import Pipeline
 from labkit.support.validation import require
-from labros.wire import TYPES, Wire
+from labros.wire import TYPES, RosCodec
 
 STORAGES = {"mcap": rosbag2.StoragePlugin.MCAP, "sqlite3": rosbag2.StoragePlugin.SQLITE3}
 FOREVER = QosTime(0, 0)
@@ -44,7 +44,7 @@ class BagWriter(Transport):
             raise FileExistsError(17, "it is there already", str(self.path))
         self.path.parent.mkdir(parents=True, exist_ok=True)
         ros1 = self.path.suffix == ".bag"
-        self._wire = Wire(ros1)
+        self._wire = RosCodec(ros1)
         newest = {"version": 9, "storage_plugin": STORAGES[storage]}
         self._writer = rosbag1.Writer(self.path) if ros1 else rosbag2.Writer(self.path, **newest)
         self._connections, self.callbacks = {}, {}
@@ -79,7 +79,7 @@ class BagWriter(Transport):
         return topic in self.wants
 
 
-def process(
+def answer_bag(
     source,
     out,
     pipeline: Pipeline,
@@ -131,6 +131,6 @@ def _open(source: Path) -> AnyReader:
 
 def _messages(reader: AnyReader, connections):
     """Topic and message, in the order of recording; the error in place of a message that cannot be read."""
-    wire = Wire(ros1=not reader.is2)
+    wire = RosCodec(ros1=not reader.is2)
     for connection, _, data in reader.messages(connections) if connections else ():
         yield connection.topic, wire.decode_or_error(connection.msgtype, data)

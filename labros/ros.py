@@ -88,12 +88,12 @@ def run_ros_node(
     """
     from labkit.learning.network import load_model  # torch takes its time to import
 
-    require(version)
+    check_ros_installed(version)
     pipeline = Pipeline(load_model(weights_path, num_classes), table_z, target_class, crf=crf)
     options = {"topics": ROS_TOPICS} | options
     return run(lambda transport, _: SegmentationNode(pipeline, transport, **options), version=version)
 
 
-def require(version: int) -> None:
+def check_ros_installed(version: int) -> None:
     """Raise ModuleNotFoundError, which says what to install, if this version of ROS is missing."""
-    ros1.ros("rospy") if version == 1 else ros2.ros("rclpy")
+    ros1.import_ros("rospy") if version == 1 else ros2.import_ros("rclpy")

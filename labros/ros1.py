@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 from labkit.node.bus import Transport
 from labkit.node.messages import Message
-from labros.wire import TYPES, Wire
+from labros.wire import TYPES, RosCodec
 
 logger = logging.getLogger(__name__)
 DIST_PACKAGES = "/usr/lib/python3/dist-packages"
@@ -24,7 +24,7 @@ QUEUE = 10  # messages to a slow listener
 CHECK_SECONDS = 0.5  # how often the master is asked whether it still knows us
 
 
-def ros(module: str):
+def import_ros(module: str):
     """Import a module of ROS 1; raises ModuleNotFoundError that says what to install."""
     if importlib.util.find_spec(module.partition(".")[0]) is None and DIST_PACKAGES not in sys.path:
         sys.path.append(DIST_PACKAGES)
@@ -42,9 +42,9 @@ class Ros1Transport(Transport):
     """
 
     def __init__(self, name: str, arguments=()):
-        self._rospy, self._time_limit = ros("rospy"), socket.getdefaulttimeout()
+        self._rospy, self._time_limit = import_ros("rospy"), socket.getdefaulttimeout()
         self._rospy.init_node(name, argv=[name, *arguments], disable_signals=True)
-        self._wire = Wire(ros1=True)
+        self._wire = RosCodec(ros1=True)
         self._publishers, self._subscribers = {}, {}
         self._closing = threading.Event()
         self._keeper = threading.Thread(target=self._keep_registered, daemon=True)
@@ -53,7 +53,7 @@ class Ros1Transport(Transport):
     @classmethod
     def open(cls, name: str, stop: threading.Event, arguments=()) -> "Ros1Transport | None":
         """Join ROS as soon as a master answers; None if `stop` is set before. ROS sets it when it ends the node."""
-        uri = ros("rosgraph").get_master_uri()
+        uri = import_ros("rosgraph").get_master_uri()
         said = False
         while not stop.is_set():
             try:
@@ -67,7 +67,7 @@ class Ros1Transport(Transport):
         else:
             return None
         transport = cls(name, arguments)
-        ros("rospy").on_shutdown(stop.set)  # `rosnode kill`, or another node took this one's name
+        import_ros("rospy").on_shutdown(stop.set)  # `rosnode kill`, or another node took this one's name
         return transport
 
     def close(self) -> None:
@@ -120,14 +120,14 @@ class Ros1Transport(Transport):
 
     @functools.cache  # noqa: B019 - a process holds one transport
     def _message_class(self, name: str) -> type:
-        """A class of rospy that sends and receives a type's bytes as they are; `Wire` writes and reads them."""
+        """A class of rospy that sends and receives a type's bytes as they are; `RosCodec` writes and reads them."""
         text, checksum = self._wire.store.generate_msgdef(name, ros_version=1)
         told = {"_type": name.replace("/msg/", "/"), "_md5sum": checksum, "_full_text": text}
         return type(name.rpartition("/")[2], (self._rospy.AnyMsg,), told)
 
     def _keep_registered(self) -> None:
         name, uri = self._rospy.get_name(), self._rospy.get_node_uri()
-        master = xmlrpc.client.ServerProxy(ros("rosgraph").get_master_uri())
+        master = xmlrpc.client.ServerProxy(import_ros("rosgraph").get_master_uri())
         itself = xmlrpc.client.ServerProxy(uri)
         while not self._closing.wait(CHECK_SECONDS) and not self._rospy.is_shutdown():
             try:

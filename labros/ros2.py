@@ -1,8 +1,8 @@
 """The edge to ROS 2: a transport over rclpy (topic 08).
 
 rclpy comes from a sourced ROS 2, or from the unofficial wheels of `make ros2` (docs/ros2.md). Messages travel as bytes,
-which `Wire` reads and writes: that is faster than rclpy's own classes, and a message that cannot be read is an error of
-one message and not of a thread.
+which `RosCodec` reads and writes: that is faster than rclpy's own classes, and a message that cannot be read is an
+error of one message and not of a thread.
 """
 
 import importlib.util
@@ -17,7 +17,7 @@ from labkit.node.bus import Transport
 from labkit.node.messages import Message, Point, Transforms
 from labkit.support.validation import require
 from labros import ros2_types
-from labros.wire import TYPES, Wire
+from labros.wire import TYPES, RosCodec
 
 logger = logging.getLogger(__name__)
 STATIC = "tf_static"  # the last part of the topic whose messages a late listener must get, too
@@ -28,7 +28,7 @@ FAST_DDS_3, FAST_DDS_2 = "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROF
 MISSING = "rclpy is missing; ROS 2: source a distribution's setup file, or `make ros2` for wheels in .venv-ros2"
 
 
-def ros(module: str):
+def import_ros(module: str):
     """Import a module of ROS 2; raises ModuleNotFoundError that says where to get it."""
     try:
         return importlib.import_module(module)
@@ -54,19 +54,19 @@ class Ros2Transport(Transport):
     """
 
     def __init__(self, name: str, arguments=(), lifecycle: bool = False):
-        rclpy = ros("rclpy")
+        rclpy = import_ros("rclpy")
         set_up_shared_memory()
         self.quality()
-        self._wire = Wire(ros1=False)
+        self._wire = RosCodec(ros1=False)
         self._publishers, self._readers, self._services, self._numbers = {}, {}, {}, {}
         self._lost, self._refused = Counter(), {}
         self._optional = set()  # topics that nobody need publish
         self._publishing, self._closed = threading.Lock(), False
         self._context = rclpy.Context()
         self._context.init([name, *arguments])
-        create = ros("rclpy.lifecycle").LifecycleNode if lifecycle else rclpy.create_node
+        create = import_ros("rclpy.lifecycle").LifecycleNode if lifecycle else rclpy.create_node
         self.node = create(name, context=self._context)
-        self._executor = ros("rclpy.executors").SingleThreadedExecutor(context=self._context)
+        self._executor = import_ros("rclpy.executors").SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
@@ -126,7 +126,9 @@ class Ros2Transport(Transport):
         """Offer messages of the class `kind`; those of vision_msgs only where it is installed, since few have it."""
         if TYPES[kind].startswith("vision_msgs") and importlib.util.find_spec("vision_msgs") is None:
             return
-        events = ros("rclpy.event_handler").PublisherEventCallbacks(incompatible_qos=self._refuse(topic, "listener"))
+        events = import_ros("rclpy.event_handler").PublisherEventCallbacks(
+            incompatible_qos=self._refuse(topic, "listener")
+        )
         self._publishers[topic] = self.node.create_publisher(
             self._class(kind), topic, event_callbacks=events, **self._qos(topic, self._outputs)
         )
@@ -152,7 +154,7 @@ class Ros2Transport(Transport):
             self._count_lost(topic, info)
             callback(self._wire.decode_or_error(name, data))
 
-        events = ros("rclpy.event_handler").SubscriptionEventCallbacks(
+        events = import_ros("rclpy.event_handler").SubscriptionEventCallbacks(
             incompatible_qos=self._refuse(topic, "publisher")
         )
         # Transforms are small, and each is needed: nobody sends them with less than reliability.
@@ -179,7 +181,7 @@ class Ros2Transport(Transport):
             self._lost[topic] += max(0, number - last - 1)
 
     def _qos(self, topic: str, reliability: str) -> dict:
-        qos = ros("rclpy.qos")
+        qos = import_ros("rclpy.qos")
         static = topic.rpartition("/")[2] == STATIC
         durability = qos.DurabilityPolicy.TRANSIENT_LOCAL if static else qos.DurabilityPolicy.VOLATILE
         profile = qos.QoSProfile(
@@ -187,7 +189,7 @@ class Ros2Transport(Transport):
             reliability=qos.ReliabilityPolicy.get_from_short_key(reliability),
             durability=durability,
         )
-        overriding = ros("rclpy.qos_overriding_options").QoSOverridingOptions.with_default_policies()
+        overriding = import_ros("rclpy.qos_overriding_options").QoSOverridingOptions.with_default_policies()
         return {"qos_profile": profile, "qos_overriding_options": overriding}
 
     def resolve(self, topic: str) -> str:
@@ -225,7 +227,7 @@ class Ros2Transport(Transport):
 
     def on_restart(self, callback: Callable[[], None]) -> None:
         """Call `callback` whenever the time of /clock is set back, or begins to be followed."""
-        clock, duration = ros("rclpy.clock"), ros("rclpy.duration")
+        clock, duration = import_ros("rclpy.clock"), import_ros("rclpy.duration")
         threshold = clock.JumpThreshold(
             min_forward=None, min_backward=duration.Duration(nanoseconds=-1), on_clock_change=True
         )
@@ -247,7 +249,7 @@ class Ros2Transport(Transport):
         )
 
         def say(event) -> None:
-            policy = ros("rclpy.qos").qos_policy_name_from_kind(event.last_policy_kind).lower()
+            policy = import_ros("rclpy.qos").qos_policy_name_from_kind(event.last_policy_kind).lower()
             told = f"no messages pass, for a {peer} {does}: {policy}, here {ours} (see {option})"
             self._refused[topic] = told
             logger.warning("%s: %s", topic, told)
@@ -256,7 +258,7 @@ class Ros2Transport(Transport):
 
     def parameters(self, defaults: dict) -> dict:
         """Declare ROS parameters that are fixed at the start, with these defaults; returns their values."""
-        descriptor = ros("rcl_interfaces.msg").ParameterDescriptor(read_only=True, dynamic_typing=True)
+        descriptor = import_ros("rcl_interfaces.msg").ParameterDescriptor(read_only=True, dynamic_typing=True)
         found = {}
         for name, default in defaults.items():
             if not self.node.has_parameter(name):
@@ -273,7 +275,7 @@ class Managed:
     """
 
     def __init__(self, transport: Ros2Transport, build):
-        lifecycle = ros("rclpy.lifecycle")
+        lifecycle = import_ros("rclpy.lifecycle")
         self.transport, self.node = transport, None
         managed, done = self, lifecycle.TransitionCallbackReturn
 

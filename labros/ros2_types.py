@@ -1,4 +1,4 @@
-"""Message types that ROS 2 has and this machine has not: made from their names, for bytes that `Wire` reads and writes.
+"""Message types that ROS 2 has and this machine has not: made from their names, for the bytes of `RosCodec`.
 
 A sourced ROS 2 has every package of messages; the wheels from PyPI lack tf2_msgs. rclpy asks a message class for its
 "type support": a C structure that says what the type is called, and how a C message becomes bytes. The kit sends and

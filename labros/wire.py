@@ -55,10 +55,10 @@ VISION = {  # the types of vision_msgs 4 that rosbags lacks; ROS 1 has others of
 DIAGNOSED_BY = "labkit"  # the hardware_id of diagnostics: who says it
 
 
-class Wire:
+class RosCodec:
     """Translates between messages and bytes, for one of the two generations of ROS.
 
-    >>> wire = Wire(ros1=False)
+    >>> wire = RosCodec(ros1=False)
     >>> pose = Pose(Header(5, "base_link"), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
     >>> wire.decode("geometry_msgs/msg/PoseStamped", wire.encode(pose)) == pose
     True

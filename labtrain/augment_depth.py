@@ -144,14 +144,14 @@ def hidden_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     return replace(frame, depth=depth)
 
 
-def exposed(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+def random_exposure(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     """The picture at another exposure: too dark, too bright, or with other mid tones."""
     gamma, gain = np.exp(rng.uniform(np.log((0.6, 0.35)), np.log((2.2, 1.8))))
     tones = np.clip(255.0 * gain * (np.arange(256) / 255.0) ** gamma, 0.0, 255.0).astype(np.uint8)
     return replace(frame, rgb=cv2.LUT(frame.rgb, tones))
 
 
-def bent(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+def random_bend(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     """Depth with an error of 1 to 15 mm that changes over a third of the picture or more: nothing is quite plane.
 
     Lenses err so, and bins and worn tables are so.
@@ -161,7 +161,7 @@ def bent(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     return replace(frame, depth=np.where(frame.depth > 0.0, frame.depth + error, np.float32(0.0)))
 
 
-def without_depth(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
+def random_depth_loss(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     """Up to a third of the picture without depth: in ragged patches, or where it is darkest; sometimes black there.
 
     A scanner that gives a colour with each point alone gives none, which is black, where it has no point.
@@ -189,7 +189,7 @@ def varied_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     Painted, and some each of another exposure, with bent or missing depth, and of another size.
     """
     frame = painted(frame, rng, bands=BANDS)
-    for change, share in ((exposed, 0.4), (bent, 0.35), (without_depth, 0.35)):
+    for change, share in ((random_exposure, 0.4), (random_bend, 0.35), (random_depth_loss, 0.35)):
         frame = change(frame, rng) if rng.random() < share else frame
     return random_size(frame, rng, *SIZES) if rng.random() < 0.5 else frame
 

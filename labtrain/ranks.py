@@ -18,13 +18,13 @@ def env_int(name: str, alone: int = 0) -> int:
     return int(os.environ[name]) if dist.is_torchelastic_launched() else alone
 
 
-def leads() -> bool:
+def is_main() -> bool:
     """Whether this process writes files and prints: one does."""
     return env_int("RANK") == 0
 
 
 @contextmanager
-def joined(device: torch.device) -> Iterator[None]:
+def process_group(device: torch.device) -> Iterator[None]:
     """Meet the other ranks, and part from them at the end: over gloo, on GPUs also over NCCL."""
     if not dist.is_torchelastic_launched():
         yield
@@ -59,7 +59,7 @@ def share_of_batch(count: int) -> range:
     return range(count * rank // ranks, count * (rank + 1) // ranks)
 
 
-def spread(model: nn.Module) -> nn.Module:
+def wrap_ddp(model: nn.Module) -> nn.Module:
     """What to call in place of the model, so that its gradients are the means over ranks; its parts stay its own."""
     if rank_and_count()[1] == 1:
         return model

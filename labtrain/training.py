@@ -200,7 +200,7 @@ class Trainer:
         self.frozen = [part for part in parts if not any(weight.requires_grad for weight in part.parameters())]
         # A frozen network with a branch that tells things apart learns no classes, and need not give them.
         self.learns_classes = not self.things or model.logits not in self.frozen
-        self.call = ranks.spread(self.model)
+        self.call = ranks.wrap_ddp(self.model)
         self.optimiser = torch.optim.AdamW(
             [w for w in self.model.parameters() if w.requires_grad],
             lr=config.lr,
@@ -389,9 +389,9 @@ def train(
     Raises ValueError for data that do not fit, a checkpoint of another configuration, or a loss that is not a sum over
     pixels where one is needed: under torchrun, and to take class weights out again. Topics 03 and 05.
     """
-    out, where, progress = Path(out), choose_device(device), progress and ranks.leads()
+    out, where, progress = Path(out), choose_device(device), progress and ranks.is_main()
     model = fresh_model(config) if model is None else model
-    with ranks.joined(where):
+    with ranks.process_group(where):
         check_loss(loss, config, validated=val_set is not None)
         how = {"progress": progress, "depth": "geometry" in TorchEngine(model).takes.arrays}
         things = TorchEngine(model).things
@@ -445,7 +445,7 @@ def run(trainer: Trainer, val_data: ImagesInMemory | None, checkpoint: Path, pro
 
 def write_state(trainer: Trainer, checkpoint: Path) -> None:
     """Write all that another run needs to go on from here; the first rank does."""
-    if ranks.leads():
+    if ranks.is_main():
         write_checkpoint(checkpoint, trainer.state())
 
 
@@ -459,7 +459,7 @@ def finish_run(trainer: Trainer, val_data: ImagesInMemory, out: Path) -> None:
 
 def save_weights(model: nn.Module, trainer: Trainer, out: Path) -> None:
     """Write a model as the run's weights, with the last row of the history, and the history; the first rank does."""
-    if not ranks.leads():
+    if not ranks.is_main():
         return
     name = trainer.config.model
     save_model(model, out / f"{name}.pt", **trainer.history[-1], config=asdict(trainer.config))

@@ -27,7 +27,7 @@ KIT = distribution_of("labkit")
 # The rooms of labkit from the bottom up: each may import what stands left of it, itself, and `labkit`.
 ROOMS = (
     "support > labels > frame > geometry losses metrics instance_metrics crf > grasp learning > network > "
-    "notices > pipeline sim > node"
+    "notices targets > pipeline sim > node"
 )
 BELOW = {
     room: set(re.split(r"\W+", ROOMS.partition(layer)[0])) for layer in ROOMS.split(" > ") for room in layer.split()
@@ -44,8 +44,8 @@ PACKAGES = {
     "labcourse.stacks": {"labcourse.stacks", "labkit"},
     "labcli": {"labcli", "labkit", "labtrain", "labros", "labgrader", "labcourse", "data_gen"},
 }
-# `labkit.check` is the one door upwards, and opens when it is called; old addresses lead on from there.
-DOORS = {"labkit", "labkit.course"}
+# `labkit.check` is the one door upwards, and opens when it is called.
+DOORS = {"labkit"}
 
 
 def tracked(*patterns: str) -> list[Path]:
@@ -115,7 +115,7 @@ def test_what_judges_and_grades_knows_no_course():
 
 def test_the_library_imports_without_jupyter_and_without_the_simulator():
     """Nothing of the pipeline asks for Jupyter, and nothing but labkit.sim for PyBullet."""
-    library = [name for name in modules() if re.match(r"lab(kit(?!\.course|\.sim)|train|ros)\b", name)]
+    library = [name for name in modules() if re.match(r"lab(kit(?!\.sim)|train|ros)\b", name)]
     absent = ("pybullet", "IPython", "ipywidgets", "jupyterlab", "nbformat", "nbgrader", "traitlets", "onnx")
     code = f"import importlib, sys\nsys.modules.update(dict.fromkeys({absent}))\n"
     code += f"for name in {library}: importlib.import_module(name)"

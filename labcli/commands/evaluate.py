@@ -73,11 +73,11 @@ def _of_a_folder(folder: Path, model: str, things: bool, reading, json: Path | N
     from labcli import evaluate_folder as own
     from labcli.pictures import Reading
     from labkit.learning.network import load_model, weights_path
-    from labkit.pipeline import anything
+    from labkit.learning.things import instance_finder
     from labkit.support.files import write_atomically
 
     true, network = own.TrueThings(folder, Reading(*reading)), load_model(weights_path(model))
-    judged = own.judge(true, anything(network) if things else own.things_by_class(network))
+    judged = own.judge(true, instance_finder(network) if things else own.things_by_class(network))
     for sentence in true.said:
         typer.echo(sentence, err=True)
     typer.echo(own.table(judged, true.alone))

@@ -65,8 +65,8 @@ class Settings:
         from labcli.perceive import read_gripper, read_workspace
         from labkit.learning.engines import open_engine
         from labkit.learning.network import load_model, weights_path
+        from labkit.learning.things import instance_finder
         from labkit.pipeline import Pipeline
-        from labkit.pipeline import anything as things_of
 
         path = weights_path(self.model)
         model = path if path.suffix == ".onnx" else load_model(path)
@@ -78,10 +78,10 @@ class Settings:
                 None,
                 height,
                 self.target,
-                find_objects=things_of(open_engine(model, self.engine), self.mirror is not False),
+                find_objects=instance_finder(open_engine(model, self.engine), self.mirror is not False),
                 **planning,
             )
-        how = {"mirror": self.mirror, "engine": self.engine, "crf": self.crf}
+        how = {"flip_tta": self.mirror, "engine": self.engine, "crf": self.crf}
         return Pipeline(model, height, self.target, **how, **planning)
 
     def node(self, topics=None) -> dict:
@@ -95,7 +95,6 @@ class Settings:
         """
         from labcli.poses import read_pose
         from labkit.node.messages import DEFAULT_TOPICS
-        from labkit.support.validation import require
 
         topics = topics or DEFAULT_TOPICS
         for name, _, given in (item.partition("=") for item in self.topic or ()):
@@ -184,10 +183,10 @@ def bag(
     ] = False,
 ) -> None:
     """Answer the frames of a bag of ROS 1 or ROS 2, and write another; exit status 1 if no frame was answered."""
-    from labros.bags import process
+    from labros.bags import answer_bag
 
     options = settings.node()
-    counts = process(source, out, settings.pipeline(), probabilities=probabilities, storage=storage, **options)
+    counts = answer_bag(source, out, settings.pipeline(), probabilities=probabilities, storage=storage, **options)
     bad = f"{counts.lost} lost, {counts.failed} unusable, {counts.skipped} malformed messages"
     reasons = ", ".join(f"{reason} ({n})" for reason, n in counts.reasons.most_common(5))
     typer.echo(f"wrote {out}: {counts.answered} frames answered, {bad}" + (f": {reasons}" if reasons else ""))
@@ -209,7 +208,7 @@ def ros(
     seed: Seed = 0,
 ) -> None:
     """Run the node on ROS 2, or ROS 1, until SIGINT."""
-    from labros.ros import require, run
+    from labros.ros import check_ros_installed, run
 
     if (lifecycle or settings.on_demand) and ros1:
         raise ValueError("node: expected --lifecycle and --on-demand without --ros1, for they are ROS 2's")
@@ -218,7 +217,7 @@ def ros(
             f"node: expected options of `labkit node ros --help`, and ROS's behind --ros-args, got {arguments[0]}"
         )
     version = 1 if ros1 else 2
-    settings.node(), require(version)  # what is wrong or missing is said before anything else happens
+    settings.node(), check_ros_installed(version)  # what is wrong or missing is said before anything else happens
     frame = None
     if simulated:
         from data_gen import render, sample_scene

@@ -66,8 +66,8 @@ def perceive(
     from labcli.report import save
     from labkit.labels import TARGET
     from labkit.learning.network import load_model, weights_path
+    from labkit.learning.things import instance_finder
     from labkit.pipeline import Pipeline
-    from labkit.pipeline import anything as things_of
     from labkit.support.files import check_writable
 
     if plane is not None and camera_pose is not None:
@@ -85,14 +85,14 @@ def perceive(
     for sentence in (*shot.said, *said_of_pose):
         typer.echo(sentence)
     planning = {"gripper": own.read_gripper(gripper)}
-    planning["workspace"] = own.read_workspace(workspace) if workspace else None
+    planning["workspace"] = own.read_workspace(workspace) if workspace else "table"
     pixel = shot.pixel(*own.read_pixel(at)) if at else None
     labels, numbers, said = None, None, ""
     if mask is not None:
         pipeline = Pipeline(**planning)
         labels, numbers, said = own.read_mask(mask, shot, target, instances)
     elif anything:
-        pipeline = Pipeline(find_objects=things_of(load_model(weights_path(model))), **planning)
+        pipeline = Pipeline(find_objects=instance_finder(load_model(weights_path(model))), **planning)
     else:
         pipeline = Pipeline(
             load_model(weights_path(model)), target_class=TARGET if target is None else target, **planning

@@ -73,10 +73,10 @@ def train(
     try:
         history = training.train(train_set, val_set, config, out, resume, device, model=network, workers=workers)
     except KeyboardInterrupt as stop:  # it says where the checkpoint is
-        if ranks.leads():
+        if ranks.is_main():
             typer.echo(f"labkit: {stop}", err=True)
         raise typer.Exit(130) from stop
     last = history[-1]
     scores = f", validation mIoU {last['mean_iou']:.3f}" if "mean_iou" in last else ""
-    if ranks.leads():
+    if ranks.is_main():
         typer.echo(f"{out / f'{model}.pt'}: {last['epoch']} epochs, loss {last['loss']:.3f}{scores}")

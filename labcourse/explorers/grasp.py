@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 
 from labcourse.explorers.explorer import Explorer
 from labcourse.views import fingers
-from labkit.geometry import backproject_to_base
+from labkit.geometry import masked_cloud_to_base
 from labkit.grasp import Grasp, Gripper
 from labkit.labels import PALETTE, TARGET
 from labkit.sim.spec import Camera, ObjectSpec, Part, SceneSpec
@@ -127,7 +127,7 @@ def views(thing: str) -> tuple[list[np.ndarray], np.ndarray]:
     with World(SceneSpec((spec,), cameras[0], robot=False)) as world:
         frames = [world.render((120, 90), camera) for camera in cameras]
         centre = world.centre(thing)
-    return [backproject_to_base(f.labels, f.depth, f.K, f.T_base_cam, TARGET) for f in frames], centre
+    return [masked_cloud_to_base(f.labels, f.depth, f.K, f.T_base_cam, TARGET) for f in frames], centre
 
 
 def visible_centroid() -> Explorer:

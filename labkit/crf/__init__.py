@@ -4,7 +4,7 @@ energy       the Potts energy, and what a solver returns
 integers     the same energy in integers, so that bounds are proofs
 exact        enumeration: Z, marginals and MAP of tiny grids; no pairwise term; two classes by a minimum cut
 messages     TRW-S, which proves a lower bound, and ICM
-cuts         many classes by a sequence of cuts: expansion and swap moves
+cuts         many classes by a sequence of cuts: expansion moves
 persistency  labels that are provably best, so that little is left to solve
 mean_field   the closest distribution of independent pixels
 dense        a CRF in which all pixels are neighbours

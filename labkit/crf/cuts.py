@@ -1,16 +1,16 @@
-"""Many classes by a sequence of minimum cuts: expansion and swap moves.
+"""Many classes by a sequence of minimum cuts: expansion moves.
 
 Boykov, Veksler and Zabih 2001, "Fast approximate energy minimization via graph cuts", doi:10.1109/34.969114.
 
 For three classes and more the minimum is NP-hard to find. But the best of exponentially many small changes can be found
-by one cut: let every pixel choose between its label and alpha (expansion), or let the pixels of two labels choose
-between these (swap). When no move helps any more, the energy is within twice the optimum (expansion, Potts).
+by one cut: let every pixel choose between its label and alpha. When no class can expand any more, the energy is within
+twice the optimum (Potts).
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, cycle
+from itertools import cycle
 
 import numpy as np
 from jaxtyping import Bool, Integer
@@ -19,7 +19,7 @@ from labkit.crf.energy import MapResult, PottsCRF
 from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE, Graph, max_flow, new_forest
 from labkit.crf.messages import _trws
-from labkit.crf.move_kernels import RING, expansion_move, swap_move
+from labkit.crf.move_kernels import RING, expansion_move
 from labkit.support.validation import MAX_ITERATIONS, check_whole
 
 START_SWEEPS = 6
@@ -60,17 +60,6 @@ def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4)
     finish = _expansion(crf, integer, start.labels)
     best = min(start, finish, key=lambda result: result.energy)
     return replace(best, lower_bound=start.lower_bound, iterations=start.iterations + finish.iterations)
-
-
-def swap(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> MapResult:
-    """Minimise by swap moves, from the unary solution or from `labels`, until no two classes can improve by swapping.
-
-    iterations counts the moves tried (topic 02).
-    """
-    labels = crf.unary.argmin(axis=2) if labels is None else crf.check_labelling("labels", labels)
-    moves = Moves(quantise(crf), labels)
-    tried = try_in_turn([partial(moves.swap, *pair) for pair in combinations(range(crf.shape[2]), 2)])
-    return moves.result(crf, tried)
 
 
 def try_in_turn(moves: list[Callable[[], bool]]) -> int:
@@ -129,17 +118,7 @@ class Moves:
         self.labels[takes] = alpha
         return len(takes) > 0
 
-    def swap(self, alpha: int, beta: int) -> bool:
-        """Label the pixels of alpha and beta anew with these two, as is best; return whether the energy fell."""
-        present, flow, tree = self.cut(swap_move, (alpha, beta))
-        if flow == present:
-            return False
-        before = self.labels[self.nodes]
-        part = (before == alpha) | (before == beta)
-        self.labels[self.nodes[part]] = np.where(tree[part] == SOURCE, beta, alpha)
-        return True
-
-    def cut(self, question: Callable, *classes: int | tuple[int, int], near: int = NEAR):
+    def cut(self, question: Callable, *classes: int, near: int = NEAR):
         """Put a question of `move_kernels` to the free pixels: what it returns, the flow, and each pixel's tree."""
         integer = self.integer
         answer = question(

@@ -55,32 +55,6 @@ def expansion_move(unary, weights, step, labels, free, nodes, alpha, graph):
 
 
 @kernel
-def swap_move(unary, weights, step, labels, free, nodes, classes, graph):
-    """Ask each pixel of the two `classes` which of them it takes, the second being the source's side; all are free.
-
-    A plain minimum cut between these pixels; the others are left out, as whatever they disagree about stays. Returns
-    the value of the cut that stands for the present labels.
-    """
-    alpha, beta = classes
-    K = len(step)
-    capacity, excess = graph.capacity, graph.excess
-    present = 0
-    for n in nodes:
-        capacity[n] = 0
-        takes_part = labels[n] in (alpha, beta)
-        excess[n] = unary[n, alpha] - unary[n, beta] if takes_part else 0
-        present += max(-excess[n], 0) if labels[n] == beta else max(excess[n], 0)
-        if takes_part:
-            for k in range(K):
-                m = n + step[k]
-                if labels[m] in (alpha, beta):
-                    capacity[n, k] = pair_weight(weights, n, m, k, K)
-                    if 2 * k < K and labels[m] != labels[n]:
-                        present += capacity[n, k]
-    return present
-
-
-@kernel
 def persistency_test(unary, weights, step, labels, free, nodes, graph):
     """Ask which pixels keep their label in some best labelling: those beyond the source's side of the cut.
 

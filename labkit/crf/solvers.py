@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Num
 
-from labkit.crf.cuts import expansion, swap, trws_expansion
+from labkit.crf.cuts import expansion, trws_expansion
 from labkit.crf.energy import MapResult, PottsCRF, unary_from_probabilities
 from labkit.crf.exact import brute_force, min_cut, unary
 from labkit.crf.mean_field import mean_field
@@ -21,7 +21,6 @@ METHODS = {
     "icm": icm,
     "mean_field": mean_field,
     "expansion": expansion,
-    "swap": swap,
     "trws": trws,
     "trws+expansion": trws_expansion,
     "persistency": persistency,

@@ -169,23 +169,18 @@ def fit_plane(
 # ------------------------------------------------------------------------------------- outliers and separate objects
 
 
-def remove_outliers(
+def inlier_indices(
     P: Float[np.ndarray, "N 3"], radius: Scalar = 0.01, min_neighbours: int = 4
-) -> Float[np.ndarray, "M 3"]:
-    """Drop the points with fewer than `min_neighbours` other points within `radius` metres (radius outlier removal).
+) -> Integer[np.ndarray, "M"]:
+    """Find the points with at least `min_neighbours` others within `radius` metres: their indices in P, ascending.
 
-    Such points float between a surface and what is behind it, where a sensor mixed two depths in one pixel. `radius`
-    should span two or three pixels at the cloud's distance. The order is kept; an empty cloud stays empty.
+    Left out by this radius outlier removal is what floats between a surface and what is behind it, where a sensor mixed
+    two depths in one pixel. `radius` should span two or three pixels at the cloud's distance.
 
     >>> P = np.array([[0.0, 0.0, 0.0], [0.001, 0.0, 0.0], [0.5, 0.0, 0.0]])
-    >>> remove_outliers(P, radius=0.01, min_neighbours=1)[:, 0].tolist()
-    [0.0, 0.001]
+    >>> inlier_indices(P, radius=0.01, min_neighbours=1).tolist()
+    [0, 1]
     """
-    return P[inliers(P, radius, min_neighbours)]
-
-
-def inliers(P: Float[np.ndarray, "N 3"], radius: Scalar = 0.01, min_neighbours: int = 4) -> Integer[np.ndarray, "M"]:
-    """Find the points that `remove_outliers` keeps: their indices in P, ascending."""
     from labkit.support.geometry_kernels import count_neighbours, sort_into_cells
 
     P = _check_cloud("P", P)
@@ -197,24 +192,18 @@ def inliers(P: Float[np.ndarray, "N 3"], radius: Scalar = 0.01, min_neighbours: 
     return np.flatnonzero(keep)
 
 
-def cluster(P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 30) -> list[Float[np.ndarray, "_ 3"]]:
-    """Split a cloud into separate objects, the one with the most points first.
-
-    Two points belong together if a chain of points with steps of at most `gap` metres joins them (single linkage).
-    Groups of fewer than `min_points` are dropped as noise; within a group the order is kept. An empty cloud gives an
-    empty list.
-
-    >>> P = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.31, 0.0, 0.0]])
-    >>> [len(group) for group in cluster(P, gap=0.015, min_points=1)]
-    [2, 1]
-    """
-    return [P[group] for group in cluster_indices(P, gap, min_points)]
-
-
 def cluster_indices(
     P: Float[np.ndarray, "N 3"], gap: Scalar = 0.015, min_points: int = 30
 ) -> list[Integer[np.ndarray, "_"]]:
-    """Split a cloud as `cluster` does; for each object the indices of its points in P, ascending."""
+    """Split a cloud into separate objects, the one with the most points first: indices of their points in P, ascending.
+
+    Two points belong together if a chain of points with steps of at most `gap` metres joins them (single linkage).
+    Groups of fewer than `min_points` are dropped as noise. An empty cloud gives an empty list.
+
+    >>> P = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.31, 0.0, 0.0]])
+    >>> [group.tolist() for group in cluster_indices(P, gap=0.015, min_points=1)]
+    [[1, 2], [0]]
+    """
     from labkit.support.geometry_kernels import link_cells, sort_into_cells
 
     P = _check_cloud("P", P)

@@ -73,7 +73,7 @@ def back_project_to_base(
     return _back_project(depth, check_K("K", K), check_T("T_base_cam", T_base_cam))
 
 
-def backproject_to_base(
+def masked_cloud_to_base(
     mask: Integer[np.ndarray, "H W"],
     depth: Float[np.ndarray, "H W"],
     K: Real[np.ndarray, "3 3"],
@@ -86,7 +86,7 @@ def backproject_to_base(
     camera's own place. No such pixel gives an empty (0, 3) cloud.
 
     >>> mask, depth = np.array([[2, 2, 1]]), np.array([[0.5, 0.0, 0.5]])
-    >>> backproject_to_base(mask, depth, np.eye(3), np.eye(4), target_class=2).tolist()
+    >>> masked_cloud_to_base(mask, depth, np.eye(3), np.eye(4), target_class=2).tolist()
     [[0.0, 0.0, 0.5]]
     """
     depth = _check_depth_images(check_shape("depth", depth, (None, None)))

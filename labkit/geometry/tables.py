@@ -17,7 +17,8 @@ THICK = 0.012  # metres over or under a plane where no second one is looked for
 NARROW = 0.08  # metres: a plane whose outline is narrower is the face of a thing
 REACH = 1.6  # metres from the camera to the nearest tenth of a plane: further off nothing is grasped
 FLAT = 0.2  # sine of the angle between a plane and the sight, at least: of flatter ones little is seen
-SAME = 0.03, 0.9  # two planes less far apart (metres), and leaning less (cosine), are one surface
+SAME_HEIGHT = 0.03  # metres: two planes that are less far apart, and parallel, are one surface
+PARALLEL = 0.9  # cosine of the angle between two planes, at least
 STANDING = 0.012, 0.35  # metres over a table from which, and up to which, points belong to what stands on it
 LEVEL = 0.9  # cosine of the angle between a table and the horizon, if that is known
 CELL = 0.02  # metres: the grid on which a table's points hang together, over up to four cells that things hide
@@ -34,21 +35,21 @@ ABOVE = "stand well over the table, as on a shelf"
 class Table:
     """A plane that things may stand on.
 
-    plane: its normal points to the camera. T: (4, 4), maps points to the table's own frame, where z is the height over
-    it (`base_on_table`). outline: convex, (M, 2), x and y of that frame: where the table was seen. things: the share of
-    all points that belong to what stands on it. away: metres from the camera to its nearest tenth.
-    sine: of the angle between it and the line of sight.
+    plane: its normal points to the camera. T_table_frame: (4, 4), maps points of the frame that it was found in to the
+    table's own, where z is the height over it (`base_on_table`). outline: convex, (M, 2), x and y of that frame: where
+    the table was seen. things: the share of all points that belong to what stands on it. distance: metres from the
+    camera to its nearest tenth. sine: of the angle between it and the line of sight.
     """
 
     plane: Plane
-    T: Float[np.ndarray, "4 4"]
+    T_table_frame: Float[np.ndarray, "4 4"]
     outline: Float[np.ndarray, "M 2"]
     things: float
-    away: float
+    distance: float
     sine: float
 
     @property
-    def worth(self) -> float:
+    def score(self) -> float:
         """How likely it is the table: things on it, points of it, and a sight that is not along it, multiplied.
 
         The wall of a bin has nearly as much before it as the bin's floor has on it, but it is smaller and seen flatly.
@@ -57,8 +58,8 @@ class Table:
 
     def over(self, P: Float[np.ndarray, "N 3"]) -> tuple[Bool[np.ndarray, "N"], Float[np.ndarray, "N"]]:
         """Which points lie over or under the outline, and all points' heights over the plane, metres."""
-        Q = transform_points(self.T, P)
-        return within(self.outline, Q[:, :2]), Q[:, 2]
+        Q = transform_points(self.T_table_frame, P)
+        return in_convex_outline(self.outline, Q[:, :2]), Q[:, 2]
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -78,7 +79,7 @@ def find_tables(
     points: of a picture's pixels, metres, NaN without depth, in the camera's frame or the base frame. viewer: where the
     camera stands in that frame. up: what is up in it, if it is known; planes that lean against it by more than 26
     degrees are left out then. The planes come from RANSAC, one after the
-    other. First come those within reach of the camera, and of these the one of most `worth`: what stands on it lies
+    other. First come those within reach of the camera, and of these the one of highest `score`: what stands on it lies
     over its outline by 12 mm to 35 cm, and over no other such plane in between. So a floor that fills most of the
     picture comes after the low table with the things on it. Topic 06.
     """
@@ -107,7 +108,7 @@ def find_tables(
             tables.append(table)
     shares = [_standing(table, [other for other in tables if other is not table], P) for table in tables]
     tables = [replace(table, things=share) for table, share in zip(tables, shares, strict=True)]
-    return sorted(tables, key=lambda table: (table.away > REACH, -table.worth, -table.plane.inliers.sum()))
+    return sorted(tables, key=lambda table: (table.distance > REACH, -table.score, -table.plane.inliers.sum()))
 
 
 def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
@@ -131,10 +132,10 @@ def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
     return T
 
 
-def within(outline: Float[np.ndarray, "M 2"], xy: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
+def in_convex_outline(outline: Float[np.ndarray, "M 2"], xy: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
     """Which places lie in a convex outline, or on it.
 
-    >>> within(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0.2, 0.2], [0.8, 0.8]])).tolist()
+    >>> in_convex_outline(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0.2, 0.2], [0.8, 0.8]])).tolist()
     [True, False]
     """
     left, right = np.ones((2, len(xy)), bool)
@@ -191,7 +192,7 @@ def _table(plane: Plane, points, solid: Bool[np.ndarray, "h w"], viewer, least: 
 def _same(a: Table, b: Table) -> bool:
     """Whether two planes are one surface, of which one was fitted to what is not quite flat of it."""
     between = abs(_middle(b) @ a.plane.normal + a.plane.offset)
-    return bool(between < SAME[0] and a.plane.normal @ b.plane.normal > SAME[1])
+    return bool(between < SAME_HEIGHT and a.plane.normal @ b.plane.normal > PARALLEL)
 
 
 def _standing(table: Table, others: list[Table], P: Float[np.ndarray, "N 3"]) -> float:
@@ -249,13 +250,13 @@ def reasons_against(
 
 def _well_over(other: Table, table: Table) -> bool:
     """Whether another plane is parallel to a table, and high above it."""
-    parallel = other is not table and other.plane.normal @ table.plane.normal > SAME[1]
+    parallel = other is not table and other.plane.normal @ table.plane.normal > PARALLEL
     return bool(parallel and _middle(other) @ table.plane.normal + table.plane.offset > HIGH)
 
 
 def _middle(table: Table) -> Float[np.ndarray, "3"]:
     """The middle of a table's outline, in the frame that the table was found in."""
-    return (np.linalg.inv(table.T) @ (*table.outline.mean(axis=0), 0.0, 1.0))[:3]
+    return (np.linalg.inv(table.T_table_frame) @ (*table.outline.mean(axis=0), 0.0, 1.0))[:3]
 
 
 def _hanging(table: Table, points: Float[np.ndarray, "H W 3"]) -> Bool[np.ndarray, "H W"]:

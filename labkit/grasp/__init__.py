@@ -4,4 +4,4 @@
 grips on maps of heights, `measure_kernels` looks closely at the best; numba compiles these.
 """
 
-from labkit.grasp.planner import Grasp, GraspPlan, Gripper, plan_grasps, principal_axis_grasp, top_down_grasp
+from labkit.grasp.planner import Grasp, GraspPlan, Gripper, plan_grasps, principal_axis_grasp, weighed

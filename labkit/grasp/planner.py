@@ -10,7 +10,7 @@ gripper's measures, and nothing else.
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 
 import cv2
@@ -126,13 +126,15 @@ def plan_grasps(
     table_z: float,
     camera_position: Float[np.ndarray, "3"] | None = None,
     gripper: Gripper = Gripper(),
+    certainty: Sequence[float] | None = None,
 ) -> GraspPlan:
     """Rank top-down grasps of one or several targets among everything that the camera saw.
 
     targets: a cloud each. scene: the points of targets, table and obstacles. table_z: height of the table.
     camera_position: where the camera stands; without it nothing is known of shadows. gripper: the hand, the Panda's by
-    default. Metres, base frame. Without any grasp the plan says why. Raises ValueError for an argument that is not
-    finite, of another shape, or in millimetres. Topic 07.
+    default. certainty: of each target, in 0..1, by which the scores of its grasps are multiplied. Metres, base frame.
+    Without any grasp the plan says why. Raises ValueError for an argument that is not finite, of another shape, or in
+    millimetres. Topic 07.
 
     >>> x, y, z = np.meshgrid(np.arange(0.48, 0.521, 0.002), np.arange(-0.01, 0.011, 0.002), np.arange(0, 0.031, 0.002))
     >>> box = np.stack([x, y, z], axis=-1).reshape(-1, 3)  # 4 cm long in x, 2 cm wide in y
@@ -161,7 +163,8 @@ def plan_grasps(
             grasps += found
     grasps.sort(key=lambda grasp: -grasp.score)
     reason = "" if grasps else "; ".join(dict.fromkeys(reasons)) or "no target points"
-    return GraspPlan(tuple(grasps), reason)
+    plan = GraspPlan(tuple(grasps), reason)
+    return plan if certainty is None else weighed(plan, certainty)
 
 
 @cache
@@ -174,29 +177,10 @@ if hasattr(os, "register_at_fork"):  # Windows has no fork
     os.register_at_fork(after_in_child=_threads.cache_clear)  # a child process has none of its parent's threads
 
 
-def top_down_grasp(
-    cloud: Float[np.ndarray, "N 3"],
-    scene: Float[np.ndarray, "M 3"] | None = None,
-    table_z: float | None = None,
-    camera_position: Float[np.ndarray, "3"] | None = None,
-    gripper: Gripper = Gripper(),
-) -> Grasp:
-    """Give the best grasp of one cloud; where the planner finds none, the one of its principal axis, with score 0.
-
-    cloud, scene: points of the base frame, metres; scene: all that was seen, the cloud's points among it; default the
-    cloud alone. table_z: default the cloud's lowest point. The other arguments are those of `plan_grasps`. Raises
-    ValueError for an empty cloud, which has no centroid. Topic 07.
-
-    >>> stick = np.array([[0.5, 0.001 * i, 0.05] for i in range(100)])
-    >>> T = top_down_grasp(stick, table_z=0.03).T_base_grasp
-    >>> abs(T[:3, 1]).round(2), T[:3, 2]
-    (array([1., 0., 0.]), array([ 0.,  0., -1.]))
-    """
-    cloud = _cloud("cloud", cloud)
-    table_z = cloud[:, 2].min(initial=np.inf) if table_z is None else table_z
-    fallback = principal_axis_grasp(cloud, table_z, gripper)
-    plan = plan_grasps([cloud], cloud if scene is None else scene, table_z, camera_position, gripper)
-    return plan.grasps[0] if plan.grasps else fallback
+def weighed(plan: GraspPlan, certainty: Sequence[float]) -> GraspPlan:
+    """Multiply scores by how certain their targets are, and sort: a fine grip on an obstacle is worth little."""
+    grasps = [replace(grasp, score=grasp.score * certainty[grasp.target]) for grasp in plan.grasps]
+    return replace(plan, grasps=tuple(sorted(grasps, key=lambda grasp: -grasp.score)))
 
 
 def principal_axis_grasp(

@@ -120,12 +120,12 @@ def open_engine(model, engine: str = "torch") -> Engine:
     return FunctionEngine(model)
 
 
-def shipped(name: str) -> Engine:
+def open_shipped(name: str) -> Engine:
     """The kit's own "unet" or "smallsegnet" in OpenCV: the labels of PyTorch without loading it, 120 MB less memory.
 
     Without the package `onnx` it is PyTorch all the same. Raises ValueError for another name. Topic 09.
 
-    >>> shipped("unet")(np.zeros((5, 7, 3), np.uint8)).shape
+    >>> open_shipped("unet")(np.zeros((5, 7, 3), np.uint8)).shape
     (5, 7, 4)
     """
     require("name", name in SHIPPED, f"one of {', '.join(SHIPPED)}", repr(name))

@@ -80,7 +80,7 @@ class NetworkInput:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class InstanceOutput:
     """What a network says of things, at the pixels of the view that it saw, (h, w).
 
     foreground: probability that the pixel is on a thing. votes: where the middle of its thing's visible pixels is, as
@@ -97,7 +97,7 @@ class Engine(ABC):
     """A network that is ready to run: `engine(picture)` gives class probabilities, `engine.logits(picture)` logits.
 
     takes: what the network takes. num_classes: how many classes it tells apart, None if it does not say. things:
-    whether it tells things apart as well; `engine.see(picture)` then gives that, too.
+    whether it tells things apart as well; `engine.predict_instances(picture)` then gives that, too.
     """
 
     def __init__(self, takes: NetworkInput, num_classes: int | None = None, things: bool = False):
@@ -113,36 +113,38 @@ class Engine(ABC):
         return z[:, : self.num_classes] if self.things else z
 
     def __call__(
-        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], flip_tta: bool = False
     ) -> Float32[np.ndarray, "H W C"]:
         """Class probabilities of a picture, of any height and width: the softmax of the logits (topic 03).
 
-        mirror: average them with those of the mirrored picture, mirrored back: two opinions, at twice the price, whose
-        errors differ. Raises ValueError if the picture is not what the network takes, or the result is not finite (the
-        weights may hold NaN).
+        flip_tta: average them with those of the mirrored picture, mirrored back (test-time flip): two opinions, at
+        twice the price, whose errors differ. Raises ValueError if the picture is not what the network takes, or the
+        result is not finite (the weights may hold NaN).
         """
         view, arrays = self._seen(picture)
-        return self._probabilities(view, [self._outputs(arrays, m, self.classes) for m in (False, True)[: 1 + mirror]])
+        return self._probabilities(
+            view, [self._outputs(arrays, m, self.classes) for m in (False, True)[: 1 + flip_tta]]
+        )
 
-    def see(
-        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
-    ) -> tuple[Float32[np.ndarray, "H W C"], Sight | None]:
+    def predict_instances(
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], flip_tta: bool = False
+    ) -> tuple[Float32[np.ndarray, "H W C"], InstanceOutput | None]:
         """Class probabilities of a picture and, by the same run of the network, what it says of things; else None.
 
         Arguments and errors as for the engine itself. In a mirror, votes change the sign of du; both are averaged.
         """
         if not self.things:
-            return self(picture, mirror), None
+            return self(picture, flip_tta), None
         view, arrays = self._seen(picture)
-        runs = [self._outputs(arrays, m, self.forward) for m in (False, True)[: 1 + mirror]]
+        runs = [self._outputs(arrays, m, self.forward) for m in (False, True)[: 1 + flip_tta]]
         p = self._probabilities(view, [z[: self.num_classes] for z in runs])
         z = np.stack([z[self.num_classes :] for z in runs])
-        if mirror:
+        if flip_tta:
             z[1, THINGS.index("du")] *= -1.0
         z = check_finite("things", z)
         with np.errstate(over="ignore"):  # exp of a large number: the foreground is 0
             foreground = (1.0 / (1.0 + np.exp(-z[:, 0]))).mean(axis=0)
-        return p, Sight(foreground, z[:, 1:].mean(axis=0).transpose(1, 2, 0) * np.float32(VOTE_UNIT), view)
+        return p, InstanceOutput(foreground, z[:, 1:].mean(axis=0).transpose(1, 2, 0) * np.float32(VOTE_UNIT), view)
 
     def logits(
         self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
@@ -209,7 +211,7 @@ class FunctionEngine(Engine):
         self.function = function
 
     def __call__(
-        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], mirror: bool = False
+        self, picture: RGBDFrame | UInt8[np.ndarray, "H W 3"], flip_tta: bool = False
     ) -> Float[np.ndarray, "H W C"]:
         rgb = picture.rgb if isinstance(picture, RGBDFrame) else check_rgb("rgb", picture)
         try:

@@ -9,7 +9,9 @@ close, put theirs on another. With errors of a few pixels the n votes lie in a s
 into a peak. What two things share is no longer a border but a valley between two peaks.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import cv2
@@ -18,7 +20,7 @@ from jaxtyping import Float, Float32, Int32, Integer
 
 from labkit.frame import RGBDFrame
 from labkit.labels import IGNORE
-from labkit.learning.inference import VOTE_UNIT, Sight
+from labkit.learning.inference import VOTE_UNIT, InstanceOutput
 from labkit.learning.view import resized
 from labkit.support.validation import check_finite, check_shape, require
 
@@ -36,7 +38,7 @@ VOTES_COUNT = 8.0  # weight of a vote's loss at a pixel of a thing, against that
 
 
 @dataclass(frozen=True, eq=False)
-class Things:
+class Instances:
     """The things of one frame.
 
     instances: int32 (H, W), 0 where there is none, things numbered from 1, the largest first. certainty: for each
@@ -53,54 +55,74 @@ class Things:
         return len(self.certainty)
 
 
-def find_things(model, frame: RGBDFrame, mirror: bool = True, sizes: tuple[float, ...] | None = None) -> Things:
+def segment_instances(
+    model, frame: RGBDFrame, flip_tta: bool = True, sizes: tuple[float, ...] | None = None
+) -> Instances:
     """Find every thing in a frame, whatever it is and wherever it stands: `look`, then `group`.
 
-    model: a network that tells things apart, such as the kit's unet_rgbd, or an engine of one. mirror: look at the
-    mirror image, too. sizes: as for `look`; None is LOOKS with `mirror`, which takes three times as long, and none
+    model: a network that tells things apart, such as the kit's unet_rgbd, or an engine of one. flip_tta: look at the
+    mirror image, too. sizes: as for `look`; None is LOOKS with `flip_tta`, which takes three times as long, and none
     without. Nothing found is no error: `len(things)` is 0. Raises ValueError for another network.
     """
     from labkit.learning.engines import open_engine
 
-    sizes = LOOKS if sizes is None and mirror else sizes or ()
-    probabilities, sight = look(check_tells_things(open_engine(model)), frame, mirror, sizes)
+    sizes = LOOKS if sizes is None and flip_tta else sizes or ()
+    probabilities, sight = look(check_predicts_instances(open_engine(model)), frame, flip_tta, sizes)
     numbers, certainty = group(sight.foreground, sight.votes)
     instances, foreground = brought_back(sight, numbers)
     left = np.unique(instances[instances > 0])  # a thing may lie outside the picture, or between its pixels
     number_of = np.zeros(len(certainty) + 1, np.int32)
     number_of[left] = np.arange(1, len(left) + 1)
-    return Things(number_of[instances], tuple(certainty[k - 1] for k in left), foreground, probabilities)
+    return Instances(number_of[instances], tuple(certainty[k - 1] for k in left), foreground, probabilities)
 
 
-def look(engine, frame: RGBDFrame, mirror: bool = True, sizes: tuple[float, ...] = LOOKS):
-    """Class probabilities of a frame and what the network says of its things, as `Engine.see` gives them.
+def look(engine, frame: RGBDFrame, flip_tta: bool = True, sizes: tuple[float, ...] = LOOKS):
+    """Class probabilities of a frame and what the network says of its things, as `Engine.predict_instances` gives them.
 
     sizes: foreground and votes are the mean of one look for each, as if all lengths were so many times as large. A
     large thing that comes apart in one size may be whole in another, and a small one is seen better enlarged. With
-    none, for a network that takes pictures as they are, and for a frame without any depth it is what `see` gives. The
-    probabilities are those of the true size: it is what a class may hang on.
+    none, for a network that takes pictures as they are, and for a frame without any depth it is what the engine's
+    `predict_instances` gives. The probabilities are those of the true size: it is what a class may hang on.
     """
-    probabilities, sight = engine.see(frame, mirror)
+    probabilities, sight = engine.predict_instances(frame, flip_tta)
     if not sizes or sight.view is None:
         return probabilities, sight
     h, w = sight.foreground.shape
     foreground, votes = np.zeros((h, w), np.float32), np.zeros((h, w, 2), np.float32)
     for factor in sizes:
-        other = engine.see(resized(frame, factor), mirror)[1]
+        other = engine.predict_instances(resized(frame, factor), flip_tta)[1]
         size = np.array(other.foreground.shape[::-1], np.float32)  # of the other view, which shows the same
         foreground += cv2.resize(other.foreground, (w, h)) / len(sizes)
         votes += cv2.resize(other.votes, (w, h)) * ((w, h) / size) / len(sizes)
-    return probabilities, Sight(np.clip(foreground, 0.0, 1.0), votes, sight.view)
+    return probabilities, InstanceOutput(np.clip(foreground, 0.0, 1.0), votes, sight.view)
 
 
-def check_tells_things(engine):
+def instance_finder(model=None, flip_tta: bool = True) -> Callable[[RGBDFrame], Instances]:
+    """Make a function that finds things of any class, for `Pipeline(find_objects=...)`, of `segment_instances`.
+
+    model: a network or an engine that tells things apart; None is the kit's own, unet_rgbd. flip_tta: as for
+    `segment_instances`. Raises ValueError for a network of classes alone. Topic 03.
+    """
+    from labkit.learning.engines import open_engine
+    from labkit.learning.network import load_model, weights_path
+
+    engine = open_engine(load_model(weights_path("unet_rgbd")) if model is None else model)
+    return partial(segment_instances, check_predicts_instances(engine), flip_tta=flip_tta)
+
+
+def predicts_instances(engine) -> bool:
+    """Whether an engine says at each pixel which thing it belongs to."""
+    return bool(getattr(engine, "things", False))
+
+
+def check_predicts_instances(engine):
     """Return an engine whose network tells things apart; raises ValueError for one of classes alone."""
     wanted = "a network that tells things apart, such as unet_rgbd, or `labkit train --things` of one"
-    require("model", getattr(engine, "things", False), wanted, "one of classes alone")
+    require("model", predicts_instances(engine), wanted, "one of classes alone")
     return engine
 
 
-def brought_back(sight: Sight, numbers: Int32[np.ndarray, "h w"]):
+def brought_back(sight: InstanceOutput, numbers: Int32[np.ndarray, "h w"]):
     """Instances and foreground at the picture's own pixels: the nearest pixel's of the view, and interpolated."""
     if sight.view is None:
         return numbers, sight.foreground

@@ -124,7 +124,7 @@ def nearby_cells(keys, offset):
 
 
 @inline
-def within(points, i, j, reach):
+def closer_than(points, i, j, reach):
     """Say whether two points are at most `reach` apart."""
     x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
     return x * x + y * y + z * z <= reach * reach
@@ -150,7 +150,7 @@ def add_neighbours(points, keys, starts, x_step, y_step, reach, enough, count):
                         if count[i] >= enough:
                             break
                         if not starts[a] <= j < starts[a + 1]:
-                            count[i] += within(points, i, j, reach)
+                            count[i] += closer_than(points, i, j, reach)
 
 
 @inline
@@ -167,7 +167,7 @@ def touch(points, starts, a, b, reach):
     """Say whether any point of cell a is within `reach` of any point of cell b."""
     for i in range(starts[a], starts[a + 1]):
         for j in range(starts[b], starts[b + 1]):
-            if within(points, i, j, reach):
+            if closer_than(points, i, j, reach):
                 return True
     return False
 

@@ -172,6 +172,14 @@ def check_T(name: str, T, tolerance: float = 1e-4) -> np.ndarray:
     return T
 
 
+def check_pixel(name: str, at, size: tuple[int, int]) -> tuple[int, int]:
+    """Return a pixel (u, v) as whole numbers if it lies in a picture of (width, height) `size`."""
+    u, v = check_finite(name, check_shape(name, at, (2,)))
+    fits = 0 <= round(u) < size[0] and 0 <= round(v) < size[1]
+    require(name, fits, f"a pixel (u, v) of the picture of {size[0]} x {size[1]}", f"({u:g}, {v:g})")
+    return round(u), round(v)
+
+
 def check_labels(name: str, y, num_classes: int, ignore: int | None = 255) -> np.ndarray:
     """Return integer labels in 0 .. num_classes - 1, or `ignore`; any shape and integer dtype."""
     y = as_array(name, y)

@@ -15,7 +15,7 @@ from labcli import evaluate_folder as own
 from labcli.cli import app
 from labkit.instance_metrics import InstanceScores
 from labkit.labels import OBSTACLE, SURFACE, TARGET
-from labkit.pipeline import anything
+from labkit.learning.things import instance_finder
 from labkit.sim.world import World
 
 
@@ -81,7 +81,7 @@ def test_true_things_score_as_perfect_and_what_nobody_knows_does_not_count(folde
 
 
 def test_a_truth_that_does_not_tell_things_apart_gives_foreground_alone_and_says_so(folder, alone, tmp_path):
-    apart = json.loads(own.as_json(own.judge(own.TrueThings(folder), anything()), False))
+    apart = json.loads(own.as_json(own.judge(own.TrueThings(folder), instance_finder()), False))
     said = run(alone, "--anything", "--json", tmp_path / "scores.json", "--worst", "2", "--out", tmp_path)
     assert "2 pictures whose truth does not tell things apart" in said and "as one piece" not in said
     facts = json.loads((tmp_path / "scores.json").read_text())

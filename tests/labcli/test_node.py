@@ -49,7 +49,7 @@ def test_a_bag_of_which_no_frame_was_answered_is_a_failure_that_names_its_cause(
 def test_settings_of_things_the_hand_and_the_workspace_reach_the_pipeline():
     pipeline = Settings(anything=True, gripper="max_opening=0.03", workspace="0 1 -1 1 0 0.5").pipeline(0.2)
     assert pipeline.model is None and pipeline.find_objects is not None
-    assert pipeline.gripper.max_opening == 0.03 and pipeline.workspace.tolist() == [[0, 1], [-1, 1], [0, 0.5]]
+    assert pipeline.gripper.max_opening == 0.03 and pipeline.targets.workspace.tolist() == [[0, 1], [-1, 1], [0, 0.5]]
     assert pipeline.table_z == 0.2
 
 

@@ -14,7 +14,7 @@ import torch
 
 from labcourse.stacks.small_fcn import SmallFCN
 from labkit.crf import PottsCRF, solve
-from labkit.geometry import back_projection_jacobian, backproject_to_base
+from labkit.geometry import back_projection_jacobian, masked_cloud_to_base
 from labkit.labels import TARGET
 from labkit.learning.network import SmallSegNet, load_model
 from labkit.losses import segmentation_loss, softmax, weighted_optimum
@@ -127,14 +127,14 @@ def test_pixels_without_depth_become_no_points():
     v, u = np.where(mask == TARGET)
     listing = (np.linalg.inv(K) @ np.stack([u, v, np.ones(4)]) * depth[v, u]).T + T[:3, 3]
     assert (listing == T[:3, 3]).all(axis=1).any() and np.isnan(listing).any()
-    assert len(backproject_to_base(mask, depth, K, T, TARGET)) == 2
+    assert len(masked_cloud_to_base(mask, depth, K, T, TARGET)) == 2
 
 
 def test_the_cloud_has_one_dtype():
     mask, depth = np.zeros((2, 2), np.uint8), np.ones((2, 2), np.float32)
     listing_empty, listing_full = np.zeros((0, 3), np.float32), np.linalg.inv(np.eye(3)) @ np.ones((3, 4), np.float32)
     assert listing_empty.dtype != listing_full.dtype
-    empty, full = (backproject_to_base(mask, depth, np.eye(3), np.eye(4), c) for c in (TARGET, 0))
+    empty, full = (masked_cloud_to_base(mask, depth, np.eye(3), np.eye(4), c) for c in (TARGET, 0))
     assert empty.shape == (0, 3) and full.shape == (4, 3) and empty.dtype == full.dtype
 
 
@@ -161,7 +161,7 @@ def test_the_ros_node_uses_depth_intrinsics_transform_and_class():
     K = np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]])
     mask, depth = np.zeros((480, 640), np.uint8), np.zeros((480, 640), np.float32)
     mask[240, 320], depth[240, 320] = TARGET, d
-    (point,) = backproject_to_base(mask, depth, K, np.eye(4), TARGET)
+    (point,) = masked_cloud_to_base(mask, depth, K, np.eye(4), TARGET)
     assert np.linalg.norm(listing[:2]) > 300 and np.linalg.norm(point[:2]) < 0.001
 
 

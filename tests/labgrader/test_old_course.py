@@ -5,27 +5,20 @@ data/course_0_2.zip holds what 0.2 left of README's sample course: the lab, thre
 """
 
 import csv
-import importlib
 import json
 import shutil
-import sys
 import zipfile
 from pathlib import Path
 
 import pytest
 from grading_course import lab_notebook
-from traitlets.config import PyFileConfigLoader
-from traitlets.utils.importstring import import_item
 
-from labcourse import plots
-from labcourse.explorers import iou
 from labgrader.course import asked, find, of_topic
 from labgrader.file_check import check_file
 from labgrader.grade.grade import Grading
 from labgrader.grade.gradebook import opened
 from labgrader.grade_course import grade_course
 from labgrader.handin.reading import read_lab, read_submission
-from labkit.course import MOVED
 
 TOPIC, WRITTEN = "04_iou", "accuracy_and_iou"
 
@@ -66,33 +59,6 @@ def test_everybody_keeps_points_and_what_was_graded_by_hand(old):
     assert points(old) == before and scores(old) == total
     with opened(old) as book:
         assert book.find_grade(WRITTEN, TOPIC, TOPIC, "ada").manual_score == 2.0
-
-
-def test_nbgraders_configuration_of_then_names_classes_that_are_there(old):
-    config = PyFileConfigLoader("nbgrader_config.py", str(old)).load_config()
-    for name, (application, trait) in {
-        "collect.LmsExtractor": ("ZipCollectApp", "extractor_plugin"),
-        "collect.LmsCollector": ("ZipCollectApp", "collector_plugin"),
-        "refusal.GradedByLabkit": ("Autograde", "exporter_class"),
-        "refusal.FeedbackPages": ("GenerateFeedback", "exporter_class"),
-    }.items():
-        written = config[application][trait]
-        assert written == f"labkit.course.grading.{name}"
-        assert import_item(written).__module__.startswith("labgrader.")
-
-
-def test_what_notebooks_of_then_import_is_the_same_as_at_its_new_address():
-    from labkit.course.explorers import iou as old_iou
-    from labkit.course.plots import panels as old_panels
-
-    from labkit.course import plots as old_plots
-
-    assert old_iou is iou and old_plots is plots and old_panels is plots.panels
-    for head, new in MOVED.items():
-        assert importlib.import_module(f"labkit.course.{head}") is importlib.import_module(new)
-    with pytest.raises(ModuleNotFoundError, match=r"labkit\.course\.never"):
-        importlib.import_module("labkit.course.never")
-    assert "labkit.course.never" not in sys.modules
 
 
 # ------------------------------------------------------------------------------- a lab that asked other questions

@@ -69,7 +69,7 @@ GOOD: dict[Callable, dict] = {
     geometry.centroid_and_covariance: {"P": CLOUD},
     geometry.principal_axes: {"P": CLOUD, "tolerance": 0.05},
     geometry.fit_plane: {"P": CLOUD},
-    geometry.inliers: {"P": CLOUD, "radius": 0.01, "min_neighbours": 3},
+    geometry.inlier_indices: {"P": CLOUD, "radius": 0.01, "min_neighbours": 3},
     geometry.cluster_indices: {"P": CLOUD, "gap": 0.01, "min_points": 5},
     geometry.pixel_rays: {"shape": (6, 8), "K": K},
     geometry.back_project: {"depth": DEPTH, "K": K},

@@ -14,13 +14,13 @@ from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
 from labkit.learning.engines import open_engine
 from labkit.learning.network import SmallSegNet, UNetRGBD
 from labkit.pipeline import (
-    WORKSPACE,
     Pipeline,
     most_probable,
     refine_labels,
     segment_rgb_image,
 )
 from labkit.sim.world import World
+from labkit.targets import WORKSPACE
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_a_network_or_a_function_of_the_image_may_be_the_model(frame):
     with torch.no_grad():
         x = torch.from_numpy(frame.rgb).permute(2, 0, 1)[None] / 255.0
         expected = network(x)[0].argmax(dim=0).numpy()
-    p = Pipeline(network, mirror=False, crf=False).run(frame)
+    p = Pipeline(network, flip_tta=False, crf=False).run(frame)
     assert np.mean(p.labels != expected) < 1e-3
     assert np.allclose(p.probabilities.sum(axis=-1), 1.0, atol=1e-5)
     q = Pipeline(lambda rgb: open_engine(network)(rgb)).run(frame)
@@ -70,7 +70,7 @@ def test_a_network_with_canonical_views_looks_into_the_mirror_as_well(frame):
     once, twice = (open_engine(network)(frame, mirror) for mirror in (False, True))
     assert not np.array_equal(once, twice)
     for asked, expected in ((None, twice), (True, twice), (False, once)):
-        assert np.array_equal(Pipeline(network, mirror=asked).perceive(frame)[1], expected)
+        assert np.array_equal(Pipeline(network, flip_tta=asked).perceive(frame)[1], expected)
     network.takes = dataclasses.replace(network.takes, pixel=None)  # its time grows with the picture
     assert np.array_equal(Pipeline(network).perceive(frame)[1], open_engine(network)(frame))
 
@@ -218,7 +218,7 @@ def test_the_crf_removes_speckles_and_may_be_ones_own(frame):
     speckled[::9, ::9, OBSTACLE] = 0.4
     p = Pipeline(lambda rgb: speckled, crf=True).run(frame)
     assert np.mean(p.labels != frame.labels) < 0.2 * np.mean(most_probable(speckled) != frame.labels)
-    assert list(p.seconds) == ["network", "labels", "crf", "back_projection", "clouds", "grasps"]
+    assert list(p.seconds) == ["network", "crf", "back_projection", "clouds", "grasps"]
     q = Pipeline(lambda rgb: speckled, crf=lambda probabilities, frame: frame.labels).run(frame)
     assert np.array_equal(q.labels, frame.labels)
 
@@ -254,6 +254,7 @@ def test_each_object_of_a_function_of_a_frame_is_a_target(frame):
         (lambda f: Pipeline(lambda rgb: one_hot(f.labels), target_class=4).run(f), "target_class"),
         (lambda f: Pipeline(workspace=((0, 1), (0, 1))), "workspace"),
         (lambda f: Pipeline(workspace=((0, 1), (1, 0), (0, 1))), "workspace"),
+        (lambda f: Pipeline(workspace="floor"), "workspace"),
         (lambda f: Pipeline(grasp=np.asarray, gripper=Gripper()), "gripper"),
         (lambda f: Pipeline().locate(f, np.zeros((3, 3), int)), "labels"),
         (lambda f: Pipeline().locate(f, np.full(f.labels.shape, 256)), "labels"),

@@ -14,8 +14,8 @@ from labkit.node import convert
 from labkit.node.actors import Camera
 from labkit.node.messages import CameraInfo, Header, Image, Pose, Topics, Transform, Transforms
 from labkit.pipeline import Pipeline
-from labros.bags import BagWriter, process
-from labros.wire import Wire
+from labros.bags import BagWriter, answer_bag
+from labros.wire import RosCodec
 
 TOPICS = Topics()
 NAMES = ["in.bag", "in_ros2"]
@@ -46,7 +46,7 @@ def record(path, frames, storage="mcap", **options):
 
 def contents(path) -> dict[str, list]:
     """Messages by topic, with the stamps of the recording."""
-    found, wire = {}, Wire(ros1=path.suffix == ".bag")
+    found, wire = {}, RosCodec(ros1=path.suffix == ".bag")
     with AnyReader([path]) as reader:
         for connection in reader.connections:
             found[connection.topic] = []
@@ -57,7 +57,7 @@ def contents(path) -> dict[str, list]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_message_comes_back_from_a_bag_as_it_was(tmp_path, name):
-    known = Wire(ros1=name.endswith(".bag")).knows
+    known = RosCodec(ros1=name.endswith(".bag")).knows
     sent = {f"/{type(message).__name__}": message for message in MESSAGES if known(type(message))}
     with BagWriter(tmp_path / name) as bag:
         for topic, message in sent.items():
@@ -78,7 +78,7 @@ def test_every_message_comes_back_from_a_bag_as_it_was(tmp_path, name):
 def test_a_bag_is_answered_frame_by_frame(tmp_path, frames, name, depth):
     source = record(tmp_path / name, frames, depth=depth)
     out = tmp_path / name.replace("in", "out")
-    counts = process(source, out, Pipeline(Truth(frames)), probabilities=True, progress=False)
+    counts = answer_bag(source, out, Pipeline(Truth(frames)), probabilities=True, progress=False)
     assert counts.answered == 2 and counts.failed == counts.skipped == counts.dropped == 0
     found = contents(out)
     for number, frame in enumerate(frames):
@@ -112,7 +112,7 @@ def test_both_storages_of_ros_2_are_folders_as_ros_2_writes_them_and_their_files
     assert offered["/tf_static"]["durability"] == "transient_local" and offered[TOPICS.rgb]["durability"] == "volatile"
     for number, bag in enumerate((source, file)):
         out = tmp_path / f"out{number}"
-        counts = process(bag, out, Pipeline(Truth(frames)), storage=storage, progress=False)
+        counts = answer_bag(bag, out, Pipeline(Truth(frames)), storage=storage, progress=False)
         assert counts.answered == 2 and list(out.glob(f"*.{ending}"))
 
 
@@ -120,7 +120,9 @@ def test_from_ros_2_to_ros_1_and_with_names_and_pose_as_parameters(tmp_path, fra
     names = dataclasses.replace(TOPICS, rgb="/left/image", mask="/labels", tf="/elsewhere")
     source = record(tmp_path / "in", frames[:1], topics=names)
     T = frames[0].T_base_cam
-    counts = process(source, tmp_path / "out.bag", Pipeline(Truth(frames)), topics=names, T_base_cam=T, progress=False)
+    counts = answer_bag(
+        source, tmp_path / "out.bag", Pipeline(Truth(frames)), topics=names, T_base_cam=T, progress=False
+    )
     assert counts.answered == 1
     found = contents(tmp_path / "out.bag")
     assert len(found["/labels"]) == 1 and TOPICS.mask not in found
@@ -134,7 +136,7 @@ def test_a_transform_may_be_recorded_after_its_image(tmp_path, frames):
             pose = convert.encode_pose(frame.T_base_cam, Header(stamp * MS, "base_link"))
             camera = Transform(pose.header, "camera_optical_frame", pose.position, pose.orientation)
             bag.publish(TOPICS.tf, Transforms((camera,)))
-    counts = process(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
+    counts = answer_bag(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
     assert counts.answered == 1
 
 
@@ -148,7 +150,7 @@ def test_malformed_messages_of_a_bag_are_skipped(tmp_path, frames):
             bag.publish(TOPICS.info, CameraInfo(Header(stamp, header.frame_id), 24, 32, (0.0,) * 9))
             camera.publish(small(frames[0]), stamp)
     surface = one_hot(np.full((24, 32), SURFACE)).astype(np.float32)
-    counts = process(tmp_path / "in.bag", tmp_path / "out", Pipeline(lambda rgb: surface), progress=False)
+    counts = answer_bag(tmp_path / "in.bag", tmp_path / "out", Pipeline(lambda rgb: surface), progress=False)
     assert (counts.answered, counts.skipped, counts.failed) == (5, 10, 0)
 
 
@@ -158,7 +160,7 @@ def test_frames_of_which_a_message_was_lost_are_counted_and_named(tmp_path, fram
     with BagWriter(tmp_path / "in.bag") as bag:
         for number, way in enumerate(ways):
             Camera(bag, topics=dataclasses.replace(TOPICS, **way)).publish(frames[0], number * 100 * MS)
-    counts = process(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
+    counts = answer_bag(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
     assert (counts.answered, counts.lost, counts.failed, counts.skipped) == (1, 3, 0, 0)
     assert counts.reasons == {
         f"frame lost: no {TOPICS.rgb} within 20 ms": 1,
@@ -171,7 +173,7 @@ def test_a_topic_of_another_type_is_skipped_with_its_type(tmp_path, frames, capl
     with BagWriter(tmp_path / "in.bag") as bag:
         Camera(bag, topics=dataclasses.replace(TOPICS, rgb="/unused")).publish(frames[0], 0)
         bag.publish(TOPICS.rgb, Pose(Header(), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
-    counts = process(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
+    counts = answer_bag(tmp_path / "in.bag", tmp_path / "out.bag", Pipeline(Truth(frames)), progress=False)
     assert counts.answered == 0 and counts.skipped == 1
     assert "expected an Image, got Pose" in caplog.records[-1].getMessage()
 
@@ -180,19 +182,19 @@ def test_a_topic_of_another_type_is_skipped_with_its_type(tmp_path, frames, capl
 def test_what_cannot_be_done_with_bags_is_said(tmp_path, frames):
     pipeline = Pipeline(Truth(frames))
     with pytest.raises(FileNotFoundError):
-        process(tmp_path / "nowhere.bag", tmp_path / "out.bag", pipeline)
+        answer_bag(tmp_path / "nowhere.bag", tmp_path / "out.bag", pipeline)
     whole = record(tmp_path / "in.bag", frames)
     cut = tmp_path / "cut.bag"
     cut.write_bytes(whole.read_bytes()[:5000])
     with pytest.raises(ValueError, match=r"^bag: .*cut\.bag cannot be read"):
-        process(cut, tmp_path / "out.bag", pipeline)
+        answer_bag(cut, tmp_path / "out.bag", pipeline)
     (tmp_path / "folder").mkdir()
     with pytest.raises(ValueError, match=r"^bag: .*folder cannot be read"):
-        process(tmp_path / "folder", tmp_path / "out.bag", pipeline)
+        answer_bag(tmp_path / "folder", tmp_path / "out.bag", pipeline)
     with pytest.raises(ValueError, match=r"^topics: expected /color in .* got .*/camera/rgb/image_raw"):
-        process(whole, tmp_path / "out.bag", pipeline, topics=dataclasses.replace(TOPICS, rgb="/color"))
+        answer_bag(whole, tmp_path / "out.bag", pipeline, topics=dataclasses.replace(TOPICS, rgb="/color"))
     with pytest.raises(FileExistsError):
-        process(whole, cut, pipeline)
+        answer_bag(whole, cut, pipeline)
     with pytest.raises(ValueError, match=r"^storage: expected one of mcap, sqlite3, got 'zip'"):
-        process(whole, tmp_path / "out.bag", pipeline, storage="zip")
+        answer_bag(whole, tmp_path / "out.bag", pipeline, storage="zip")
     assert not (tmp_path / "out.bag").exists(), "nothing is written before the input is known to be good"

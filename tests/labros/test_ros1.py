@@ -23,7 +23,7 @@ from labkit.node.actors import Arm
 from labkit.node.messages import ROS_TOPICS, Header, Image
 from labkit.sim.world import World
 from labros import ros1
-from labros.wire import TYPES, Wire
+from labros.wire import TYPES, RosCodec
 
 pytestmark = pytest.mark.debian("python3-rospy", "python3-rosmaster")
 NODE = ("-m", "labcli.cli", "node", "ros", "--ros1", "--model", "smallsegnet", "--no-crf")
@@ -149,13 +149,13 @@ def test_bad_messages_a_killed_camera_and_a_new_master_cost_no_good_frame(tester
 @pytest.mark.debian(*(f"python3-{package}-msgs" for package in ("sensor", "geometry", "tf2", "diagnostic")))
 @pytest.mark.parametrize(
     "message",
-    [message for message in MESSAGES if Wire(ros1=True).knows(type(message))],
+    [message for message in MESSAGES if RosCodec(ros1=True).knows(type(message))],
     ids=lambda message: type(message).__name__,
 )
 def test_bytes_and_checksum_are_those_of_the_classes_of_ros(message):
     """The class that Debian's package has for the type reads the kit's bytes and writes the same ones."""
     package, _, kind = TYPES[type(message)].split("/")
-    cls, wire = getattr(ros1.ros(f"{package}.msg"), kind), Wire(ros1=True)
+    cls, wire = getattr(ros1.import_ros(f"{package}.msg"), kind), RosCodec(ros1=True)
     data, again = bytes(wire.encode(message)), io.BytesIO()
     cls().deserialize(data).serialize(again)
     assert again.getvalue() == data

@@ -28,7 +28,7 @@ from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline, segment_rgb_image
 from labkit.sim.world import World
 from labros import ros2, ros2_types
-from labros.wire import TYPES, Wire
+from labros.wire import TYPES, RosCodec
 
 if importlib.util.find_spec("rclpy") is None:
     pytest.skip("needs ROS 2: make test-ros2, or a sourced ROS 2", allow_module_level=True)
@@ -113,7 +113,7 @@ def spoil(rng, peer, good: dict[str, bytes], stamp: int) -> None:
 
 def test_malformed_messages_a_late_joiner_and_a_killed_node_cost_no_good_frame(peer, frame):
     """1,000 good frames among 100 malformed messages, each answered once; a second listener; a second node."""
-    tiny, rng, wire = small(frame), np.random.default_rng(0), Wire(ros1=False)
+    tiny, rng, wire = small(frame), np.random.default_rng(0), RosCodec(ros1=False)
     image = MESSAGES[0]
     good = {topic: bytes(wire.encode(image)) for topic in (peer.topics.rgb, peer.topics.depth)}
     with peer.node(*NODE, "--qos-inputs", "reliable", "--table-z", "0.01") as running:
@@ -425,7 +425,7 @@ def test_bytes_are_those_of_the_classes_of_ros(message):
 
     package, _, kind = TYPES[type(message)].split("/")
     module = pytest.importorskip(f"{package}.msg", reason=f"{package} has no wheel: a sourced ROS 2 has it")
-    wire, name = Wire(ros1=False), TYPES[type(message)]
+    wire, name = RosCodec(ros1=False), TYPES[type(message)]
     data = bytes(wire.encode(message))
     theirs = serialize_message(deserialize_message(data, getattr(module, kind)))[: len(data)]  # it reserves too much
     assert bytes(wire.encode(wire.decode(name, theirs))) == data, "equal but for the bytes that align numbers"
@@ -438,8 +438,8 @@ def test_a_made_type_talks_to_the_real_one(made_publishes):
     from sensor_msgs.msg import Image as Real
 
     name = TYPES[Image]
-    made = ros2_types.made_class(name, Wire(ros1=False).store.hash_rihs01(name))
-    data, got = bytes(Wire(ros1=False).encode(MESSAGES[0])), []
+    made = ros2_types.made_class(name, RosCodec(ros1=False).store.hash_rihs01(name))
+    data, got = bytes(RosCodec(ros1=False).encode(MESSAGES[0])), []
     with ros2.Ros2Transport("sender") as sender, ros2.Ros2Transport("receiver") as receiver:
         publisher = sender.node.create_publisher(made if made_publishes else Real, "image", 10)
         receiver.node.create_subscription(
@@ -453,7 +453,7 @@ def test_a_made_type_talks_to_the_real_one(made_publishes):
         publisher.publish(data)
         wait_for(lambda: got, "the message")
     theirs = serialize_message(got[0]) if made_publishes else got[0]
-    assert bytes(Wire(ros1=False).encode(Wire(ros1=False).decode(name, theirs))) == data
+    assert bytes(RosCodec(ros1=False).encode(RosCodec(ros1=False).decode(name, theirs))) == data
 
 
 def test_from_camera_topic_to_lift_over_ros(peer):

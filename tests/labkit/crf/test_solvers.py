@@ -16,7 +16,7 @@ from labkit.crf.energy import pair_slices
 from labkit.crf.exact import grid_max_flow
 from labkit.crf.integers import inside, quantise
 
-APPROXIMATE = ("icm", "mean_field", "expansion", "swap", "trws", "trws+expansion", "persistency")
+APPROXIMATE = ("icm", "mean_field", "expansion", "trws", "trws+expansion", "persistency")
 BOUNDED = ("unary", "trws", "trws+expansion", "persistency")
 
 # Shapes with at most 3^9 or 2^12 labellings, degenerate ones included.

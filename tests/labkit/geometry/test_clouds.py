@@ -10,12 +10,10 @@ from scipy.sparse.csgraph import connected_components
 
 from labkit.geometry import (
     centroid_and_covariance,
-    cluster,
     cluster_indices,
     fit_plane,
-    inliers,
+    inlier_indices,
     principal_axes,
-    remove_outliers,
     transform_points,
 )
 
@@ -144,7 +142,7 @@ reaches = st.sampled_from([0.25, 0.7, 1.0, 1.5, 1.7, 3.0])
 @given(P=clouds, gap=reaches, min_points=st.integers(1, 5))
 @settings(max_examples=100, deadline=None)
 def test_clusters_are_those_of_brute_force_single_linkage(P, gap, min_points):
-    found = cluster(P, gap=gap, min_points=min_points)
+    found = [P[group] for group in cluster_indices(P, gap=gap, min_points=min_points)]
     if len(P) == 0:
         assert found == []
         return
@@ -163,19 +161,21 @@ def test_clusters_are_those_of_brute_force_single_linkage(P, gap, min_points):
 def test_outliers_are_those_that_brute_force_finds(P, radius, min_neighbours):
     neighbours = (squared_distances(P) <= radius * radius).sum(axis=1) - 1 if len(P) else np.zeros(0)
     np.testing.assert_array_equal(remove_outliers(P, radius, min_neighbours), P[neighbours >= min_neighbours])
-    np.testing.assert_array_equal(inliers(P, radius, min_neighbours), np.flatnonzero(neighbours >= min_neighbours))
+    np.testing.assert_array_equal(
+        inlier_indices(P, radius, min_neighbours), np.flatnonzero(neighbours >= min_neighbours)
+    )
 
 
 def test_dense_clouds_agree_with_brute_force_too():
     rng = np.random.default_rng(19)
     P = (rng.normal(size=(700, 3)) * (0.06, 0.06, 0.01) + (0.5, -0.2, 0.0)).astype(np.float32)
     near = squared_distances(P) <= 0.01**2
-    np.testing.assert_array_equal(remove_outliers(P, 0.01, 6), P[near.sum(axis=1) - 1 >= 6])
+    np.testing.assert_array_equal(inlier_indices(P, 0.01, 6), np.flatnonzero(near.sum(axis=1) - 1 >= 6))
     _, group = connected_components(near)
     sizes = sorted(np.bincount(group), reverse=True)
-    assert [len(points) for points in cluster(P, 0.01, 1)] == sizes
+    assert [len(points) for points in cluster_indices(P, 0.01, 1)] == sizes
     far = np.vstack([P, np.array([[90.0, -90.0, 90.0]], np.float32)])  # one far point does not disturb the rest
-    assert [len(points) for points in cluster(far, 0.01, 1)] == [*sizes, 1]
+    assert [len(points) for points in cluster_indices(far, 0.01, 1)] == [*sizes, 1]
 
 
 # Bad input
@@ -188,13 +188,13 @@ BAD = [
     ("tolerance", principal_axes, {"P": CLOUD, "tolerance": 1.5}),
     ("P", fit_plane, {"P": np.zeros((2, 3))}),
     ("P", fit_plane, {"P": np.outer(np.arange(20.0), [1.0, 2.0, 3.0])}),
-    ("P", remove_outliers, {"P": NAN_CLOUD}),
-    ("radius", remove_outliers, {"P": CLOUD, "radius": 0.0}),
-    ("radius", remove_outliers, {"P": CLOUD + np.arange(5.0)[:, None], "radius": 1e-9}),
-    ("min_neighbours", remove_outliers, {"P": CLOUD, "min_neighbours": -1}),
-    ("min_neighbours", remove_outliers, {"P": CLOUD, "min_neighbours": 2.5}),
-    ("gap", cluster, {"P": CLOUD, "gap": -0.1}),
-    ("min_points", cluster, {"P": CLOUD, "min_points": 0}),
+    ("P", inlier_indices, {"P": NAN_CLOUD}),
+    ("radius", inlier_indices, {"P": CLOUD, "radius": 0.0}),
+    ("radius", inlier_indices, {"P": CLOUD + np.arange(5.0)[:, None], "radius": 1e-9}),
+    ("min_neighbours", inlier_indices, {"P": CLOUD, "min_neighbours": -1}),
+    ("min_neighbours", inlier_indices, {"P": CLOUD, "min_neighbours": 2.5}),
+    ("gap", cluster_indices, {"P": CLOUD, "gap": -0.1}),
+    ("min_points", cluster_indices, {"P": CLOUD, "min_points": 0}),
 ]
 
 

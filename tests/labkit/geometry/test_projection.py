@@ -14,8 +14,8 @@ from labkit.geometry import (
     back_project_to_base,
     back_projection_jacobian,
     back_projection_noise,
-    backproject_to_base,
     invert_transform,
+    masked_cloud_to_base,
     nearest_rotation,
     pixel_rays,
     project,
@@ -104,7 +104,7 @@ def test_what_is_not_in_front_of_the_camera_has_no_pixel():
 def test_the_masked_cloud_is_that_of_the_image_where_the_mask_is_and_depth():
     depth, T = depth_with_holes(8), pose(9)
     mask = np.random.default_rng(7).integers(0, 4, depth.shape).astype(np.uint8)
-    P = backproject_to_base(mask, depth, K, T, 2)
+    P = masked_cloud_to_base(mask, depth, K, T, 2)
     assert 0 < len(P) < np.count_nonzero(mask == 2)
     np.testing.assert_array_equal(P, back_project_to_base(depth, K, T)[(mask == 2) & (depth > 0.0)])
 
@@ -112,8 +112,8 @@ def test_the_masked_cloud_is_that_of_the_image_where_the_mask_is_and_depth():
 def test_a_mask_without_target_pixels_or_without_depth_gives_an_empty_cloud():
     depth = np.ones((2, 3), np.float32)
     for cloud in (
-        backproject_to_base(np.zeros((2, 3), np.uint8), depth, K, pose(0), 2),
-        backproject_to_base(np.full((2, 3), 2, np.int64), 0.0 * depth, K, pose(0), np.uint8(2)),
+        masked_cloud_to_base(np.zeros((2, 3), np.uint8), depth, K, pose(0), 2),
+        masked_cloud_to_base(np.full((2, 3), 2, np.int64), 0.0 * depth, K, pose(0), np.uint8(2)),
     ):
         assert cloud.shape == (0, 3) and cloud.dtype == np.float32
 
@@ -207,14 +207,14 @@ BAD = [
     ("depth", back_project, 1000.0 * np.ones((2, 2, 3)), K),
     ("T_base_cam", back_project_to_base, DEPTH, K, T_STRETCHED),
     ("T_base_cam", back_project_to_base, DEPTH, K, T_MILLIMETRES),
-    ("mask", backproject_to_base, MASK[:, :2], DEPTH, K, np.eye(4), 2),
-    ("mask", backproject_to_base, MASK.astype(float), DEPTH, K, np.eye(4), 2),
-    ("mask", backproject_to_base, MASK[..., None], DEPTH, K, np.eye(4), 2),
-    ("depth", backproject_to_base, MASK, DEPTH[None], K, np.eye(4), 2),
-    ("K", backproject_to_base, MASK, DEPTH, K_TRANSPOSED, np.eye(4), 2),
-    ("T_base_cam", backproject_to_base, MASK, DEPTH, K, T_STRETCHED, 2),
-    ("target_class", backproject_to_base, MASK, DEPTH, K, np.eye(4), -1),
-    ("target_class", backproject_to_base, MASK, DEPTH, K, np.eye(4), 2.0),
+    ("mask", masked_cloud_to_base, MASK[:, :2], DEPTH, K, np.eye(4), 2),
+    ("mask", masked_cloud_to_base, MASK.astype(float), DEPTH, K, np.eye(4), 2),
+    ("mask", masked_cloud_to_base, MASK[..., None], DEPTH, K, np.eye(4), 2),
+    ("depth", masked_cloud_to_base, MASK, DEPTH[None], K, np.eye(4), 2),
+    ("K", masked_cloud_to_base, MASK, DEPTH, K_TRANSPOSED, np.eye(4), 2),
+    ("T_base_cam", masked_cloud_to_base, MASK, DEPTH, K, T_STRETCHED, 2),
+    ("target_class", masked_cloud_to_base, MASK, DEPTH, K, np.eye(4), -1),
+    ("target_class", masked_cloud_to_base, MASK, DEPTH, K, np.eye(4), 2.0),
     ("P_cam", project, np.zeros((4, 2)), K),
     ("P_cam", project, np.zeros((3, 4)), K),
     ("K", project, CLOUD, K_SINGULAR),

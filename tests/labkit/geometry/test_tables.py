@@ -76,13 +76,13 @@ def test_what_does_not_stand_on_the_table_is_no_target_without_a_workspace(boxes
     frame, number = seen(*boxes)
     things = np.where(number >= 3, number - 2, 0)
     labels = np.where(things > 0, TARGET, 0)
-    p = Pipeline(workspace=None).locate(frame, labels, instances=things)
+    p = Pipeline(workspace="table").locate(frame, labels, instances=things)
     assert len(p.clouds) == 1 and set(things.ravel()[p.pixels[0]]) == {1}
     assert {grasp.target for grasp in p.plan.grasps} == {0}
     (said,) = p.left_out
     assert said.startswith("1 of 2 targets") and why in said and said in p.notices
     assert len(Pipeline(workspace=EVERYTHING).locate(frame, labels, instances=things).clouds) == 2
-    alone = Pipeline(workspace=None).locate(frame, labels, instances=np.where(things == 2, 2, 0))
+    alone = Pipeline(workspace="table").locate(frame, labels, instances=np.where(things == 2, 2, 0))
     assert not alone.plan.grasps and why in alone.plan.reason
 
 
@@ -91,7 +91,7 @@ def test_a_thing_is_chosen_by_its_pixel_whatever_its_class():
     frame, number = seen(WIDE_TABLE, THING, second)
     labels = np.where(number == 3, 3, np.where(number == 2, TARGET, 1))
     v, u = (int(x.mean()) for x in np.nonzero(number == 3))
-    p = Pipeline(workspace=None).locate(frame, labels, at=(u, v))
+    p = Pipeline(workspace="table").locate(frame, labels, at=(u, v))
     assert set(number.ravel()[p.pixels[0]]) == {3} and len(p.clouds) == 1 and p.certainty == (1.0,)
     q = Pipeline(find_objects=lambda frame: np.maximum(number - 1, 0)).run(frame, at=(u, v))
     assert set(number.ravel()[q.pixels[0]]) == {3}

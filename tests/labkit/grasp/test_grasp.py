@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from labkit.grasp import Gripper, plan_grasps, principal_axis_grasp, top_down_grasp
+from labkit.grasp import Gripper, plan_grasps, principal_axis_grasp
 from labkit.grasp.surroundings_kernels import hidden_points
 from labkit.sim.client import Client
 from labkit.sim.collision import hulls
@@ -321,19 +321,7 @@ def test_nothing_taller_can_hide_than_the_bound_says(height, azimuth, elevation)
         assert hidden[near, 2].max(initial=TABLE + 0.004) > highest - 0.012
 
 
-# The simple entrances -----------------------------------------------------------------------------------------------
-
-
-def test_top_down_grasp_is_the_best_of_the_plan_or_else_the_one_of_the_principal_axis():
-    target = box((0.07, 0.03, 0.04), yaw=0.5)
-    best = plan_grasps([target], scene(target), TABLE).grasps[0]
-    np.testing.assert_array_equal(top_down_grasp(target, scene(target), TABLE).T_base_grasp, best.T_base_grasp)
-    alone = top_down_grasp(target)  # a cloud is enough
-    assert angle_between(closing(alone), np.degrees(0.5) + 90.0) < 4.0 and alone.score > 0.0
-    wide = box((0.14, 0.1, 0.05))
-    fallback = top_down_grasp(wide, table_z=TABLE)
-    assert fallback.score == 0.0
-    np.testing.assert_array_equal(fallback.T_base_grasp, principal_axis_grasp(wide, TABLE).T_base_grasp)
+# The simple entrance -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.0])

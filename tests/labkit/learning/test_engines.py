@@ -14,7 +14,15 @@ from typer.testing import CliRunner
 
 import data_gen
 from labcli.cli import app
-from labkit.learning.engines import ENGINES, SHIPPED, export, labels_of_scores, open_engine, segment_like_cpp, shipped
+from labkit.learning.engines import (
+    ENGINES,
+    SHIPPED,
+    export,
+    labels_of_scores,
+    open_engine,
+    open_shipped,
+    segment_like_cpp,
+)
 from labkit.learning.network import UNetRGBD, load_model, weights_path
 from labkit.pipeline import Pipeline, segment_rgb_image
 
@@ -50,16 +58,16 @@ def frames():
 @pytest.mark.parametrize("name", SHIPPED)
 def test_what_ships_as_onnx_is_the_network_of_the_weights_that_ship(name, frames, monkeypatch):
     expected = open_engine(load_model(weights_path(name))).logits(frames[0].rgb)
-    assert np.abs(shipped(name).logits(frames[0].rgb) - expected).max() < 1e-4
+    assert np.abs(open_shipped(name).logits(frames[0].rgb) - expected).max() < 1e-4
     monkeypatch.setattr("importlib.util.find_spec", lambda package: None)  # as where onnx is not installed
-    assert np.array_equal(shipped(name).logits(frames[0].rgb), expected)
+    assert np.array_equal(open_shipped(name).logits(frames[0].rgb), expected)
     with pytest.raises(ValueError, match="name: expected one of unet, smallsegnet, got 'unet_rgbd'"):
-        shipped("unet_rgbd")
+        open_shipped("unet_rgbd")
 
 
 def test_an_opencv_that_reads_a_network_for_one_size_alone_reads_it_for_each(monkeypatch):
     """OpenCV 4.12, which Colab has."""
-    expected, picky, reads = shipped("unet"), cv2.dnn.readNetFromONNX, []
+    expected, picky, reads = open_shipped("unet"), cv2.dnn.readNetFromONNX, []
 
     def of_one_size_alone(data):
         reads.append(data.tobytes())
@@ -68,7 +76,7 @@ def test_an_opencv_that_reads_a_network_for_one_size_alone_reads_it_for_each(mon
         return picky(data)
 
     monkeypatch.setattr(cv2.dnn, "readNetFromONNX", of_one_size_alone)
-    engine, rng = shipped("unet"), np.random.default_rng(0)
+    engine, rng = open_shipped("unet"), np.random.default_rng(0)
     for height, width in ((24, 40), (24, 40), (40, 24)):
         picture = rng.integers(0, 256, (height, width, 3), np.uint8)
         assert np.abs(engine.logits(picture) - expected.logits(picture)).max() < 1e-4
@@ -97,7 +105,7 @@ def test_a_function_and_an_engine_are_engines_too(frames):
 
     engine, rgb = open_engine(thirds), frames[0].rgb
     assert open_engine(engine) is engine
-    assert np.array_equal(engine(rgb), thirds(rgb)) and np.array_equal(engine(frames[0], mirror=True), thirds(rgb))
+    assert np.array_equal(engine(rgb), thirds(rgb)) and np.array_equal(engine(frames[0], flip_tta=True), thirds(rgb))
     assert np.allclose(np.exp(engine.logits(rgb)), thirds(rgb).transpose(2, 0, 1), atol=1e-6)
 
 

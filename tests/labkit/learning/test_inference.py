@@ -83,7 +83,9 @@ def test_any_network_and_size_gives_what_plain_pytorch_gives(kind, name):
         p, mirrored = (np.exp(x) / np.exp(x).sum(axis=0) for x in (expected, plain(model, rgb[:, ::-1].copy())))
         assert np.allclose(engine(rgb), p.transpose(1, 2, 0), atol=1e-5)
         both = 0.5 * (p + mirrored[:, :, ::-1]).transpose(1, 2, 0)
-        assert engine(rgb, mirror=True).dtype == np.float32 and np.allclose(engine(rgb, mirror=True), both, atol=1e-5)
+        assert engine(rgb, flip_tta=True).dtype == np.float32 and np.allclose(
+            engine(rgb, flip_tta=True), both, atol=1e-5
+        )
     assert model.training, "it is left in the mode that it was in"
 
 

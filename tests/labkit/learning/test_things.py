@@ -16,9 +16,19 @@ from labkit.labels import IGNORE
 from labkit.learning.engines import open_engine
 from labkit.learning.inference import THINGS, VOTE_UNIT, Engine, NetworkInput
 from labkit.learning.network import TorchEngine, UNetRGBD, load_model, save_model, weights_path, with_things
-from labkit.learning.things import CELL, LEAST, SPREAD, find_things, group, histogram, look, things_loss, vote_targets
+from labkit.learning.things import (
+    CELL,
+    LEAST,
+    SPREAD,
+    group,
+    histogram,
+    look,
+    segment_instances,
+    things_loss,
+    vote_targets,
+)
 from labkit.learning.view import canonical_view
-from labtrain.augment_depth import bent, exposed, without_depth
+from labtrain.augment_depth import random_bend, random_depth_loss, random_exposure
 from labtrain.images import ImagesInMemory
 from labtrain.paint import painted
 from labtrain.training import THINGS_RECIPE, Trainer, train
@@ -159,10 +169,10 @@ def test_classes_stay_what_they_were_when_things_are_added(crowd):
     torch.manual_seed(1)
     classes = UNetRGBD().eval()
     both = with_things(classes).eval()
-    old, (p, sight) = TorchEngine(classes)(crowd, True), TorchEngine(both).see(crowd, True)
+    old, (p, sight) = TorchEngine(classes)(crowd, True), TorchEngine(both).predict_instances(crowd, True)
     np.testing.assert_array_equal(p, old)
     np.testing.assert_array_equal(TorchEngine(both)(crowd, True), old)
-    assert TorchEngine(classes).see(crowd)[1] is None and sight.foreground.shape == sight.votes.shape[:2]
+    assert TorchEngine(classes).predict_instances(crowd)[1] is None and sight.foreground.shape == sight.votes.shape[:2]
     assert TorchEngine(both).logits(crowd).shape == (4, *crowd.depth.shape)
     again = with_things(both)
     assert all(torch.equal(a, b) for a, b in zip(again.state_dict().values(), both.state_dict().values(), strict=True))
@@ -181,7 +191,10 @@ def test_a_file_says_whether_it_tells_things_apart(tmp_path, fresh):
 def test_every_engine_sees_the_same(engine, fresh, crowd):
     if engine == "onnxruntime":
         pytest.importorskip("onnxruntime")
-    (p, here), (q, there) = open_engine(fresh).see(crowd), open_engine(fresh, engine).see(crowd)
+    (p, here), (q, there) = (
+        open_engine(fresh).predict_instances(crowd),
+        open_engine(fresh, engine).predict_instances(crowd),
+    )
     assert np.abs(p - q).max() < 1e-4 and q.shape[-1] == 4
     assert np.abs(here.foreground - there.foreground).max() < 1e-4
     assert np.abs(here.votes - there.votes).max() < 1e-2
@@ -196,7 +209,9 @@ def test_a_vote_in_the_mirror_points_the_other_way(crowd):
             z[:, 5:] = np.reshape((1.0, 2.0), (2, 1, 1))
             return z
 
-    once, twice = (Right(NetworkInput(), 4, things=True).see(crowd.rgb, mirror)[1] for mirror in (False, True))
+    once, twice = (
+        Right(NetworkInput(), 4, things=True).predict_instances(crowd.rgb, mirror)[1] for mirror in (False, True)
+    )
     assert once.votes[3, 5].tolist() == [VOTE_UNIT, 2 * VOTE_UNIT]
     assert twice.votes[3, 5].tolist() == [0.0, 2 * VOTE_UNIT]
 
@@ -211,7 +226,7 @@ def test_looks_in_other_sizes_are_averaged_in_pixels_of_the_one_view(crowd):
             return z
 
     engine = Told(NetworkInput(arrays=("image", "geometry"), pixel=0.0025), 4, things=True)
-    (p, once), (q, thrice) = engine.see(crowd), look(engine, crowd, False, (0.5, 2.0))
+    (p, once), (q, thrice) = engine.predict_instances(crowd), look(engine, crowd, False, (0.5, 2.0))
     np.testing.assert_array_equal(p, q)
     assert once.votes.shape == thrice.votes.shape and thrice.view.to_turned.tolist() == once.view.to_turned.tolist()
     assert once.votes[5, 5].tolist() == [VOTE_UNIT, 0.0]
@@ -225,7 +240,7 @@ def test_looks_in_other_sizes_are_averaged_in_pixels_of_the_one_view(crowd):
 
 def test_a_network_of_classes_alone_finds_no_things(crowd):
     with pytest.raises(ValueError, match="model: expected a network that tells things apart"):
-        find_things(UNetRGBD(), crowd)
+        segment_instances(UNetRGBD(), crowd)
 
 
 # Paint and training -------------------------------------------------------------------------------------------------
@@ -259,7 +274,7 @@ def test_bands_lie_square_to_a_thing_s_length():
 
 
 def test_bad_exposure_and_depth_leave_instances_and_say_nothing_of_their_own(crowd):
-    for change in (exposed, bent, without_depth):
+    for change in (random_exposure, random_bend, random_depth_loss):
         for seed in range(6):
             once, again = (change(crowd, np.random.default_rng(seed)) for _ in range(2))
             assert np.array_equal(once.rgb, again.rgb) and np.array_equal(once.depth, again.depth)
@@ -267,9 +282,9 @@ def test_bad_exposure_and_depth_leave_instances_and_say_nothing_of_their_own(cro
             np.testing.assert_array_equal(once.instances, crowd.instances)
             off = np.abs(once.depth - crowd.depth)
             lost = (once.depth == 0.0) & (crowd.depth > 0.0)
-            if change is exposed:
+            if change is random_exposure:
                 assert not off.any() and (once.rgb != crowd.rgb).any()
-            elif change is bent:
+            elif change is random_bend:
                 assert 0.0005 < off.max() <= 0.0151 and not lost.any()
             else:
                 assert 0.005 < lost.mean() < 0.45 and not off[~lost].any()
@@ -342,7 +357,7 @@ def test_shipped_weights_find_most_things_of_a_heap():
     found = true = 0
     for config, seed in (("clutter", 800_001), ("bin", 800_003)):
         frame = data_gen.render(data_gen.sample_scene(seed, config))
-        seen = find_things(network, frame)
+        seen = segment_instances(network, frame)
         scores = score_instances(frame.instances, seen.instances)
         found, true = found + scores.over(0.5), true + scores.true
         assert len(seen) == len(np.unique(seen.instances)) - 1 and seen.foreground.shape == frame.depth.shape

@@ -20,7 +20,7 @@ from labkit.node.rehearsal import camera_to_lift
 from labkit.node.segmentation import SegmentationNode
 from labkit.pipeline import Pipeline
 from labkit.sim.world import World
-from labros.wire import TYPES, Wire
+from labros.wire import TYPES, RosCodec
 
 TOPICS = Topics()
 SCENE = dataclasses.replace(scene(box("block", 0.5, 0.05)), seed=5)
@@ -117,7 +117,7 @@ def test_results_are_those_of_the_pipeline_and_carry_stamp_and_frame(frame):
     assert [one.score for one in found] == [g.score for g in p.plan.grasps]
     cloud = p.clouds[p.plan.grasps[0].target]
     assert np.allclose(np.subtract(found[0].centre, np.divide(found[0].size, 2)), cloud.min(axis=0))
-    wire = Wire(ros1=False)
+    wire = RosCodec(ros1=False)
     assert wire.decode(TYPES[Detections], wire.encode(out.detections[0])) == out.detections[0]
 
 
@@ -561,5 +561,5 @@ def test_a_camera_that_says_nothing_is_a_warning(frame, monkeypatch):
 def test_a_point_survives_the_wire():
     point = Point(Header(5, "map"), (1.0, 2.0, 3.0))
     for ros1 in (False, True):
-        wire = Wire(ros1)
+        wire = RosCodec(ros1)
         assert wire.decode("geometry_msgs/msg/PointStamped", wire.encode(point)) == point
