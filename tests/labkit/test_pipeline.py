@@ -198,7 +198,7 @@ def test_the_gripper_reaches_the_planner(frame):
     assert max(grasp.width for grasp in Pipeline().locate(frame, frame.labels).plan.grasps) > 0.04
 
 
-@pytest.mark.parametrize(("given", "of_frame", "used"), [(0.1, 0.02, 0.1), (None, 0.02, 0.02), (None, None, 0.0)])
+@pytest.mark.parametrize(("given", "of_frame", "used"), [(0.01, 0.02, 0.01), (None, 0.02, 0.02), (None, None, 0.0)])
 def test_the_tables_height_is_given_or_the_frames_or_zero(given, of_frame, used, frame):
     heights = []
 

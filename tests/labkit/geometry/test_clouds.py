@@ -152,18 +152,14 @@ def test_clusters_are_those_of_brute_force_single_linkage(P, gap, min_points):
     sizes = [len(points) for points in found]
     assert sizes == sorted((len(points) for points in expected), reverse=True)
     assert {points.tobytes() for points in found} == {points.tobytes() for points in expected}
-    indices = cluster_indices(P, gap, min_points)
-    assert [P[each].tobytes() for each in indices] == [points.tobytes() for points in found]
 
 
 @given(P=clouds, radius=reaches, min_neighbours=st.integers(0, 6))
 @settings(max_examples=100, deadline=None)
 def test_outliers_are_those_that_brute_force_finds(P, radius, min_neighbours):
     neighbours = (squared_distances(P) <= radius * radius).sum(axis=1) - 1 if len(P) else np.zeros(0)
-    np.testing.assert_array_equal(remove_outliers(P, radius, min_neighbours), P[neighbours >= min_neighbours])
-    np.testing.assert_array_equal(
-        inlier_indices(P, radius, min_neighbours), np.flatnonzero(neighbours >= min_neighbours)
-    )
+    expected = np.flatnonzero(neighbours >= min_neighbours)
+    np.testing.assert_array_equal(inlier_indices(P, radius, min_neighbours), expected)
 
 
 def test_dense_clouds_agree_with_brute_force_too():
