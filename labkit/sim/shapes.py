@@ -6,7 +6,9 @@ how wide does the object reach?), and tests (does a rendered point lie on the su
 
 import hashlib
 import importlib.util
+import os
 import re
+import secrets
 import tempfile
 import threading
 import xml.etree.ElementTree as ElementTree
@@ -144,21 +146,25 @@ _one_at_a_time = threading.Lock()
 
 
 @cache
-def _private_folder() -> tempfile.TemporaryDirectory:
-    """A folder that no other user may enter, removed when the process ends."""
-    return tempfile.TemporaryDirectory(prefix="labkit-")
+def _folder_of(process: int) -> Path:
+    """Where a process keeps such a file: always the same place, which nobody else can foresee."""
+    return Path(tempfile.gettempdir()) / f"labkit-{process}-{secrets.token_hex(8)}"
 
 
 @contextmanager
 def as_file(content: bytes, suffix: str) -> Iterator[str]:
     """Keep bytes in a file while the block runs, and give its path: PyBullet takes meshes and textures from files only.
 
-    PyBullet remembers files by their names, so a name is the hash of the content: never one name for two contents.
+    PyBullet remembers files by their names, so a name is the hash of the content: never one name for two contents. The
+    folder, which no other user may enter, is there as long as the file: a process that is killed leaves none behind.
     """
-    path = Path(_private_folder().name) / (hashlib.sha256(content).hexdigest()[:24] + suffix)
+    folder = _folder_of(os.getpid())
+    path = folder / (hashlib.sha256(content).hexdigest()[:24] + suffix)
     with _one_at_a_time:
-        write_atomically(path, content)
+        folder.mkdir(mode=0o700)
         try:
+            write_atomically(path, content)
             yield str(path)
         finally:
-            path.unlink()
+            path.unlink(missing_ok=True)
+            folder.rmdir()
