@@ -18,6 +18,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from labgrader.as_arrays import giving_arrays
 from labgrader.comparison import Problem
 from labgrader.course import course, find, of_topic
 from labgrader.program.cell import Cell, parsed
@@ -73,9 +74,9 @@ def in_colour(line: Marked) -> str:
 def check(name: str, answer: object) -> Callable:
     """Check a student's answer, show the result, and return the function to go on with.
 
-    name: of the question, "04_iou.iou". answer: the student's function. Returns the answer if it passes every case,
-    else the kit's own function, so that the cells below run. Raises CheckFailed under LABKIT_STRICT=1, and ValueError
-    where no process for an answer can be started.
+    name: of the question, "04_iou.iou". answer: the student's function. Returns the answer if it passes every case, its
+    lists as arrays, else the kit's own function, so that the cells below run. Raises CheckFailed under LABKIT_STRICT=1,
+    and ValueError where no process for an answer can be started.
     """
     try:
         question = find(name)
@@ -107,7 +108,9 @@ def check(name: str, answer: object) -> Callable:
     if verdict.problem is not None and verdict.problem.kind == "unanswered":
         notes += ("The kit's function takes its place below.",)
     shown = describe(question, verdict, printed, notes)
-    return conclude(shown, answer if verdict.passed else question.reference, verdict.passed, page)
+    if not verdict.passed:
+        return conclude(shown, question.reference, False, page)
+    return conclude(shown, giving_arrays(answer, public_cases(question)), True, page)
 
 
 def judged(

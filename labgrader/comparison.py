@@ -25,6 +25,10 @@ DEEPEST = 64  # lists in lists: NumPy has no array of so many axes
 FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, np.ufunc)
 
 
+class Listed(np.ndarray):
+    """Numbers that came in a list or a tuple, where they had no dtype: none is asked of them."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """What is wrong with one output.
@@ -144,7 +148,7 @@ def array_of_list(got: list) -> np.ndarray | Problem | None:
         array = np.array(got)
     except (ValueError, OverflowError):
         return None
-    return array if got and array.dtype.kind in "biuf" else None
+    return array.view(Listed) if array.dtype.kind in "biuf" else None
 
 
 def plain_array(got: object) -> object:
@@ -160,7 +164,7 @@ def plain_array(got: object) -> object:
             return Problem("dtype", f"a tensor of {got.dtype}, {got.layout} is not an array of numbers")
     elif not issubclass(cls, bool | int | float | complex | np.generic | np.ndarray):
         return Problem("kind", f"expected an array or a number, got {kind_name(got)}")
-    array = np.array(got, subok=False)
+    array = np.array(got, subok=issubclass(cls, Listed))
     if array.dtype.kind not in "biuf":
         return Problem("dtype", f"expected real numbers, got dtype {array.dtype}")
     return array[()]
@@ -204,13 +208,15 @@ def as_expected(expected: object, got: object) -> object:
             return tuple(number_of_one(e, g) for e, g in zip(expected, got, strict=True))
         return got
     if isinstance(got, tuple) and len({part.shape for part in got}) == 1:
-        array = np.array(got)
+        array = np.array(got).view(type(np.asanyarray(got[0])))
         return array if array.ndim == 1 or array.shape == expected.shape else got
     return number_of_one(expected, got)
 
 
 def number_of_one(expected: object, got: object) -> object:
-    """The number in an array of shape (1,), where a number is expected."""
+    """The number in an array of shape (1,), where a number is expected; an empty list as the empty array that is."""
+    if isinstance(got, Listed | tuple) and np.shape(got) == (0,) and not np.size(expected):
+        return np.empty_like(expected)
     alone = isinstance(got, np.ndarray) and got.shape == (1,) and np.shape(expected) == ()
     return got[0] if alone else got
 
@@ -238,7 +244,7 @@ def wrong_form(question: Question, expected: object, got: object) -> Problem | N
         for name, (e, g) in zip(names, pairs, strict=True):
             if problem := test(e, g):
                 return Problem(problem.kind, name + problem.says)
-    if question.same_dtype and (expected.dtype != got.dtype):
+    if question.same_dtype and expected.dtype != got.dtype and not isinstance(got, Listed):
         return Problem("dtype", f"expected dtype {expected.dtype}, got {got.dtype}")
     return None
 

@@ -20,9 +20,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from labgrader.comparison import Problem
+from labgrader.comparison import Listed, Problem
 from labgrader.program.slice import Program
-from labgrader.run.process import DTYPES, MOST_AXES, MOST_BYTES, MOST_MESSAGE, MOST_PARTS, MOST_PRINTED, ONE
+from labgrader.run.process import DTYPES, LISTED, MOST_AXES, MOST_BYTES, MOST_MESSAGE, MOST_PARTS, MOST_PRINTED, ONE
 from labgrader.run.stopwatch import Stopwatch, memory_of
 
 # What a worker may say of an output that is none, and of a cell: a text, or a text and the name of a type of Python's.
@@ -253,6 +253,7 @@ def decode_values(data: bytes) -> object:
     claims = []
     for _ in range(1 if count == ONE else count):
         code, ndim = struct.unpack_from("<BB", claimable(data, at, 2), 0)
+        kind, code = Listed if code & LISTED else np.ndarray, code & ~LISTED
         if code >= len(DTYPES) or ndim > MOST_AXES:
             raise ValueError("reply: no such dtype, or too many axes")
         shape = struct.unpack(f"<{ndim}q", claimable(data, at + 2, 8 * ndim))
@@ -261,17 +262,18 @@ def decode_values(data: bytes) -> object:
         # What is empty along one axis may be endless along another.
         if math.prod(max(n, 1) for n in shape) > MOST_BYTES:
             raise ValueError("reply: too long an axis")
-        claims.append((np.dtype(DTYPES[code]).newbyteorder("<"), shape))
+        claims.append((np.dtype(DTYPES[code]).newbyteorder("<"), shape, kind))
         at += 2 + 8 * ndim
     if not data or (count != ONE and count > MOST_PARTS):
         raise ValueError("reply: no values, or too many")
-    if len(data) - at != sum(dtype.itemsize * math.prod(shape) for dtype, shape in claims):
+    if len(data) - at != sum(dtype.itemsize * math.prod(shape) for dtype, shape, _ in claims):
         raise ValueError("reply: not as many bytes as it claims")
     values = []
-    for dtype, shape in claims:
+    for dtype, shape, kind in claims:
         size = math.prod(shape)
         array = np.frombuffer(data, dtype, size, at).reshape(shape)
-        values.append((array.view(np.uint8) != 0 if dtype.kind == "b" else array)[()])  # no truth value but 0 and 1
+        array = array.view(np.uint8) != 0 if dtype.kind == "b" else array
+        values.append(array.view(kind)[()])  # no truth value but 0 and 1
         at += size * dtype.itemsize
     return values[0] if count == ONE else tuple(values)
 

@@ -30,7 +30,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from labgrader.comparison import MOST_BYTES, Problem, parts, plain, quiet
+from labgrader.comparison import MOST_BYTES, Listed, Problem, parts, plain, quiet
 from labgrader.program.cell import Cell
 from labgrader.program.fingerprint import fingerprints
 from labgrader.program.live import LiveProgram, altered, own_entry
@@ -42,6 +42,7 @@ MOST_PARTS = 16
 MOST_AXES = 8
 MOST_MESSAGE = 160  # characters of an exception's message
 MORE = b'J"more"'  # asks for the cases of other seeds, in the middle of a repair; they are the next request
+LISTED = 64  # added to the code of a dtype: the numbers came in a list
 ONE = 255  # the count of an output that is no tuple
 MOST_PRINTED = 600  # characters that are kept of what an answer prints
 # What a plain worker refuses, since a sandbox has none of it: it is no defence, but a tick here is a tick there.
@@ -65,13 +66,13 @@ def encode(value: object) -> bytes:
         return worded(value)
     head = bytes([ord("V"), len(value) if isinstance(value, tuple) else ONE])
     arrays = [as_sent(part) for part in parts(value)]
-    for array in arrays:
+    for part, array in zip(parts(value), arrays, strict=True):
         length = array.itemsize  # of an empty array, too: its longest axis becomes bytes once it is summed
         for n in array.shape:
             length *= max(n, 1)
         if array.ndim > MOST_AXES or length > MOST_BYTES:
             return worded(Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"))
-        code = DTYPES.index(array.dtype.str[1:].replace("b1", "?"))
+        code = DTYPES.index(array.dtype.str[1:].replace("b1", "?")) + LISTED * isinstance(part, Listed)
         head += struct.pack(f"<BB{array.ndim}q", code, array.ndim, *array.shape)
     reply = head + b"".join(array.tobytes() for array in arrays)
     return reply if len(reply) <= MOST_BYTES else worded(Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"))

@@ -117,14 +117,14 @@ CASES = [
 def test_what_is_shown_in_a_terminal(answer, shown, capsys):
     go_on = check("00_test.share", answer)
     assert capsys.readouterr().out == shown + "\n"
-    assert go_on is (answer if shown.startswith("✔") else share)
+    assert getattr(go_on, "__wrapped__", go_on) is (answer if shown.startswith("✔") else share)
 
 
 def test_a_strict_check_raises_what_it_would_show(monkeypatch):
     monkeypatch.setenv("LABKIT_STRICT", "1")
     for answer, shown in CASES:
         if shown.startswith("✔"):
-            assert check("00_test.share", answer) is answer
+            assert check("00_test.share", answer).__wrapped__ is answer
         else:
             with pytest.raises(CheckFailed, match=re.escape(shown.splitlines()[0])):
                 check("00_test.share", answer)
@@ -250,7 +250,7 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
         "checking.Limits(question_s=0.5)\niou = check('04_iou.iou', iou)\nchecking.LIMITS = limits",
         "def iou(n):\n    i = np.diag(n)\n    with np.errstate(invalid='ignore'):\n"
         "        return i / (n.sum(0) + n.sum(1) - i)",
-        "mine = iou\niou = check('04_iou.iou', iou)\nprint(iou is mine)",
+        "mine = iou\niou = check('04_iou.iou', iou)\nprint(iou.__wrapped__ is mine)",
         "other = check('04_iou.iou', lambda n: np.diag(n) / n.sum(0))\nprint(other is iou)",
     ]
     outputs = executed(cells, tmp_path)
