@@ -5,6 +5,8 @@ RETIRED are those that the lab asks no more; labs that were released when it did
 
 import numpy as np
 
+from labcourse.kinds import array, sum_to_1
+
 RETIRED = ("two_means", "change_prior")
 
 
@@ -44,6 +46,18 @@ def draw_pixels(rng):
     return some_logits(rng, H, W, C), some_labels(rng, H, W, C), draw_weights(rng, C)
 
 
+def logits_of_any_size(rng, shape, C):
+    """Logits (*shape, C), those of a pixel a few units apart and together of any size; some classes are far off."""
+    z = 3.0 * rng.normal(size=(*shape, C)) + rng.choice([0.0, 1e4, -1e6, 1e6], (*shape, 1))
+    return z - rng.choice([0.0, 0.0, 0.0, 2e4], z.shape)
+
+
+def above_0(rng, values):
+    """Shares, none of them 0, of numbers that are not negative."""
+    return sum_to_1(rng, values + 1e-3)
+
+
+SHARES = array("C", 0.0, 1.0, form=above_0, says=("above 0", "sum 1"))
 TOY = np.array([[2.0, 1.0, -1.0]])
 
 

@@ -1,8 +1,19 @@
 """05_class_weights.adjusted_grad: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
-from labcourse.questions.t05_class_weights import SURE, TOY, draw_shares, some_labels, some_logits
+from labcourse.kinds import MOST_CLASSES, array, labels, number
+from labcourse.questions.t05_class_weights import (
+    SHARES,
+    SURE,
+    TOY,
+    draw_shares,
+    logits_of_any_size,
+    some_labels,
+    some_logits,
+)
 from labgrader.question import Question, wrong
 
 
@@ -26,17 +37,46 @@ def _pixels(rng):
     )
 
 
+def _any_pixels(rng, shape, C):
+    """Logits (*shape, C) of any size, labels that are far from sure, shares of the classes, a small tau."""
+    y = rng.choice(np.array([*range(C), 255], np.uint8), shape, p=np.array([*[0.8 / C] * C, 0.2]))
+    y = np.asarray(y, np.uint8)
+    y.flat[0] = C - 1
+    return logits_of_any_size(rng, shape, C), y, draw_shares(rng, C), float(rng.uniform(0.0, 3.0))
+
+
+def _rare_classes(rng, least, most):
+    """Logits that a tau of any size leaves a few units apart, where it shifts those of rare classes by far."""
+    shares = np.exp(rng.uniform(-12.0, 0.0, 3))
+    shares, tau = shares / shares.sum(), float(rng.uniform(least, most))
+    y = rng.integers(0, 3, (2, 6), np.uint8)
+    return rng.normal(size=(2, 6, 3)) - tau * np.log(shares), y, shares, tau
+
+
+SHAPES = ((3, 3, 4), 2), ((40,), MOST_CLASSES), ((), 3)
 QUESTION = Question(
     reference=adjusted_grad,
-    inputs=_pixels,
+    kinds={
+        "z": array("... C", says=("however large", "C from 1 to 255")),
+        "y": labels("..."),
+        "shares": SHARES,
+        "tau": number(0.0, 2000.0, says="0 to 2000"),
+    },
+    inputs=(
+        _pixels,
+        partial(_rare_classes, least=0.0, most=3.0),
+        partial(_rare_classes, least=1000.0, most=2000.0),
+        *(partial(_any_pixels, shape=shape, C=C) for shape, C in SHAPES),
+    ),
     by_hand=(
+        (np.array([3.0]), np.array(0, np.uint8), np.ones(1), 1.0),
         (np.zeros((1, 2)), np.array([1], np.uint8), np.array([0.9, 0.1]), 1.0),  # the softmax is the shares
         (TOY, np.array([1], np.uint8), np.array([0.7, 0.1, 0.2]), 0.0),  # tau 0: the plain gradient
         (SURE, np.array([0, 2], np.uint8), np.array([0.7, 0.1, 0.2]), 2.0),  # one maximum for both is not enough
         (TOY, np.array([0], np.uint8), np.array([0.4, 0.4, 0.2]), 2000.0),  # all shifts are far below all logits
     ),
-    random_cases=8,
-    atol=2e-4,  # logits near 1000 have errors of 3e-5 in single precision
+    random_cases=12,
+    atol=5e-5,
     points=3,
     forbidden=("scipy", "torch"),
 )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labcourse.kinds import MOST_CLASSES, array, number
 from labgrader.question import Question, holds, wrong
 
 
@@ -21,15 +22,34 @@ def draw_counts(rng):
     return counts, float(rng.uniform(0.2, 1.2))
 
 
+def _any_power(rng):
+    """Pixels of 255 classes, up to those of a large data set, a third of them absent, and a high power."""
+    counts = (10.0 ** rng.uniform(0.0, 12.0, MOST_CLASSES)).astype(np.int64)
+    counts[rng.random(MOST_CLASSES) < 0.3] = 0
+    return counts, float(rng.choice([rng.uniform(2.0, 20.0), rng.integers(11, 20), 20.0]))
+
+
+def _two_classes(rng):
+    """Pixels of two classes in hundreds, and a high power."""
+    return rng.integers(100, 1000, 2), float(rng.choice([rng.uniform(10.0, 20.0), rng.integers(10, 20)]))
+
+
 QUESTION = Question(
     reference=class_weights,
-    inputs=draw_counts,
+    kinds={
+        "counts": array("C", 0, 10**12, dtype="int64", says=("0 to 10 ** 12", "C from 1 to 255")),
+        "power": number(0.0, 20.0, says="0 to 20"),
+    },
+    inputs=(draw_counts, _any_power, _two_classes),
     by_hand=(
+        (np.array([7]), 3.0),
         (np.array([900, 100, 0]), 1.0),
         (np.array([900, 100, 25]), 0.5),
-        (np.array([1, 7, 0]), 0.5),
+        (np.array([1, 255, 0]), 0.5),
         (np.array([3, 40]), 0.0),
     ),
+    atol=1e-30,  # weights are small where a power is high; float32 has none much smaller
+    random_cases=6,
     forbidden=("sklearn",),
 )
 

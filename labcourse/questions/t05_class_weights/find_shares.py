@@ -1,8 +1,18 @@
 """05_class_weights.find_shares: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
-from labcourse.questions.t05_class_weights import SURE, draw_shares, draw_weights, some_logits
+from labcourse.kinds import MOST_CLASSES, array, count
+from labcourse.questions.t05_class_weights import (
+    SHARES,
+    SURE,
+    draw_shares,
+    draw_weights,
+    logits_of_any_size,
+    some_logits,
+)
 from labgrader.question import Question, holds, wrong
 
 
@@ -26,10 +36,36 @@ def _network(rng):
 _THREE = np.array([[2.0, 0.0], [0.0, 1.0], [0.0, 3.0]])
 
 
+def _any_network(rng, shape, C):
+    """Logits (*shape, C) of any size, some pixels twice, weights, shares in training, and one round."""
+    z = logits_of_any_size(rng, shape, C)
+    for axis in range(len(shape)):
+        np.moveaxis(z, axis, 0)[-1] = np.moveaxis(z, axis, 0)[0]
+    return z, draw_weights(rng, C), draw_shares(rng, C), 1
+
+
+def _slow(rng):
+    """Logits that say little, so that the guess still moves in the last of many rounds."""
+    w, shares = draw_weights(rng, 2), draw_shares(rng, 2)
+    z = rng.normal(0.0, 0.3, (30, 2)) + np.log(w * shares) + rng.choice([0.0, 1e5])
+    return z, w, shares, int(rng.choice([60, MOST_ROUNDS]))
+
+
+MOST_ROUNDS = 100
+SHAPES = ((3, 3, 4), 3), ((40,), MOST_CLASSES)
 QUESTION = Question(
     reference=find_shares,
-    inputs=_network,
+    kinds={
+        "z": array("... C", says=("however large", "C from 1 to 255"), free=("reversed along ...*", "transposed")),
+        "w": array("C", 0.1, 25.0, says="0.1 to 25"),
+        "shares": SHARES,
+        "rounds": count(1, MOST_ROUNDS, says="1 to 100"),
+    },
+    inputs=(_network, _slow, *(partial(_any_network, shape=shape, C=C) for shape, C in SHAPES)),
     by_hand=(
+        (np.array([3.0]), np.array([2.0]), np.ones(1), 2),
+        (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), MOST_ROUNDS),
+        (-_THREE, np.ones(2), np.array([0.9, 0.1]), 1),
         (np.array([[0.0, 0.0]]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), 1),  # weights alone
         (_THREE, np.ones(2), np.array([0.5, 0.5]), 1),  # a mean of probabilities
         (_THREE, np.ones(2), np.array([0.9, 0.1]), 1),
@@ -44,9 +80,9 @@ QUESTION = Question(
 )
 
 
-@holds("the shares are above 0 and sum to 1")
+@holds("no share is below 0, and they sum to 1")
 def shares_sum_to_1(z, w, shares, rounds, out):
-    return np.all(out > 0.0) and np.isclose(np.sum(out), 1.0, atol=1e-4)
+    return np.all(out >= 0.0) and np.isclose(np.sum(out), 1.0, atol=1e-4)
 
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

@@ -1,7 +1,10 @@
 """05_class_weights.least_cost: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import MOST_CLASSES, array, probabilities
 from labgrader.question import Question, wrong
 
 
@@ -19,10 +22,28 @@ def _probabilities_and_costs(rng):
     return q, cost
 
 
+def _any_costs(rng, shape, C, sizes):
+    """Draw probabilities of a shape, most of them small and some 0, and costs between two powers of ten."""
+    q = rng.dirichlet(np.full(C, 0.3), shape)
+    q[q < 1e-4] = 0.0
+    cost = 10.0 ** rng.uniform(*sizes, (C, C))
+    np.fill_diagonal(cost, cost.diagonal() / 1000.0)
+    return q / q.sum(axis=-1, keepdims=True), cost
+
+
+ANY = ((4, 4, 5, 3), (-4.0, -3.0)), ((40, 4), (5.0, 6.0)), ((100, 6), (-2.0, 6.0)), ((4, MOST_CLASSES), (-4.0, 6.0))
 QUESTION = Question(
     reference=least_cost,
-    inputs=_probabilities_and_costs,
+    kinds={
+        "q": probabilities("... C", says=("probabilities", "sum to 1")),
+        "cost": array("C C", 0.0, 1e6, says=("0 to 10 ** 6", "C from 1 to 255")),
+    },
+    inputs=(_probabilities_and_costs, *(partial(_any_costs, shape=q[:-1], C=q[-1], sizes=sizes) for q, sizes in ANY)),
+    random_cases=10,
     by_hand=(
+        (np.array([0.4999, 0.5001]), np.array([[0.0, 16.0], [16.0, 0.0]])),  # nearly a tie
+        (np.array([0.6, 0.4]), np.array([[3.0, 1.0], [1.0, 2.0]])),  # 2.2 for saying 0, 1.4 for saying 1
+        (np.ones(1), np.array([[3.0]])),
         (np.array([0.8, 0.2]), np.array([[0.0, 1.0], [10.0, 0.0]])),  # 2 for saying 0, 0.8 for saying 1
         (np.array([[0.5, 0.4, 0.1], [0.1, 0.4, 0.5]]), np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 9.0, 1.0]])),
         (np.array([[0.5, 0.4, 0.1]]), np.array([[0.0, 4.0, 1.0], [1.0, 0.0, 2.0], [8.0, 1.0, 0.0]])),

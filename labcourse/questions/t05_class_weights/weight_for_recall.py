@@ -1,7 +1,10 @@
 """05_class_weights.weight_for_recall: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import array, number, truth
 from labgrader.question import Question, wrong
 
 
@@ -30,10 +33,27 @@ def _pixels(rng):
             return q1, y, float((must - rng.uniform(0.3, 0.7)) / n)
 
 
+def _many_pixels(rng, least, most):
+    """Draw as many pixels as a picture's, probabilities of any size, and a recall."""
+    n, y = MANY // 2, rng.permutation(np.arange(MANY) < MANY // 2)
+    q1 = np.clip(1.0 / (1.0 + np.exp(rng.choice([-1.0, 1.0], MANY) * rng.uniform(6.0, 21.0, MANY))), SURE, 1.0 - SURE)
+    must = int(n * rng.uniform(least, most))
+    return q1, y, float((must - rng.uniform(0.3, 0.7)) / n)
+
+
+MANY = 12_000
+SURE = 1e-9
 QUESTION = Question(
     reference=weight_for_recall,
-    inputs=_pixels,
+    kinds={
+        "q1": array("N", SURE, 1.0 - SURE, says="1e-9 to 1 - 1e-9", digits=9),
+        "y": truth("N"),
+        "recall": number(0.01, 1.0, says="0.01 to 1"),
+    },
+    inputs=(_pixels, partial(_many_pixels, least=0.012, most=0.016), partial(_many_pixels, least=0.3, most=1.0)),
     by_hand=(
+        (np.array([0.4]), np.array([True]), 0.5),
+        (np.array([SURE, 0.5]), np.array([True, True]), 1.0),  # weight 999,999,999
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
@@ -42,6 +62,7 @@ QUESTION = Question(
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
     ),
     random_cases=12,
+    atol=0.0,
     rtol=1e-5,  # weights tried one after the other come near, and not to the answer
     points=3,
 )
