@@ -22,8 +22,8 @@ from labgrader.as_arrays import giving_arrays
 from labgrader.comparison import Problem
 from labgrader.course import course, find, of_topic
 from labgrader.program.cell import Cell, parsed
-from labgrader.program.notebook import LARGEST_NOTEBOOK, Unreadable, refuse_large, refuse_long
-from labgrader.program.slice import Program, program
+from labgrader.program.notebook import LARGEST_FILE, Unreadable, readable, refuse_long
+from labgrader.program.slice import NO_CELL, Program, program
 from labgrader.question import Question
 from labgrader.reply.judge import Verdict
 from labgrader.reply.messages import Marked
@@ -163,7 +163,7 @@ def why_its_file_is_not_graded() -> str:
     try:
         here = {} if jupyter() is None else jupyter().user_ns
         with open(here.get("__vsc_ipynb_file__") or os.environ["JPY_SESSION_NAME"], "rb") as file:
-            refuse_large(file.read(LARGEST_NOTEBOOK + 1))
+            readable(file.read(LARGEST_FILE + 1))
     except Unreadable as reason:
         return str(reason)
     except (OSError, KeyError, TypeError, ValueError):
@@ -188,14 +188,14 @@ def program_of(question: Question, answer: Callable) -> Program:
     name = question.function if namespace.get(question.function) is answer else getattr(answer, "__name__", "")
     blanks, here = of_topic(question.topic), course()
     given = {other: q.source for other, q in blanks.items() if namespace.get(other, q.reference) is q.reference}
-    cut = Program(refused="no cell defines it")
+    cut = Program(refused=f"{NO_CELL} it")
     for cells in places_of(answer, blanks):
         try:
             refuse_long(cells)
         except Unreadable as reason:
             return Program(refused=str(reason))
         cut = program(cells, name, blanks, here.packages, question.forbidden, here.kit, given, latest=True)
-        if not cut.refused.startswith("no cell defines"):
+        if not cut.refused.startswith(NO_CELL):
             return replace(cut, name=name)
     return Program(refused="there is no text that defines it alone: write it under its name, in a cell or in a file")
 

@@ -18,9 +18,9 @@ from labgrader.comparison import Problem
 from labgrader.course import asked, course, of_topic, topics
 from labgrader.handin.reading import released_by
 from labgrader.program.cell import Cell, Parsed, cells_of
-from labgrader.program.notebook import Unreadable, code_of, parse
+from labgrader.program.notebook import Unreadable, code_of, no_code, parse
 from labgrader.program.open_notebook import live_notebook, running_file
-from labgrader.program.slice import program
+from labgrader.program.slice import NO_CELL, program
 from labgrader.question import Question
 from labgrader.reply.judge import Verdict
 from labgrader.run import plain
@@ -55,12 +55,14 @@ def check_file(path: Path | str | None = None, start: Start = plain.fresh_worker
     if topic is None and not texts:
         raise ValueError(f"path: expected a lab of the course, but {path.name} calls no check of one")
     questions, tasks = (of_topic(topic), asked(topic)) if topic else ({}, {})
-    lab = CheckedLab(cells, questions, start)
+    lab = CheckedLab(cells, questions, start, no_code(notebook["cells"]))
     order = [cell.grade_id for cell in cells if cell.grade_id in questions]
     expected = [name for name in released_by(notebook)[1] or tasks if name in questions]
     names = list(dict.fromkeys([*order, *expected]))
     for name in names:
-        print(describe(questions[name], lab.verdict(name)))
+        verdict = lab.verdict(name)
+        note = lab.notes.get(name, "")
+        print(describe(questions[name], verdict, notes=[f"{note[:1].upper()}{note[1:]}."] if note else ()))
     right = sum(lab.verdict(name).passed for name in names)
     if names:
         print(f"{path.name}, {state}: {right} of {len(names)} answers are right.")
@@ -110,11 +112,16 @@ def topic_of(path: Path, cells: Sequence[Cell]) -> str | None:
 
 @dataclass
 class CheckedLab:
-    """The answers of a saved lab, each judged once."""
+    """The answers of a saved lab, each judged once.
+
+    no_code: what to say of those whose cells are no code; notes: which of several cells of an answer was judged.
+    """
 
     cells: Sequence[Cell]
     questions: dict[str, Question]
     start: Start = plain.fresh_worker
+    no_code: dict[str, str] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     budget: Budget = field(default_factory=lambda: Budget(LIMITS))
 
@@ -130,6 +137,9 @@ class CheckedLab:
         question, here = self.questions[name], course()
         asked = (name, self.questions, here.packages, question.forbidden, here.kit)
         cut = program(self.cells, *asked)
+        self.notes[name] = cut.note
+        if cut.refused.startswith(NO_CELL) and name in self.no_code:
+            return Verdict(Problem("refused", self.no_code[name]), None, "")
         wrong = [other for other in cut.calls if not self.verdict(other).passed]
         if wrong:
             given = {other: self.questions[other].source for other in wrong}

@@ -14,7 +14,8 @@ from labgrader.grade.read_programs import read_all
 from labgrader.grade.students import known_students, remove_students, rename_students
 from labgrader.grade.totals import finish_pages, settle
 from labgrader.handin.reading import Lab, read_lab, read_submissions
-from labgrader.handin.roster import read_roster
+from labgrader.handin.roster import absent_of, read_roster
+from labgrader.handin.several import read_picks
 from labgrader.report.alike import Found, find_alike, old_records
 from labgrader.report.alike_page import write_alike
 from labgrader.report.forget import keep_out_of_git
@@ -32,7 +33,8 @@ class Graded:
     but not here. renamed: new names by the old ones; gone: of whom there are pages and grades but no submission any
     more, in this run removed if it was to `tidy`. other_files: the notebook's name where it is not the lab's.
     new_gradebook: whether there were grades, and no gradebook beside them. kept_out: what git would have taken. alike:
-    the answers that are alike.
+    the answers that are alike. notes: what a person should know of a hand-in, by student. absent: who is in the roster
+    and handed in nothing.
     """
 
     lab: Lab
@@ -47,11 +49,20 @@ class Graded:
     new_gradebook: bool
     kept_out: list[str]
     alike: Found
+    notes: dict[str, str]
+    absent: list[str]
+
+    @property
+    def told(self) -> dict[str, str]:
+        """What the table says of hand-ins, by student."""
+        both = self.late.keys() | self.notes.keys()
+        return {one: "; ".join(filter(None, [self.late.get(one), self.notes.get(one)])) for one in both}
 
     @property
     def needs_a_look(self) -> bool:
         """Whether something is for a person to judge."""
-        return self.new_gradebook or bool(self.failures) or any(record.needs_a_look for record in self.records)
+        records = any(record.needs_a_look for record in self.records)
+        return self.new_gradebook or bool(self.failures or self.notes) or records
 
 
 @dataclass(frozen=True)
@@ -89,7 +100,8 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
     """
     course, how = Path(course), Options(**options)
     lab = read_lab(course, topic)
-    read = read_submissions(course / "submitted" if how.submissions is None else Path(how.submissions), lab)
+    folder = course / "submitted" if how.submissions is None else Path(how.submissions)
+    read = read_submissions(folder, lab, read_picks(course, topic))
     out = course / "grades" / topic if how.out is None else Path(how.out)
     deadline, roster = read_deadline(course, topic), read_roster(course)
     old = [] if how.against is None else old_records(how.against, topic)
@@ -98,6 +110,7 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
     if how.change is not None:
         add_change(course, lab, how.change)
     changes = read_changes(course, lab)
+    absent = [person.name or person.id for person in absent_of(roster, [one.student for one in read])]
     new_gradebook = bool(known_students(out)) and not (course / "gradebook.db").is_file()
     with private():
         secret = secret_for(out, how.seed, how.new_round)
@@ -113,7 +126,7 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
         if how.comment is not None:
             groups = [group.name for standing in standings(lab, records) for group in standing.groups]
             comments = add_comment(out, groups, *how.comment)
-        write_outputs(out, lab, records, comments)
+        write_outputs(out, lab, records, comments, absent)
         write_alike(out, lab, records, alike)
         failures = write_gradebook(course, lab, zip(records, read, strict=True), comments, roster)
         finals = settle(course, topic, changes, deadline)
@@ -125,9 +138,12 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
         kept_out = keep_out_of_git(course)
     late = {name: f"{final.late}, so {final.score:g} in all" for name, final in finals.items() if final.late.days}
     students = {record.student for record in records} | roster.keys()
-    files = {submission.student: submission.file for submission in read if submission.file}
+    files = {one.student: one.file for one in read if one.file and not one.others}
+    notes = {one.student: one.note for one in read if one.note}
+    notes |= {name: str(final.late) for name, final in finals.items() if final.late.unknown}
     odd = strangers(deadline, students)
-    return Graded(lab, records, graded_now, failures, late, odd, renamed, gone, files, new_gradebook, kept_out, alike)
+    told = failures, late, odd, renamed, gone, files, new_gradebook, kept_out, alike, notes, absent
+    return Graded(lab, records, graded_now, *told)
 
 
 @contextmanager

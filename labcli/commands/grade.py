@@ -76,7 +76,7 @@ def tell(graded, folder: Path, tidy: bool) -> None:
     from labgrader.support import counted
 
     topic = graded.lab.topic
-    typer.echo(terminal_table(graded.lab, graded.records, graded.late))
+    typer.echo(terminal_table(graded.lab, graded.records, graded.told, graded.absent))
     if graded.strangers:
         typer.echo(f"course.toml has extensions of nobody here: {', '.join(graded.strangers)}", err=True)
     for student, failure in graded.failures.items():

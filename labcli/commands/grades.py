@@ -13,6 +13,9 @@ def grades(
     moodle: Annotated[bool, typer.Option("--moodle", help="Moodle's grading worksheet, and its zip of pages.")] = False,
     canvas: Annotated[bool, typer.Option("--canvas", help="Canvas's columns, and its zip of pages.")] = False,
     gradescope: Annotated[bool, typer.Option("--gradescope", help="An autograder for Gradescope, as a zip.")] = False,
+    assignment: Annotated[
+        int | None, typer.Option(help="Canvas's number of the assignment, where its column has another name.", min=1)
+    ] = None,
     course: Annotated[Path, typer.Option(help="Folder that holds nbgrader's gradebook.", callback=of_course)] = Path(
         "."
     ),
@@ -29,6 +32,8 @@ def grades(
 
     if moodle + canvas + gradescope > 1:
         raise ValueError("expected one of --moodle, --canvas and --gradescope, got more")
+    if assignment is not None and not canvas:
+        raise ValueError("assignment: expected --canvas beside it, got another platform")
     platform = "moodle" if moodle else "canvas" if canvas else "scores"
     if topic == FOLDER and not gradescope:
         with private():
@@ -42,7 +47,7 @@ def grades(
             tell_written([write_autograder(course, topic)])
         return
     with private():
-        written = write_grades(course, topic, platform)
+        written = write_grades(course, topic, platform, assignment)
     if written.maximum != written.released:
         said = f"the maximum is {written.maximum:g} now, and was {written.released:g} in the lab that students got"
         typer.echo(f"{said}: set it in the assignment before you import")

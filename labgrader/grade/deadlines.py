@@ -8,11 +8,13 @@
 
     [[extension]]
     lab = "04_iou"
-    student = "Ada Lovelace_1234567"    # or the number alone
+    student = "Ada Lovelace_1234567"    # or the number alone, or an email of the roster or of Gradescope
     due = 2026-10-12T23:59:00           # or late_days = 0: so many days, whatever the clock says
     reason = "ill"
 
-A platform that says only that somebody is late (Canvas) is believed, and one day is counted.
+A platform that says only that somebody is late (Canvas) is believed, and one day is counted. It knows nothing of an
+extension here: until that is over nothing is taken off, and later neither, but then a person is told to write how many
+days it were.
 """
 
 import datetime
@@ -22,30 +24,42 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from labgrader.grade.settings import fault_of_fields, read_blocks
-from labgrader.handin.roster import keys_of
+from labgrader.handin.roster import ids_of, keys_of, read_roster
 from labgrader.support import counted
 
 DAY_S = 86400.0
+UNKNOWN = "nothing is taken off until its [[extension]] says late_days = N in the place of due"
 
 
 @dataclass(frozen=True)
 class Lateness:
     """How late work is, and what it costs. guessed: whether nobody knows more than that it is late.
 
-    free: days that cost nothing, of those that a student has in the whole course.
+    free: days that cost nothing, of those that a student has in the whole course. unknown: when an extension ended, in
+    UTC, where it is called late and may have come before or after that.
+
+    >>> str(Lateness(1, free=1)), str(Lateness(3, 20.0, free=1))
+    ('1 day late, covered by a free late day; no deduction', '3 days late, 1 of them free, 20 % less')
     """
 
     days: int = 0
     percent: float = 0.0
     guessed: bool = False
     free: int = 0
+    unknown: datetime.datetime | None = None
 
     def __str__(self) -> str:
+        if self.unknown is not None:
+            until = f"{self.unknown.replace(tzinfo=datetime.UTC).astimezone():%Y-%m-%d %H:%M}"
+            return f"its platform calls it late and not since when, its extension ended on {until}: {UNKNOWN}"
         if not self.days:
             return ""
         guessed = ", as its platform marks it late and does not say by how much" if self.guessed else ""
-        free = f", {self.free} of the free days" if self.free else ""
-        return f"{counted(self.days, 'day')} late{free}, {self.percent:g} % less{guessed}"
+        free = f", {self.free} of them free" if self.free else ""
+        if self.free == self.days:
+            free = f", covered by {'a free late day' if self.days == 1 else f'{self.days} free late days'}"
+        off = f", {self.percent:g} % less" if self.percent else "; no deduction"
+        return f"{counted(self.days, 'day')} late{guessed}{free}{off}"
 
 
 @dataclass(frozen=True)
@@ -65,16 +79,24 @@ class Deadline:
         """A student's extension, {} for none."""
         return next((self.extensions[key] for key in keys_of(student) if key in self.extensions), {})
 
-    def lateness(self, student: str, handed_in: datetime.datetime | None, marked: bool = False) -> Lateness:
-        """How late a student is; handed_in: in UTC, None if unknown; marked: whether the platform calls it late."""
+    def lateness(
+        self, student: str, handed_in: datetime.datetime | None, marked: datetime.datetime | None = None
+    ) -> Lateness:
+        """How late a student is, times being in UTC. handed_in: None if unknown.
+
+        marked: where the platform calls it late and does not say since when, a time by which it was there.
+        """
         extension = self.extension(student)
         if "late_days" in extension:
             days, guessed = math.ceil(extension["late_days"]), False
         elif handed_in is not None:
             seconds, guessed = (handed_in - self.due_for(student)).total_seconds(), False
             days = math.ceil(seconds / DAY_S) if seconds > 60.0 * self.grace_minutes else 0
+        elif marked is not None and "due" in extension:
+            on_time = (marked - extension["due"]).total_seconds() <= 60.0 * self.grace_minutes
+            return Lateness() if on_time else Lateness(unknown=extension["due"])
         else:
-            days, guessed = int(marked), marked
+            days, guessed = int(marked is not None), marked is not None
         return Lateness(days, min(100.0, days * self.penalty_per_day), guessed)
 
     def with_free(self, late: Lateness, free: int) -> Lateness:
@@ -84,18 +106,19 @@ class Deadline:
 
 def read_deadline(course: Path, topic: str) -> Deadline | None:
     """The deadline of a lab in course.toml, None if there is none; ValueError, with its line, for what cannot be."""
-    extensions: dict[str, dict] = {}
+    roster, extensions = read_roster(course), {}
     for where, data in read_blocks(course, "extension"):
         needed = {"lab": str, "student": str, "reason": str}
         fault = fault_of_fields(data, needed, {"due": datetime.date, "late_days": float})
         if not fault and ("due" in data) == ("late_days" in data):
             fault = "expected one of due = DATE and late_days = NUMBER in this block"
-        if not fault and data["lab"] == topic and data["student"] in extensions:
+        ids = ids_of(roster, data["student"]) if not fault else []
+        if not fault and data["lab"] == topic and set(ids) & extensions.keys():
             fault = f"student: {data['student']} has an extension above"
         if fault:
             raise ValueError(f"{where}: {fault}")
         if data["lab"] == topic:
-            extensions[data["student"]] = data | ({"due": in_utc(data["due"])} if "due" in data else {})
+            extensions |= dict.fromkeys(ids, data | ({"due": in_utc(data["due"])} if "due" in data else {}))
     found = None
     for where, data in read_blocks(course, "deadline"):
         needed = {"lab": str, "due": datetime.date}

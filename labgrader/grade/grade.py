@@ -27,7 +27,7 @@ from labgrader.course import course, of_topic
 from labgrader.grade import copied_code
 from labgrader.grade.diagnose_outputs import Diagnosis, diagnosers
 from labgrader.handin.reading import Lab, Submission
-from labgrader.program.slice import Program
+from labgrader.program.slice import NO_CELL, Program
 from labgrader.question import Question
 from labgrader.reply.judge import Verdict
 from labgrader.run.channel import Changed, WorkerLost
@@ -52,7 +52,7 @@ class Result:
     kind: of problem, "" for a right answer: "refused" and "syntax" were not run, others are those of `Problem`.
     behaviour: a name for wrong outputs whose mistake no hint names: the same outputs, the same name. program: what was
     run; late: whether that is `Program.late`. parts: the named outputs that are right in all cases; they earn nothing
-    unless a change says so (`changes`).
+    unless a change says so (`changes`). note: which of several cells was graded, for student and instructor.
     """
 
     question: str
@@ -68,6 +68,7 @@ class Result:
     kind: str = ""
     parts: tuple[str, ...] = ()
     late: bool = False
+    note: str = ""
 
 
 class Grading:
@@ -136,6 +137,7 @@ class Grading:
         if name not in self.drafts:
             self.drafts[name] = not_gradable(self.lab, name, "it calls itself through another answer")
             self.drafts[name] = self.unless_it_fails(name, lambda: self.judged_in_public(name))
+            self.drafts[name] = replace(self.drafts[name], note=self.note(name))
         return self.drafts[name]
 
     def unless_it_fails(self, name: str, judge: Callable[[], Result]) -> Result:
@@ -148,6 +150,10 @@ class Grading:
             where = f"{type(error).__name__} in {Path(place.filename).name}, line {place.lineno}"
             return replace(not_gradable(self.lab, name, NOT_JUDGED), flag=f"the grader failed: {where}; grade it again")
 
+    def note(self, name: str) -> str:
+        """Which of several cells with an answer's grade id was graded, "" if there is one alone."""
+        return self.cuts[name][0].note if "cuts" in self.__dict__ else ""
+
     def judged_in_public(self, name: str) -> Result:
         """Judge an answer on the public cases, and say what is wrong with a wrong one."""
         question, worth = self.questions[name], self.lab.points[name]
@@ -157,7 +163,9 @@ class Grading:
             return not_gradable(self.lab, name, f"this task was another one in the lab that {released}")
         program = self.program(name, lambda other: self.draft(other).right)
         if program.refused and program.late is None:
-            refused = not_gradable(self.lab, name, program.refused)
+            is_absent = program.refused.startswith(NO_CELL)
+            why = self.submission.no_code.get(name, program.refused) if is_absent else program.refused
+            refused = not_gradable(self.lab, name, why)
             return replace(refused, program=self.submission.cells.get(name, ""))
         flags = copied_code.of_the_kit(self.cuts[name][1], question)
         flags += self.of_later_tasks(name, lambda other: self.draft(other).right)

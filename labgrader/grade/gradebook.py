@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import quote
 
 import nbformat
 from nbgrader.api import (
@@ -30,13 +31,15 @@ from nbgrader.api import (
 )
 from nbgrader.preprocessors import SaveCells
 from nbgrader.utils import parse_utc
+from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
 from labgrader.grade.batch import Record
-from labgrader.grade.markdown import harmless_markdown
+from labgrader.grade.markdown import harmless_markdown, harmless_with_pictures
 from labgrader.grade.nbgrader_plugins import KERNEL, RUBRIC_TAG
-from labgrader.handin.reading import Lab, Submission, grade_id, source_of, text_of
+from labgrader.handin.reading import Lab, Submission, source_of, text_of
 from labgrader.handin.roster import Person, person_of
+from labgrader.program.notebook import grade_id
 from labgrader.report.outputs import lines_of
 from labgrader.sandbox.sandbox import NO_SANDBOX
 from labgrader.support import inherited, write_atomically
@@ -145,8 +148,12 @@ def fault_of_file(error: Exception) -> str:
 
 
 def url_of(course: Path) -> str:
-    """Where nbgrader keeps its gradebook by default."""
-    return f"sqlite:///{course.resolve() / 'gradebook.db'}"
+    """Where nbgrader keeps its gradebook by default; escaped, by whom it will be read, if its path holds ?, % or #."""
+    path = str(course.resolve() / "gradebook.db")
+    for address in (f"sqlite:///{path}", f"sqlite:///{quote(path)}"):
+        if (found := make_url(address)).database == path and not found.query:
+            return address
+    return f"sqlite:///file:{quote(path)}?uri=true"  # SQLAlchemy 2.0 escapes nothing, but SQLite does
 
 
 def register(course: Path, lab: Lab) -> None:
@@ -178,7 +185,7 @@ def write_scores(gradebook, lab: Lab, record: Record, submission: Submission, co
         gradebook.find_comment(result.question, *where).auto_comment = said
     released = {grade_id(cell): source_of(cell) for cell in lab.notebook["cells"]}
     for name in lab.written:
-        answered = submission.cells.get(name, released[name]) != released[name]
+        answered = submission.cells.get(name, released[name]) != released[name] or name in submission.pictures
         grade = gradebook.find_grade(name, *where)
         grade.auto_score = None if answered else 0.0
         grade.needs_manual_grade = answered or grade.manual_score is not None
@@ -263,7 +270,10 @@ def copy_for_formgrader(
         name = grade_id(cell)
         answer = programs.get(name) or submission.cells.get(name)
         if answer is not None and cell["metadata"]["nbgrader"].get("solution"):
-            cell["source"] = answer if cell["cell_type"] == "code" else harmless_markdown(answer)
+            cell["source"] = answer
+            if cell["cell_type"] != "code":
+                cell["source"], shown = harmless_with_pictures(answer, submission.pictures.get(name, {}))
+                cell |= {"attachments": shown} if shown else {}
         if cell["cell_type"] == "code":
             cell["outputs"], cell["execution_count"] = [], None
         if name in results:

@@ -89,7 +89,7 @@ def free_days(course: Path, gradebook, topic: str, late_days: int) -> Counter[st
         deadline, marked, used = deadlines[lab], marked_late(course, lab), Counter()
         for submission in gradebook.assignment_submissions(lab):
             student = submission.student.id
-            days = deadline.lateness(student, submission.timestamp, student in marked).days
+            days = deadline.lateness(student, submission.timestamp, marked.get(student)).days
             who = identity(roster, student)
             used[student] = min(days, left.setdefault(who, late_days))
             left[who] -= used[student]

@@ -8,7 +8,7 @@ from pathlib import Path
 from labgrader.course import topics
 
 FILE = "course.toml"
-TABLES = ("change", "deadline", "extension", "bonus", "weight", "course")
+TABLES = ("change", "deadline", "extension", "notebook", "bonus", "weight", "course", "canvas")
 YEARS = range(2000, 2200)  # of dates, so that no zone or extension leads out of the calendar
 WORDS = {
     str: "a text",

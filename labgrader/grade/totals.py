@@ -50,7 +50,7 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             gradebook.db.commit()  # which computes the scores
             late = Lateness()
             if deadline is not None:
-                late = deadline.lateness(student, submission.timestamp, student in marked)
+                late = deadline.lateness(student, submission.timestamp, marked.get(student))
                 late = deadline.with_free(late, free[student])
                 submission.extension = deadline.due_for(student) - deadline.due or None
             notebook.late_submission_penalty = notebook.score * late.percent / 100.0
@@ -60,12 +60,17 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             waits = tuple(grade.name.removeprefix("check_") for grade in grades if grade.needs_manual_grade)
             begin = "So far" if waits else "All together"
             total = f"<h2>{begin}: {score:g} of {submission.max_score:g} points</h2>"
-            notes = [f"<p>{NOT_FINAL}.</p>" if waits else "", f"<p>Handed in {late}. {OFF}</p>" if late.days else ""]
+            notes = [f"<p>{NOT_FINAL}.</p>" if waits else "", handed_in_late(late)]
             more = [f"<p>{counted(extra, 'point')} more for everybody: {escape(reason)}</p>" for extra, reason in bonus]
             section = "\n".join(filter(None, [*sections, *more, total, *notes]))
             found[student] = Final(student, score, submission.max_score, waits, late, section)
         gradebook.db.commit()
     return dict(sorted(found.items()))
+
+
+def handed_in_late(late: Lateness) -> str:
+    """What a page says of late work, "" if it came in time."""
+    return f"<p>Handed in {late}.{f' {OFF}' if late.percent else ''}</p>" if late.days else ""
 
 
 def under(grade, comment, change: Change | None) -> None:

@@ -11,18 +11,24 @@ import hashlib
 import json
 import os
 import stat
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from labgrader.course import asked, of_topic
 from labgrader.course import course as course_here
+from labgrader.handin.pictures import Pictures, pictures_of
+from labgrader.handin.roster import keys_of
+from labgrader.handin.several import OTHERS, SEVERAL
 from labgrader.program.cell import Cell
-from labgrader.program.notebook import LARGEST_NOTEBOOK, MOST_SOURCE, Unreadable, code_of, parse
+from labgrader.program.notebook import LARGEST_FILE, MOST_SOURCE, Unreadable, code_of, grade_id, no_code, parse
 
 LONGEST_NAME = 220  # bytes: the names of a student's pages are longer, and no file's has more than 255
 LONGEST_SHOWN = 60  # characters of a name that will not do
+LONGEST_SAID = 200  # characters of what stands for a notebook
 MOST_NAMED = 3  # files that are named in the place of one that is not there
 BESIDE = ("timestamp.txt", "submission_secret.txt")  # nbgrader's
+LEFT_OUT = "left_out.txt"  # stands for a student who handed in no notebook, and says what came instead
 ODD_NAME = "odd-name-"
 # What pages, scripts, shells, addresses, other file systems or spreadsheets would read as more than a letter of a name.
 UNSAFE_IN_NAMES = frozenset('<>"`/\\:*?|;%')
@@ -52,7 +58,8 @@ class Submission:
     reason: why it cannot be graded; "" if it can. outdated: tasks that were other ones in the lab that the student had,
     with the version of the kit that released it. timestamp and secret: what nbgrader's timestamp.txt and
     submission_secret.txt beside the notebook say; nbgrader gives feedback back by them. file: the notebook's name, if
-    it is another one than the lab's.
+    it is another one than the lab's. others: names of notebooks that were handed in beside it, and differ. no_code:
+    what to say of answers whose cells are no code any more. pictures: those attached to answers in words, by grade id.
     """
 
     student: str
@@ -64,6 +71,15 @@ class Submission:
     timestamp: str = ""
     secret: str = ""
     file: str = ""
+    others: tuple[str, ...] = ()
+    no_code: dict[str, str] = field(default_factory=dict)
+    pictures: dict[str, Pictures] = field(default_factory=dict)
+
+    @property
+    def note(self) -> str:
+        """Which of several notebooks was graded, "" if there is one alone."""
+        said = f"{', '.join(self.others[:MOST_NAMED])}{', ...' if len(self.others) > MOST_NAMED else ''}"
+        return f"of its notebooks {self.file} was graded, not {said}" if self.others else ""
 
 
 def read_lab(course: Path, topic: str) -> Lab:
@@ -111,29 +127,35 @@ def released_by(notebook: dict) -> tuple[str, dict[str, str]]:
 # -------------------------------------------------------------------------------------------------- submissions
 
 
-def read_submissions(folder: Path, lab: Lab) -> list[Submission]:
+def read_submissions(folder: Path, lab: Lab, picks: Mapping[str, str] | None = None) -> list[Submission]:
     """Read what is in a folder of students' folders, by their names; each file once.
 
-    A student who handed in nothing of this topic is passed over, and so is what begins with a dot and holds nothing of
-    it. What a student put there never raises; ValueError says that there is no such folder.
+    picks: by student the notebook that a person named (`several`). A student who handed in nothing of this topic is
+    passed over, and so is what begins with a dot and holds nothing of it. What a student put there never raises;
+    ValueError says that there is no such folder.
     """
-    folder = Path(folder)
+    folder, picks = Path(folder), picks or {}
     if not folder.is_dir():
         raise ValueError(f"submissions: expected a folder of students' folders, got {folder}")
     names = sorted((entry.name for entry in os.scandir(folder)), key=os.fsencode)
     names = [name for name in names if not name.startswith(".") or os.path.isdir(folder / name / lab.topic)]
-    read = [read_submission(folder / name, lab) for name in names]
+    read = [read_submission(folder / name, lab, pick_of(picks, name)) for name in names]
     return [submission for submission in read if submission is not None]
 
 
-def read_submission(place: Path, lab: Lab) -> Submission | None:
+def pick_of(picks: Mapping[str, str], student: str) -> str:
+    """The notebook that a person named for a student, "" for none."""
+    return next((picks[key] for key in keys_of(student) if key in picks), "")
+
+
+def read_submission(place: Path, lab: Lab, pick: str = "") -> Submission | None:
     """Read what a student's folder holds of a lab, None if it has no folder of it; never raises for what it holds."""
     student, digest = name_of(place.name), "unreadable"
     try:
-        notebook = find_notebook(place, lab.topic)
+        notebook = find_notebook(place, lab.topic, pick)
         if notebook is None:
             return None
-        data = read_bytes(notebook, LARGEST_NOTEBOOK)
+        data = read_bytes(notebook, LARGEST_FILE)
         digest = hashlib.sha256(data).hexdigest()
         content = parse(data)
         other = "" if notebook.stem == lab.topic else printable(notebook.name)
@@ -145,8 +167,35 @@ def read_submission(place: Path, lab: Lab) -> Submission | None:
     except Exception as error:  # of one student's folder: the others are read all the same
         why = getattr(error, "strerror", None) or type(error).__name__
         return Submission(student, reason=f"it cannot be opened: {why}", digest=digest)
-    beside = text_of(notebook.with_name("timestamp.txt")), text_of(notebook.with_name("submission_secret.txt"))
-    return Submission(student, code, cells, "", digest, outdated(content, lab), *beside, other)
+    folder = place / lab.topic
+    beside = text_of(folder / "timestamp.txt"), text_of(folder / "submission_secret.txt")
+    others = () if pick else others_of(folder, notebook, data)
+    file = printable(notebook.name) if others else other
+    pictures = pictures_of(content["cells"], lab.written)
+    told = outdated(content, lab), *beside, file, others, no_code(content["cells"]), pictures
+    return Submission(student, code, cells, "", digest, *told)
+
+
+def others_of(folder: Path, notebook: Path, data: bytes) -> tuple[str, ...]:
+    """The names of the notebooks that were handed in beside the one that is graded; copies of it are not named."""
+    found = [path for path in notebooks_in(folder, OTHERS) if path != notebook]
+    return tuple(printable(path.name) for path in found if not is_same(path, data))
+
+
+def is_same(path: Path, data: bytes) -> bool:
+    """Whether a file has these bytes; False if it cannot be read."""
+    try:
+        return read_bytes(path, len(data)) == data
+    except (OSError, Unreadable):
+        return False
+
+
+def notebooks_in(folder: Path, *inner: str) -> list[Path]:
+    """The notebooks in a folder, and in some folders in it, by their names; follows no link."""
+    places = [folder, *(folder / name for name in inner)]
+    there = [place for place in places if stat.S_ISDIR(mode_of(place) or 0)]
+    names = [(place, sorted(entry.name for entry in os.scandir(place))) for place in there]
+    return [place / name for place, some in names for name in some if name.endswith(".ipynb") and name[0] != "."]
 
 
 def outdated(notebook: dict, lab: Lab) -> dict[str, str]:
@@ -163,10 +212,10 @@ def text_of(path: Path) -> str:
         return ""
 
 
-def find_notebook(place: Path, topic: str) -> Path | None:
+def find_notebook(place: Path, topic: str, pick: str = "") -> Path | None:
     """The notebook in a student's folder, None if there is no folder of this topic; follows no link.
 
-    Where none has the lab's name and there is one notebook alone, it is that one.
+    Where none has the lab's name and there is one notebook alone, it is that one. pick: its name, if a person chose it.
     """
     if not is_folder(place, "the student's folder"):
         raise Unreadable(f"not in a student's folder; expected STUDENT/{topic}/{topic}.ipynb")
@@ -174,27 +223,59 @@ def find_notebook(place: Path, topic: str) -> Path | None:
         raise Unreadable(f"rename the student's folder {printable(place.name)}: {fault}")
     if not is_folder(place / topic, f"the folder {topic}"):
         return None
+    if pick:
+        return picked(place / topic, pick)
+    several, there = notebooks_in(place / topic, SEVERAL), notebooks_in(place / topic)
     notebook = place / topic / f"{topic}.ipynb"
-    mode = mode_of(notebook)
-    if mode is None:
-        names = sorted(entry.name for entry in os.scandir(place / topic) if not entry.name.startswith("."))
-        others = [name for name in names if name.endswith(".ipynb")]
-        if len(others) != 1:
-            names = [printable(name) for name in (others or names) if name not in BESIDE]
-            there = ", ".join(names[:MOST_NAMED]) + (", ..." if len(names) > MOST_NAMED else "")
-            mend = f"it holds {there}; rename the one to be graded" if there else "it is empty"
-            raise Unreadable(f"the folder {topic} holds no {topic}.ipynb: {mend}")
-        notebook = notebook.with_name(others[0])
-        mode = mode_of(notebook)
-    if mode is None or not stat.S_ISREG(mode):
-        what = "no file" if mode is None or not stat.S_ISLNK(mode) else "a symbolic link"
-        raise Unreadable(f"{printable(notebook.name)} is {what}")
+    if len(several) > len(there):
+        raise Unreadable(f"it is not known which of {listed(several)} is the later one: {NAME_ONE}")
+    if mode_of(notebook) is None:
+        if len(there) != 1:
+            raise Unreadable(why_none(place / topic, there))
+        notebook = there[0]
+    refuse_odd(notebook)
     return notebook
 
 
-def printable(name: str) -> str:
+NAME_ONE = "name the one to be graded in [[notebook]] of course.toml"
+
+
+def picked(folder: Path, pick: str) -> Path:
+    """The notebook of a student's that a person named, with or without what a platform tells before its name."""
+    there = notebooks_in(folder, OTHERS, SEVERAL)
+    found = [path for path in there if path.name == pick] or [path for path in there if path.name.endswith(f", {pick}")]
+    if len(found) != 1:
+        said = "none" if not found else f"{len(found)} of them"
+        raise Unreadable(f"[[notebook]] of course.toml names {pick}, which {said} of {listed(there)} is")
+    refuse_odd(found[0])
+    return found[0]
+
+
+def why_none(folder: Path, there: Sequence[Path]) -> str:
+    """Why no notebook of a folder is graded."""
+    if not there and (said := text_of(folder / LEFT_OUT)):
+        return printable(said, LONGEST_SAID)
+    names = there or [path for path in sorted(folder.iterdir()) if path.name[0] != "." and path.name not in BESIDE]
+    mend = f"it holds {listed(names)}; {NAME_ONE if there else 'expected a notebook'}" if names else "it is empty"
+    return f"the folder {folder.name} holds no {folder.name}.ipynb: {mend}"
+
+
+def listed(paths: Sequence[Path]) -> str:
+    """The first names of some files."""
+    return ", ".join([printable(path.name) for path in paths[:MOST_NAMED]] + ["..."] * (len(paths) > MOST_NAMED))
+
+
+def refuse_odd(notebook: Path) -> None:
+    """Raise Unreadable for what is no file."""
+    mode = mode_of(notebook)
+    if mode is None or not stat.S_ISREG(mode):
+        what = "no file" if mode is None or not stat.S_ISLNK(mode) else "a symbolic link"
+        raise Unreadable(f"{printable(notebook.name)} is {what}")
+
+
+def printable(name: str, most: int = LONGEST_SHOWN) -> str:
     """The beginning of a stranger's name for a file, as a table and a terminal may show it."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name[:LONGEST_SHOWN])
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name[:most])
 
 
 def is_copy_of(notebook: dict, lab: Lab) -> bool:
@@ -263,15 +344,6 @@ def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]
     if not any(texts.values()) and not any(f"def {name}" in cell.source for name in lab.answers for cell in code):
         raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
     return code, {name: "\n\n".join(found) for name, found in texts.items() if found}
-
-
-def grade_id(cell: object) -> str | None:
-    """The grade id of a cell, None if it has none or is none."""
-    try:
-        name = cell["metadata"]["nbgrader"]["grade_id"]
-    except (TypeError, KeyError):
-        return None
-    return name if isinstance(name, str) else None
 
 
 def source_of(cell: dict) -> str | None:

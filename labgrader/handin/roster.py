@@ -9,7 +9,7 @@ import csv
 import io
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,6 +61,18 @@ def identity(roster: dict[str, Person], student: str) -> str:
     return (person.email or person.id) if person is not None else student
 
 
+def absent_of(roster: dict[str, Person], students: Iterable[str]) -> list[Person]:
+    """The people of a roster of whom there is no folder, each once."""
+    here = {identity(roster, student) for student in students}
+    absent = {identity(roster, person.id): person for person in roster.values()}
+    return [person for who, person in absent.items() if who not in here]
+
+
+def ids_of(roster: dict[str, Person], name: str) -> list[str]:
+    """The ids of whoever has this email, else the name itself: a folder's, or the number at its end."""
+    return [person.id for person in roster.values() if person.email and person.email == name] or [name]
+
+
 def read_roster(course: Path) -> dict[str, Person]:
     """The roster by id, {} if there is no file. Raises ValueError, with file and line, for what cannot be used."""
     path = Path(course) / FILE
@@ -91,7 +103,8 @@ def people_of(rows: Iterator[list[str]], path: Path, first: str) -> dict[str, Pe
     people: dict[str, Person] = {}
     for row in rows:
         row = [plain(cell) for cell in row]
-        if not any(row) or row[0] in ("Points Possible", "Student, Test"):  # of Canvas
+        is_canvass = row[:1] in (["Points Possible"], ["Student, Test"]) or not set(row) - {"", "Manual Posting"}
+        if is_canvass:
             continue
         values = {name: row[at] if at is not None and at < len(row) else "" for name, at in places.items()}
         values["id"] = values["id"].removeprefix("Participant ")

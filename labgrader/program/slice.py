@@ -30,6 +30,7 @@ QUIET = {
 }
 QUIET_MODULES = ("tqdm", "IPython")
 SILENT, OF_THE_KIT = "quiet", ", the kit's"  # pieces of a program that no student wrote: a label, and how one ends
+NO_CELL = "no cell defines"  # begins the refusal of a notebook without the answer
 WINDOWS = {"tkinter", "turtle"}  # of the standard library, and not there without a screen: editors import them unasked
 
 
@@ -41,7 +42,8 @@ class Program:
     those of the cell. calls: other blanks that the answer calls, directly or not. refused: why the answer cannot be
     graded, in words for its student; "" if it can. name: of the function that is called, "" for the question's. late:
     the program with what stands lowest in the notebook, where cells below the answer define names of it anew: it counts
-    if this one is wrong, since it is what a kernel has in the end.
+    if this one is wrong, since it is what a kernel has in the end. copies: which code cells, counted from 1, have the
+    answer's grade id and differ: a cell was copied to try again, or split; the last of them is the answer.
     """
 
     pieces: tuple[tuple[str, str], ...] = ()
@@ -49,6 +51,20 @@ class Program:
     refused: str = ""
     name: str = ""
     late: "Program | None" = None
+    copies: tuple[int, ...] = ()
+
+    @property
+    def note(self) -> str:
+        """What to tell of an answer with several cells, "" if it has one.
+
+        >>> Program(copies=(4, 6)).note
+        'code cells 4 and 6 both define it, and the lower one counts, as in a run from top to bottom'
+        """
+        *first, last = map(str, self.copies or ("",))
+        which = "both define it, and the lower one" if len(first) == 1 else "all define it, and the lowest one"
+        return (
+            f"code cells {', '.join(first)} and {last} {which} counts, as in a run from top to bottom" if first else ""
+        )
 
 
 class Refused(Exception):
@@ -126,6 +142,7 @@ class Slice:
         self.chosen: dict[int, set[int]] = {}  # positions of statements, by cell
         self.calls: dict[str, None] = {}  # other blanks, in the order in which they are met
         self.quiet: dict[str, None] = {}  # names of QUIET that no cell gives a value
+        self.copies: tuple[int, ...] = ()
         self.lower = False
 
     def program(self) -> Program:
@@ -140,7 +157,7 @@ class Slice:
         for where in sorted(self.chosen):
             label = self.name if where == self.home else f"cell {where + 1}"
             pieces.append((label, hushed(self.cells[where].kept(self.chosen[where]))))
-        return Program(tuple(pieces), tuple(self.calls))
+        return Program(tuple(pieces), tuple(self.calls), copies=self.copies)
 
     def follow(self) -> None:
         """Follow names from the answer to the statements that give them values, and to what these need, and so on."""
@@ -178,13 +195,13 @@ class Slice:
                     yield where, statement
 
     def home_of_answer(self) -> int:
-        """The cell that holds the answer; raises Refused if there is none, or several that differ."""
+        """The cell that holds the answer: of several with its grade id the last; raises Refused if there is none."""
         name, cells = self.name, self.cells
         marked = [i for i, cell in enumerate(cells) if cell.grade_id == name]
         binding = [i for i in marked if name in cells[i].binds]
         answered = [i for i in binding if not cells[i].is_blank(name)]
         if len({cells[i].dump for i in answered}) > 1:
-            raise Refused(f"{len(answered)} different cells have its grade id: keep one")
+            self.copies = tuple(i + 1 for i in answered)
         elsewhere = [i for i, cell in enumerate(cells) if i not in marked and cell.defines(name)]
         if self.latest and elsewhere:
             if not answered or answered[-1] > elsewhere[-1]:
@@ -194,7 +211,7 @@ class Slice:
         elsewhere = [i for i in elsewhere if not cells[i].is_blank(name)]
         if found := answered or elsewhere or binding:
             return found[-1]
-        raise Refused(next((cells[i].problem for i in marked if cells[i].problem), f"no cell defines {name}"))
+        raise Refused(next((cells[i].problem for i in marked if cells[i].problem), f"{NO_CELL} {name}"))
 
     def place(self, wanted: str, asking: int) -> int | None:
         """The cell that gives a name its value for a cell that needs it; None if that is Python's own, or nobody's."""

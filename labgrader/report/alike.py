@@ -18,8 +18,9 @@ from labgrader.course import of_topic
 from labgrader.grade.batch import Record, read_record
 from labgrader.grade.read_programs import Read, read
 from labgrader.grade.shapes import Shapes
-from labgrader.handin.reading import Lab, grade_id, source_of
+from labgrader.handin.reading import Lab, source_of
 from labgrader.handin.roster import keys_of
+from labgrader.program.notebook import grade_id
 
 ALIKE, LEAST = 0.7, 6  # the share of two answers' own shapes that is the same, and how many these are at least
 COPIED, LEAST_COPIED = 0.9, 8  # the same for an answer and the kit's own, of which nothing was taken away
@@ -51,11 +52,40 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class Group:
+    """Answers to a question of which each is alike to another one: two, or a crowd with one answer.
+
+    least, most: the shares that pairs of them have; shared: shapes that at least two of them share.
+    """
+
+    question: str
+    hands: tuple[Hand, ...]
+    least: float
+    most: float
+    shared: frozenset[str]
+
+
+@dataclass(frozen=True)
 class Found:
     """The pairs in a lab, those who share most first. unread: answers that could not be compared, STUDENT: QUESTION."""
 
     pairs: tuple[Pair, ...] = ()
     unread: tuple[str, ...] = ()
+
+    @property
+    def groups(self) -> list[Group]:
+        """The pairs put together: whoever is alike to one of a group is in it."""
+        together: dict[tuple[str, str], list[Pair]] = {}  # by question and person; one list for all of a group
+        for pair in self.pairs:
+            keys = [(pair.question, str(hand)) for hand in (pair.one, pair.other)]
+            one, other = (together.setdefault(key, []) for key in keys)
+            if one is not other:
+                one += other
+                for inside in other:
+                    together |= dict.fromkeys([(inside.question, str(h)) for h in (inside.one, inside.other)], one)
+                together[keys[1]] = one
+            one.append(pair)
+        return [group_of(pairs) for pairs in {id(pairs): pairs for pairs in together.values()}.values()]
 
 
 def find_alike(
@@ -146,9 +176,17 @@ def copies_of(question: str, hands: Sequence[Hand], models: Sequence[Hand], rele
                 break
 
 
-def by_people(pairs: Sequence[Pair]) -> Mapping[tuple[str, str], list[Pair]]:
-    """The pairs of the same two, in order."""
-    found: dict[tuple[str, str], list[Pair]] = defaultdict(list)
-    for pair in pairs:
-        found[str(pair.one), str(pair.other)].append(pair)
-    return dict(sorted(found.items(), key=lambda item: -sum(len(pair.shared) for pair in item[1])))
+def group_of(pairs: Sequence[Pair]) -> Group:
+    """Some pairs as one group."""
+    hands = {str(hand): hand for pair in pairs for hand in (pair.one, pair.other)}
+    shares = [pair.share for pair in pairs]
+    shared = frozenset().union(*(pair.shared for pair in pairs))
+    return Group(pairs[0].question, tuple(hands.values()), min(shares), max(shares), shared)
+
+
+def by_people(groups: Sequence[Group]) -> Mapping[tuple[str, ...], list[Group]]:
+    """The groups of the same people, in order."""
+    found: dict[tuple[str, ...], list[Group]] = defaultdict(list)
+    for group in groups:
+        found[tuple(sorted(map(str, group.hands)))].append(group)
+    return dict(sorted(found.items(), key=lambda item: -sum(len(group.shared) for group in item[1])))

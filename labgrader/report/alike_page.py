@@ -6,20 +6,21 @@ from pathlib import Path
 
 from labgrader.grade.batch import Record
 from labgrader.handin.reading import Lab
-from labgrader.report.alike import Found, Hand, Pair, by_people
+from labgrader.report.alike import Found, Group, Hand, by_people
 from labgrader.report.outputs import harmless, new_table, page, warning_of
 from labgrader.support import write_atomically
 
-MOST_SHOWN = 200  # pairs of answers on the page; the table has all
-MOST_NAMED = 10  # pairs of people in the terminal
+MOST_SHOWN = 200  # groups of answers on the page; the table has all pairs
+MOST_NAMED = 10  # groups of people in the terminal
+MOST_PEOPLE = 4  # of a group, in the terminal
 COLUMNS = ("question", "student", "other", "share", "shapes")
 WIDE = """body{max-width:96rem}.pair{display:grid;grid-template-columns:1fr 1fr;gap:1rem}
 .pair pre{white-space:pre-wrap;overflow-wrap:anywhere;margin:.2rem 0}mark{background:#ffe9a8}
 @media(max-width:60rem){.pair{grid-template-columns:1fr}}"""
 SAYS = (
-    "Each pair shares most of what is its own: what is in the lab, in the model solution or in many answers was left "
-    "out. Marked are the lines that hold it. Names, layout and order do not count. This is a reason to read, not a "
-    "proof, and no grade changes by it."
+    "Each answer shares most of what is its own with another one of its group: what is in the lab, in the model "
+    "solution or in many answers was left out. Marked are the lines that hold it. Names, layout and order do not "
+    "count. This is a reason to read, not a proof, and no grade changes by it."
 )
 
 
@@ -47,40 +48,64 @@ def alike_page(lab: Lab, records: Sequence[Record], found: Found) -> str:
     if found.unread:
         parts.append(f'<p class="warning">Could not be compared: {escape(", ".join(found.unread))}.</p>')
     shown = 0
-    for (one, other), pairs in by_people(found.pairs).items():
+    for people, groups in by_people(found.groups).items():
         if shown < MOST_SHOWN:
-            parts.append(f'<section class="look"><h2>{escape(one)} and {escape(other)}</h2>')
-            parts += [*map(side_by_side, pairs), "</section>"]
-        shown += len(pairs)
+            parts.append(f'<section class="look"><h2>{escape(in_words(people))}</h2>')
+            parts += [*map(side_by_side, groups), "</section>"]
+        shown += len(groups)
     if shown > MOST_SHOWN:
-        parts.append(f"<p>The first of {shown} pairs of answers; alike.csv has all of them.</p>")
+        parts.append(f"<p>The first of {shown} groups of answers; alike.csv has all pairs of them.</p>")
     return page(escape(f"{lab.topic}: alike"), parts, WIDE)
 
 
-def side_by_side(pair: Pair) -> str:
-    """Two answers beside each other."""
-    said = f"{escape(pair.question)}: {100 * pair.share:.0f} % of what is their own, {len(pair.shared)} shapes"
-    both = "".join(marked(hand, pair) for hand in (pair.one, pair.other))
+def in_words(people: Sequence[str]) -> str:
+    """Some names, and before many of them how many they are.
+
+    >>> in_words(["ada", "ben"]), in_words(["a", "b", "c"])
+    ('ada and ben', '3 answers: a, b and c')
+    """
+    said = f"{', '.join(people[:-1])} and {people[-1]}"
+    return said if len(people) == 2 else f"{len(people)} answers: {said}"
+
+
+def side_by_side(group: Group) -> str:
+    """The different programs of a group beside each other."""
+    share = f"{100 * group.least:.0f}" + (f" to {100 * group.most:.0f}" if group.most - group.least > 0.005 else "")
+    said = f"{escape(group.question)}: {share} % of what is their own, {len(group.shared)} shapes"
+    programs: dict[str, list[Hand]] = {}
+    for hand in group.hands:
+        programs.setdefault(hand.program, []).append(hand)
+    if len(programs) == 1:
+        programs = dict(enumerate([hand] for hand in group.hands[:2]))  # two of them show that they are the same
+    both = "".join(marked(hands, group) for hands in programs.values())
     return f'<h3>{said}</h3><div class="pair">{both}</div>'
 
 
-def marked(hand: Hand, pair: Pair) -> str:
-    """A program, with marks on the lines that hold what is shared."""
-    numbers = {line for shape in pair.shared for line in hand.shapes.get(shape, ())}
-    lines = [escape(line) for line in hand.program.split("\n")]
+def marked(hands: Sequence[Hand], group: Group) -> str:
+    """A program, with marks on the lines that hold what is shared, below those who have it."""
+    numbers = {line for shape in group.shared for line in hands[0].shapes.get(shape, ())}
+    lines = [escape(line) for line in hands[0].program.split("\n")]
     lines = [f"<mark>{line}</mark>" if i in numbers and line else line for i, line in enumerate(lines, 1)]
-    return f'<pre tabindex="0" aria-label="{escape(str(hand))}">' + "\n".join(lines) + "</pre>"
+    whose = escape(", ".join(map(str, hands)))
+    head = f"<p>{whose}</p>" if len(group.hands) > 2 else ""
+    return f'<div>{head}<pre tabindex="0" aria-label="{whose}">' + "\n".join(lines) + "</pre></div>"
 
 
 def told(found: Found, path: Path) -> Sequence[str]:
-    """What the terminal says of answers that are alike: a line per two people, and the page."""
-    people = by_people(found.pairs)
+    """What the terminal says of answers that are alike: a line per group of people, and the page."""
+    people = by_people(found.groups)
     if not people and not found.unread:
         return []
-    count = "1 pair of answers is" if len(found.pairs) == 1 else f"{len(found.pairs)} pairs of answers are"
-    lines = [f"{count} alike beyond what the task forces: {path}"]
-    for (one, other), pairs in list(people.items())[:MOST_NAMED]:
-        lines.append(f"  {one} and {other}: {', '.join(pair.question for pair in pairs)}")
+    count = sum(map(len, people.values()))
+    what = "1 group of answers is" if count == 1 else f"{count} groups of answers are"
+    lines = [f"{what} alike beyond what the task forces: {path}"]
+    for names, groups in list(people.items())[:MOST_NAMED]:
+        said = (
+            in_words(names)
+            if len(names) <= MOST_PEOPLE
+            else f"{len(names)} answers: {', '.join(names[:MOST_PEOPLE])}, ..."
+        )
+        lines.append(f"  {said}: {', '.join(group.question for group in groups)}")
     lines += ["  ..."] if len(people) > MOST_NAMED else []
     lines += [f"  could not be compared: {', '.join(found.unread)}"] if found.unread else []
     return lines

@@ -9,6 +9,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from html import escape
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from labgrader.grade.gradebook import register
 from labgrader.grade.policy import Policy, read_policy
 from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
 from labgrader.handin.reading import read_lab
-from labgrader.handin.roster import Person, identity, keys_of, person_of, read_roster
+from labgrader.handin.roster import Person, identity, person_of, read_roster
 from labgrader.report.outputs import harmless, page
 from labgrader.report.platforms import CANVAS, person_by_name
 from labgrader.support import write_atomically
@@ -30,18 +31,27 @@ WIDE = "body{max-width:none}s{color:#666}"
 
 @dataclass
 class Row:
-    """A student's line. finals: by lab; total: in percent; dropped: labs that do not count."""
+    """A student's line. finals: by lab; total: in percent; dropped: labs that do not count.
+
+    unread: labs in which something was handed in that could not be graded.
+    """
 
     name: str
     person: Person | None
     finals: dict[str, Final] = field(default_factory=dict)
     total: float = 0.0
     dropped: list[str] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
 
     @property
     def waits(self) -> bool:
         """Whether a person has still to grade something of it."""
-        return any(final.waits for final in self.finals.values())
+        return bool(self.unread) or any(final.waits for final in self.finals.values())
+
+    @property
+    def has_a_total(self) -> bool:
+        """Whether a total is final: not of who waits, nor of who handed in nothing, in which no lab has a grade."""
+        return bool(self.finals) and not self.waits
 
 
 def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
@@ -54,14 +64,16 @@ def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
     labs = [lab for lab in topics() if any((course / "grades" / lab / "feedback").glob("*.html"))]
     if not labs or not (course / "gradebook.db").is_file():
         raise ValueError(f"topic: expected labs that were graded in {course}, there is none")
-    policy, roster, finals = read_policy(course), read_roster(course), {}
+    policy, roster, finals, unread = read_policy(course), read_roster(course), {}, {}
     for name in labs:
         lab = read_lab(course, name)
         changes = read_changes(course, lab)
         register(course, changed(lab, [], changes)[0])
         finals[name] = settle(course, name, changes, read_deadline(course, name))
         finish_pages(course / "grades" / name, finals[name].values())
-    rows = rows_of(finals, roster)
+        pages = (page.stem for page in sorted((course / "grades" / name / "feedback").glob("*.html")))
+        unread[name] = [student for student in pages if student not in finals[name]]
+    rows = rows_of(finals, roster, unread)
     for row in rows:
         maxima = {lab: max((final.max_score for final in finals[lab].values()), default=0.0) for lab in labs}
         scores = {lab: row.finals[lab].score if lab in row.finals else 0.0 for lab in labs}
@@ -70,7 +82,9 @@ def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
         row.total = 100.0 * share
     if platform != "scores" and (odd := [row.name for row in rows if row.person is None]):
         raise ValueError(f"{platform}: expected students in roster.csv, got {', '.join(odd)}")
-    table = {"scores": plain_table, "moodle": moodle_table, "canvas": canvas_table}[platform](labs, rows)
+    heading = next((h for person in roster.values() for h in person.more if h.startswith(f"{TOTAL} (")), TOTAL)
+    to_canvas = partial(canvas_table, heading=heading)
+    table = {"scores": plain_table, "moodle": moodle_table, "canvas": to_canvas}[platform](labs, rows)
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in cells] for cells in table)
     files = {"course.html": course_page(labs, rows, policy), f"{platform}.csv": text.getvalue()}
@@ -79,9 +93,12 @@ def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
     return [course / "grades" / FOLDER / name for name in files], [row.name for row in rows if row.waits]
 
 
-def rows_of(finals: Mapping[str, Mapping[str, Final]], roster: dict[str, Person]) -> list[Row]:
+def rows_of(
+    finals: Mapping[str, Mapping[str, Final]], roster: dict[str, Person], unread: Mapping[str, Sequence[str]]
+) -> list[Row]:
     """A row per person, in the order of names; who is in the roster and handed in nothing has an empty one.
 
+    unread: by lab the students whose work could not be graded.
     Raises ValueError if two folders of a lab are one person's.
     """
     rows: dict[str, Row] = {}
@@ -94,10 +111,12 @@ def rows_of(finals: Mapping[str, Mapping[str, Final]], roster: dict[str, Person]
                 both = " and ".join(other for other in of_lab if identity(roster, other) == who)
                 raise ValueError(f"{lab}: {both} are both {who}; rename the folder of one")
             row.finals[lab] = final
-    here = {key for of_lab in finals.values() for student in of_lab for key in keys_of(student)}
+    for lab, students in unread.items():
+        for student in students:
+            person = person_of(roster, student) or person_by_name(student)
+            rows.setdefault(identity(roster, student), Row(student, person)).unread.append(lab)
     for person in roster.values():
-        if person.id not in here:
-            rows.setdefault(identity(roster, person.id), Row(person.name or person.id, person))
+        rows.setdefault(identity(roster, person.id), Row(person.name or person.id, person))
     return sorted(rows.values(), key=lambda row: row.name)
 
 
@@ -126,24 +145,24 @@ def moodle_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
     found = [
         [
             *(row.person.name, row.person.email, *(cell(row, lab) for lab in labs)),
-            *(f"{row.total:.2f}", NOT_FINAL if row.waits else ""),
+            *(f"{row.total:.2f}" if row.finals else "", NOT_FINAL if row.waits else ""),
         ]
         for row in rows
     ]
     return [heading, *found]
 
 
-def canvas_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
+def canvas_table(labs: Sequence[str], rows: Sequence[Row], heading: str = TOTAL) -> list[list[str]]:
     """For Canvas's Import Grades: the total in percent; what is not final is left out, and Canvas keeps what it has."""
     possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), "100"]
     found = [
         [
             *(row.person.name, row.person.id, *(row.person.more.get(column, "") for column in CANVAS)),
-            "" if row.waits else f"{row.total:.2f}",
+            f"{row.total:.2f}" if row.has_a_total else "",
         ]
         for row in rows
     ]
-    return [["Student", "ID", *CANVAS, TOTAL], possible, *found]
+    return [["Student", "ID", *CANVAS, heading], possible, *found]
 
 
 def course_page(labs: Sequence[str], rows: Sequence[Row], policy: Policy) -> str:
@@ -162,7 +181,7 @@ def course_page(labs: Sequence[str], rows: Sequence[Row], policy: Policy) -> str
 def of_lab(row: Row, lab: str) -> str:
     """A cell of the page: points, struck out where they do not count, and what is to know about them."""
     final = row.finals.get(lab)
-    points = "-" if final is None else f"{final.score:g} of {final.max_score:g}"
+    points = "not graded" if lab in row.unread else "-" if final is None else f"{final.score:g} of {final.max_score:g}"
     notes = [] if final is None else [str(final.late) if final.late.days else "", "not final" if final.waits else ""]
     note = f"<br><small>{escape('; '.join(filter(None, notes)))}</small>" if any(notes) else ""
     return (f"<s>{points}</s> dropped" if lab in row.dropped else points) + note

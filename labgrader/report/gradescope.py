@@ -4,6 +4,7 @@ Their container is the sandbox there. In it, answers run as other users, who can
 seed nor the results, and under the same limits and filter of system calls as in bubblewrap.
 """
 
+import datetime
 import json
 import os
 import shutil
@@ -18,8 +19,12 @@ from labgrader.course import course as course_here
 from labgrader.course import files_of
 from labgrader.grade.batch import SECRET_FILE, Batch, grade_batch
 from labgrader.grade.changes import CHANGES, changed, read_changes
+from labgrader.grade.deadlines import Lateness, read_deadline
+from labgrader.grade.policy import read_policy
 from labgrader.grade.settings import FILE
+from labgrader.grade.totals import OFF
 from labgrader.handin.reading import read_lab, read_submission
+from labgrader.handin.several import read_picks
 from labgrader.report.outputs import gradescope
 from labgrader.report.overview import COMMENTS_FILE, read_comments
 from labgrader.sandbox.sandbox import Limits
@@ -80,31 +85,83 @@ def write_autograder(course: Path, topic: str) -> Path:
 
 def grade(topic: str, place: Path) -> str:
     """Grade PLACE/submission with what lies in PLACE/source; returns Gradescope's results.json."""
-    course, work = place / "source", place / "work"
-    found = [path for path in sorted((place / "submission").rglob("*.ipynb")) if not path.is_symlink()]
-    named = [path for path in found if path.name == f"{topic}.ipynb"] or found
-    if len(named) != 1:
-        raise ValueError(f"expected one notebook {topic}.ipynb, got {len(named)}")
+    course, work, told = place / "source", place / "work", read_metadata(place / "submission_metadata.json")
     shutil.rmtree(work, ignore_errors=True)
-    student = student_of(place / "submission_metadata.json")
-    notebook = work / student / topic / f"{topic}.ipynb"
-    notebook.parent.mkdir(parents=True)
-    shutil.copyfile(named[0], notebook)
+    student = student_of(told)
     lab = read_lab(course, topic)
+    gather(place / "submission", work / student / topic)
+    submission = read_submission(work / student, lab, next(iter(picks_of(course, topic, told)), ""))
     secret = (course / SECRET_FILE).read_text().strip()
-    submission = read_submission(work / student, lab)
     batch = Batch(lab, [submission], work, secret, limits=Limits(container=True))
     lab, (record,) = changed(lab, grade_batch(batch, progress=False)[0], read_changes(course, lab))
-    return gradescope(lab, record, read_comments(course))
+    results = json.loads(gradescope(lab, record, read_comments(course)))
+    late, said = lateness(course, topic, told), [results["output"]]
+    if submission.note:
+        said.append(f"{submission.note[:1].upper()}{submission.note[1:]}.")
+    if late.days:
+        results["score"] = round(results["score"] * (1.0 - late.percent / 100.0), 4)
+        said.append(f"Handed in {late}.{f' {OFF}' if late.percent else ''}")
+    return json.dumps(results | {"output": "\n".join(filter(None, said))}, indent=1) + "\n"
 
 
-def student_of(metadata: Path) -> str:
-    """A name for who handed in, the same each time, from what Gradescope says of the submission."""
+def gather(handed_in: Path, folder: Path) -> None:
+    """Copy what was handed in into one folder, notebooks or whatever came instead."""
+    folder.mkdir(parents=True)
+    for path in sorted(handed_in.rglob("*")):
+        hidden = any(part.startswith((".", "__")) for part in path.relative_to(handed_in).parts)
+        if path.is_file() and not path.is_symlink() and not hidden and path.name != "timestamp.txt":
+            target = folder / path.name
+            while target.exists():
+                target = target.with_name(f"{target.stem} again{target.suffix}")
+            shutil.copyfile(path, target)
+
+
+def read_metadata(path: Path) -> dict:
+    """What Gradescope says of a submission, {} if nothing that can be read."""
     try:
-        users = sorted(str(user["id"]) for user in json.loads(metadata.read_bytes())["users"])
-    except (OSError, ValueError, TypeError, KeyError):
-        users = []
+        told = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return told if isinstance(told, dict) else {}
+
+
+def users_of(told: dict) -> list[dict]:
+    """Those who handed in: a group may have several."""
+    users = told.get("users")
+    return [user for user in users if isinstance(user, dict)] if isinstance(users, list) else []
+
+
+def student_of(told: dict) -> str:
+    """A name for who handed in, the same each time."""
+    users = sorted(str(user.get("id")) for user in users_of(told))
     return "student" + "".join(f"-{user}" for user in users if user.isalnum())[:100]
+
+
+def names_of(told: dict) -> list[str]:
+    """What course.toml may call those who handed in: by email, by the number of a university's or of Gradescope's."""
+    return [str(user[key]) for user in users_of(told) for key in ("email", "sid", "id") if user.get(key)]
+
+
+def picks_of(course: Path, topic: str, told: dict) -> list[str]:
+    """The notebooks that a person named for those who handed in."""
+    picks = read_picks(course, topic)
+    return [picks[name] for name in names_of(told) if name in picks]
+
+
+def lateness(course: Path, topic: str, told: dict) -> Lateness:
+    """How late it was handed in, under the deadline and the extensions that course.toml had when the zip was made.
+
+    Free late days are not known there, since other labs use them, too: with these nothing is taken off.
+    """
+    deadline = read_deadline(course, topic)
+    try:
+        handed_in = datetime.datetime.fromisoformat(str(told["created_at"])).astimezone(datetime.UTC)
+    except (KeyError, ValueError):
+        return Lateness()
+    if deadline is None or read_policy(course).late_days:
+        return Lateness()
+    names = [name for name in names_of(told) if name in deadline.extensions]
+    return deadline.lateness(names[0] if names else "", handed_in.replace(tzinfo=None))
 
 
 def main(topic: str, place: str) -> None:

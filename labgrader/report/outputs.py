@@ -24,6 +24,7 @@ COLUMNS = ("student", "lab", "question", "points", "max_points", "verdict", "hin
 CLASS_COLUMNS = ("question", "group", "students", "tried", "passed", "discrimination", *COUNTED, "named", "says")
 LONGEST_SAMPLE = 4000  # characters
 NOT_GRADED = "not graded"
+NOTHING = "handed in nothing"
 DISCRIMINATION = (
     "Discrimination is the point-biserial correlation of a right answer with the points of the other questions: near 0 "
     "or below it, a question tells good students from others badly, or is unclear."
@@ -43,14 +44,16 @@ th{font-weight:normal}tr:first-child>th[scope=col]{font-weight:bold}.bar{backgro
 .key{color:#666;font-size:.85rem}.bars td,.bars th{border:0;padding:.05rem .5rem}"""
 
 
-def write_outputs(out: Path, lab: Lab, records: Sequence[Record], comments: Mapping[str, str]) -> None:
+def write_outputs(
+    out: Path, lab: Lab, records: Sequence[Record], comments: Mapping[str, str], absent: Sequence[str] = ()
+) -> None:
     """Write grades.csv, class.csv and class.html, and feedback/STUDENT.html and results/STUDENT/results.json of each.
 
-    comments: an instructor's, by group of wrong answers.
+    comments: an instructor's, by group of wrong answers. absent: who handed in nothing.
     """
     out, found = Path(out), standings(lab, records)
     files = {
-        "grades.csv": grades_csv(lab, records),
+        "grades.csv": grades_csv(lab, records, absent),
         "class.csv": class_csv(found, records),
         "class.html": class_page(lab, found, comments, records),
     }
@@ -61,13 +64,16 @@ def write_outputs(out: Path, lab: Lab, records: Sequence[Record], comments: Mapp
         write_atomically(out / name, text.encode())
 
 
-def grades_csv(lab: Lab, records: Sequence[Record]) -> str:
-    """One row per student and question; one row, with the reason, for a submission that could not be graded."""
+def grades_csv(lab: Lab, records: Sequence[Record], absent: Sequence[str] = ()) -> str:
+    """One row per student and question; one row, with the reason, for what could not be graded, or is not there."""
     text, table = new_table(records, COLUMNS)
     for record in records:
         total = f"{sum(lab.points.values()):g}"
         rows = [("", "0", total, record.reason, "", NOT_GRADED)] if record.reason else map(row_of, record.results)
         table.writerows([harmless(cell) for cell in (record.student, lab.topic, *row)] for row in rows)
+    for name in absent:
+        row = (name, lab.topic, "", "0", f"{sum(lab.points.values()):g}", NOTHING, "", NOT_GRADED)
+        table.writerow([harmless(cell) for cell in row])
     return text.getvalue()
 
 
@@ -83,7 +89,8 @@ def new_table(records: Sequence[Record], columns: Sequence[str]) -> tuple[io.Str
 
 def row_of(result: Result) -> tuple[str, ...]:
     """A question's cells of the table."""
-    return result.question, f"{result.points:g}", f"{result.max_points:g}", result.says, result.hint, result.flag
+    look = "; ".join(filter(None, [result.flag, result.note]))
+    return result.question, f"{result.points:g}", f"{result.max_points:g}", result.says, result.hint, look
 
 
 def harmless(cell: str) -> str:
@@ -121,7 +128,8 @@ def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
     said = result.says[:1].upper() + result.says[1:] + "."
     hint = [f"Hint: {result.hint}"] if result.hint else []
     comment = comments.get(group_of(result), "")
-    return [said, *result.shown.splitlines(), *hint, *([f"Comment: {comment}"] if comment else [])]
+    note = [f"{result.note[:1].upper()}{result.note[1:]}."] if result.note else []
+    return [said, *note, *result.shown.splitlines(), *hint, *([f"Comment: {comment}"] if comment else [])]
 
 
 def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
@@ -237,16 +245,21 @@ def warning_of(records: Sequence[Record]) -> str:
     return "" if sandboxed else f'<p class="warning">Warning: {escape(NO_SANDBOX)}.</p>'
 
 
-def terminal_table(lab: Lab, records: Sequence[Record], late: Mapping[str, str]) -> str:
-    """A line per student: points by question, all together, how late, and what an instructor should look at."""
+def terminal_table(lab: Lab, records: Sequence[Record], told: Mapping[str, str], absent: Sequence[str] = ()) -> str:
+    """A line per student: points by question, all together, and what an instructor should know and look at.
+
+    told: of the hand-in, by student, such as how late it is. absent: who handed in nothing.
+    """
     names = list(lab.points)
     rows = [["student", *names, f"points of {sum(lab.points.values()):g}", ""]]
     for record in records:
         earned = {result.question: f"{result.points:g}" for result in record.results}
-        flags = [f"{result.question}: {result.flag}" for result in record.results if result.flag]
+        both = [(result.question, said) for result in record.results for said in (result.flag, result.note)]
+        flags = [f"{question}: {said}" for question, said in both if said]
         flags = [f"{NOT_GRADED}: {record.reason}"] if record.reason else flags
-        look = "; ".join([late[record.student], *flags] if record.student in late else flags)
+        look = "; ".join([told[record.student], *flags] if record.student in told else flags)
         rows.append([record.student, *(earned.get(name, "-") for name in names), f"{record.points:g}", look])
+    rows += [[name, *("-" for _ in names), "-", NOTHING] for name in absent]
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
     return "\n".join(aligned(row, widths) for row in rows)
 

@@ -9,23 +9,28 @@ Scores are those of nbgrader's gradebook: functions, what a person graded, and p
 
 import csv
 import io
+import re
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from labgrader.course import course as course_here
+from labgrader.grade.batch import read_record, record_path
 from labgrader.grade.changes import changed, read_changes
 from labgrader.grade.deadlines import read_deadline
 from labgrader.grade.gradebook import register
+from labgrader.grade.settings import fault_of_fields, read_blocks
 from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
 from labgrader.handin.collect import extracted, read_name, student_and_notebook
-from labgrader.handin.reading import Lab, read_lab
-from labgrader.handin.roster import Person, keys_of, person_of, read_roster
-from labgrader.report.outputs import harmless
+from labgrader.handin.reading import LEFT_OUT, Lab, read_lab
+from labgrader.handin.roster import FILE as ROSTER
+from labgrader.handin.roster import Person, absent_of, keys_of, person_of, read_roster
+from labgrader.report.outputs import NOTHING, harmless
 from labgrader.support import write_atomically
 
 CANVAS = ("SIS User ID", "SIS Login ID", "Section")  # columns beside name and ID
+ASSIGNMENT = re.compile(r"(.*) \((\d+)\)")  # the heading of one in an exported gradebook
 
 
 @dataclass(frozen=True)
@@ -42,10 +47,11 @@ class Written:
     released: float
 
 
-def write_grades(course: Path, topic: str, platform: str) -> Written:
+def write_grades(course: Path, topic: str, platform: str, assignment: int | None = None) -> Written:
     """Write the files of a platform into grades/TOPIC, and bring the pages there up to date.
 
-    platform: "moodle" or "canvas", or "scores" for a table and no zip. Raises ValueError, and writes nothing, if
+    platform: "moodle" or "canvas", or "scores" for a table and no zip. assignment: Canvas's number of it, if the roster
+    has its column under another name and course.toml does not say it. Raises ValueError, and writes nothing, if
     nothing was graded, if course.toml or the roster cannot be used, or if the platform could not find a student.
     """
     course = Path(course)
@@ -72,7 +78,8 @@ def write_grades(course: Path, topic: str, platform: str) -> Written:
     finals = settle(course, topic, changes, deadline)
     finish_pages(out, finals.values())
     graded = [(people[student], final) for student, final in finals.items() if student in pages]
-    rows = {"scores": plain_rows, "moodle": moodle_rows, "canvas": canvas_rows}[platform](topic, graded)
+    heading = canvas_heading(course, topic, roster, assignment) if platform == "canvas" else topic
+    rows = {"scores": plain_rows, "moodle": moodle_rows, "canvas": canvas_rows}[platform](heading, graded)
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in row] for row in rows)
     files = {out / f"{platform}.csv": text.getvalue().encode()}
@@ -80,9 +87,9 @@ def write_grades(course: Path, topic: str, platform: str) -> Written:
         files[out / f"{platform}_feedback.zip"] = zip_of(pages, names_in_zip(course, topic, people, platform))
     for path, data in files.items():
         write_atomically(path, data)
-    here = {key for student in pages for key in keys_of(student)}
-    without = dict.fromkeys(pages.keys() - finals.keys(), "not graded")
-    without |= {person.name or person.id: "handed in nothing" for person in roster.values() if person.id not in here}
+    reasons = {student: read_record(record_path(out, student)) for student in pages.keys() - finals.keys()}
+    without = {s: f"not graded: {record.reason}" if record else "not graded" for s, record in reasons.items()}
+    without |= {person.name or person.id: NOTHING for person in absent_of(roster, pages)}
     waiting = [f"{student} ({', '.join(final.waits)})" for student, final in finals.items() if final.waits]
     return Written(list(files), waiting, without, maximum_of(now), maximum_of(lab))
 
@@ -124,13 +131,42 @@ def moodle_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list
     return [["Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Feedback comments"], *rows]
 
 
-def canvas_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
-    """Canvas's gradebook, which finds students by its own ID.
+def canvas_heading(course: Path, name: str, roster: dict[str, Person], assignment: int | None = None) -> str:
+    """The heading by which Canvas finds an assignment, "04_iou (5511)": an exported gradebook's, else the name.
 
-    The assignment has the name that an exported gradebook gives it, "04_iou (5511)", or else the lab's. There is no
-    room for words, so a grade that is not final is left out: Canvas keeps what it has.
+    assignment: its number; without one that of course.toml counts, or the column of this name:
+
+        [[canvas]]
+        lab = "04_iou"
+        assignment = 5511
+
+    Raises ValueError, and names the columns, where an exported gradebook has none of this number or name: Canvas would
+    make a new assignment of it.
     """
-    headings = [heading for person, _ in graded for heading in person.more if heading.partition(" (")[0] == topic]
+    headings = dict.fromkeys(heading for person in roster.values() for heading in person.more)
+    found = [match for heading in headings if (match := ASSIGNMENT.fullmatch(heading))]
+    numbered = {int(match[2]): match[0] for match in found}
+    for where, data in read_blocks(course, "canvas") if assignment is None else ():
+        fault = fault_of_fields(data, {"lab": str, "assignment": float}, {})
+        if fault or not isinstance(data["assignment"], int):
+            raise ValueError(f"{where}: {fault or 'assignment: expected a whole number'}")
+        assignment = data["assignment"] if data["lab"] == name else assignment
+    if assignment is not None and (assignment in numbered or not numbered):
+        return numbered.get(assignment, f"{name} ({assignment})")
+    same = [match[0] for match in found if match[1].strip().lower() == name.lower()]
+    if assignment is None and (len(same) == 1 or not numbered):
+        return same[0] if same else name
+    what = f"none has the number {assignment}"
+    what = what if assignment is not None else f"{'several have' if same else 'none has'} the name {name}"
+    mend = f"name one by --assignment NUMBER or in [[canvas]] of course.toml: {', '.join(numbered.values())}"
+    raise ValueError(f"assignment: of the columns of {ROSTER} {what}; {mend}")
+
+
+def canvas_rows(heading: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
+    """Canvas's gradebook, which finds students by its own ID; heading: that of the assignment.
+
+    There is no room for words, so a grade that is not final is left out: Canvas keeps what it has.
+    """
     possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), f"{graded[0][1].max_score:g}" if graded else ""]
     rows = [
         [
@@ -139,7 +175,7 @@ def canvas_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list
         ]
         for person, final in graded
     ]
-    return [["Student", "ID", *CANVAS, next(iter(headings), topic)], possible, *rows]
+    return [["Student", "ID", *CANVAS, heading], possible, *rows]
 
 
 def names_in_zip(course: Path, topic: str, people: dict[str, Person], platform: str) -> dict[str, str]:
@@ -151,7 +187,7 @@ def names_in_zip(course: Path, topic: str, people: dict[str, Person], platform: 
     for path in extracted(course, topic):
         if (whose := student_and_notebook(str(path))) is not None:
             mark, _ = read_name(path)
-            names.setdefault(whose[0], f"{Path(mark.string).stem}.html")
+            names.setdefault(whose[0], f"{Path(mark.string.removesuffix(f'.{LEFT_OUT}')).stem}.html")
     return names
 
 

@@ -5,15 +5,20 @@ without signs that a terminal obeys.
 """
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
+
+from nbgrader.api import MissingEntry
 
 from labgrader.comparison import Case, Problem, compare
 from labgrader.course import of_topic
 from labgrader.grade.batch import SECRET_FILE, read_record, record_path
+from labgrader.grade.changes import changed, read_changes
 from labgrader.grade.diagnose_outputs import diagnosers
 from labgrader.grade.grade import Grading, Result
-from labgrader.handin.reading import read_lab, read_submissions
+from labgrader.grade.gradebook import opened
+from labgrader.handin.reading import Lab, read_lab, read_submissions
+from labgrader.handin.several import read_picks
 from labgrader.question import Question
 from labgrader.reply.messages import call, shown_case, written
 from labgrader.report.outputs import key_of
@@ -32,21 +37,33 @@ def second_look(
     """
     course = Path(course)
     lab, out = read_lab(course, topic), course / "grades" / topic if out is None else Path(out)
-    read = read_submissions(course / "submitted" if submissions is None else Path(submissions), lab)
+    folder = course / "submitted" if submissions is None else Path(submissions)
+    read = read_submissions(folder, lab, read_picks(course, topic))
     found = [(one, name) for one in read for name in lab.answers if key_of(one.student, lab, name) == key]
     if not found:
         raise ValueError(f"look: expected the key of an answer on a page in {out / 'feedback'}, got {key!a}")
     submission, name = found[0]
     record = read_record(record_path(out, submission.student))
-    results = [result for result in record.results if result.question == name] if record is not None else []
+    now = changed(lab, [record], read_changes(course, lab))[1] if record is not None else []
+    results = [result for one in now for result in one.results if result.question == name]
     if not results or not (out / SECRET_FILE).is_file():
         raise ValueError(f"look: {submission.student} has no grade of {name} in {out}; grade {topic} first")
-    lines = [f"{submission.student}, {topic}.{name}", *about(results[0])]
+    lines = [f"{submission.student}, {topic}.{name}", *by_a_person(course, lab, submission.student, name)]
+    lines += about(results[0])
     with closing(sandbox.servers), closing(diagnosers):
         grading = Grading(lab, submission, unsafe=unsafe)
         replies = grading.replies(name, (out / SECRET_FILE).read_text().strip())
     lines += [line for i, (case, got) in enumerate(replies) for line in told(of_topic(topic)[name], i, case, got)]
     return ["".join(c if c.isprintable() else ascii(c)[1:-1] for c in line) for line in lines]
+
+
+def by_a_person(course: Path, lab: Lab, student: str, name: str) -> Iterator[str]:
+    """The points that a person gave, which count in the place of those below."""
+    if (course / "gradebook.db").is_file():
+        with opened(course) as gradebook, suppress(MissingEntry):
+            grade = gradebook.find_grade(f"check_{name}", lab.topic, lab.topic, student)
+            if grade.manual_score is not None:
+                yield f"A person gave it {grade.manual_score:g} points, which count."
 
 
 def about(result: Result) -> Iterator[str]:

@@ -7,13 +7,16 @@ nbgrader's gradebook, where formgrader shows and changes the same ones. `texts_s
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
 from labgrader.grade.gradebook import opened, rubrics_of
-from labgrader.handin.reading import Lab, grade_id, plain_text, source_of
+from labgrader.handin.pictures import Pictures
+from labgrader.handin.reading import Lab, plain_text, source_of
+from labgrader.program.notebook import grade_id
 from labgrader.report.outputs import STYLE, key_of
+from labgrader.report.rendered import rendered
 from labgrader.support import counted
 
 LONGEST_COMMENT = 5_000  # characters
@@ -21,13 +24,17 @@ LONGEST_COMMENT = 5_000  # characters
 
 @dataclass(frozen=True)
 class Text:
-    """One student's answer. key: what names it without the student; points: None if there are none yet."""
+    """One student's answer. key: what names it without the student; points: None if there are none yet.
+
+    words: in Markdown that is harmless; pictures: base64 by kind, by name.
+    """
 
     key: str
     student: str
     words: str
     points: float | None
     comment: str
+    pictures: Pictures = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,23 +71,25 @@ def read_texts(course: Path, lab: Lab) -> dict[str, Texts]:
             for student, grade in grades:
                 comment = gradebook.find_comment(question, lab.topic, lab.topic, student)
                 is_empty = comment.auto_comment == "No response." and grade.manual_score is None
-                if not is_empty and (words := words_of(course, lab, student, question)) is not None:
-                    said = comment.manual_comment or ""
-                    texts.append(Text(key_of(student, lab, question), student, words, grade.manual_score, said))
+                if not is_empty and (found_there := words_of(course, lab, student, question)) is not None:
+                    (words, pictures), said = found_there, comment.manual_comment or ""
+                    key = key_of(student, lab, question)
+                    texts.append(Text(key, student, words, grade.manual_score, said, pictures))
             texts.sort(key=lambda text: text.key[-8:])
             most = next((grade.max_score for _, grade in grades), 0.0)
-            rubric = rubrics.get(question, "").replace("**", "")
+            rubric = rubrics.get(question, "")
             found[question] = Texts(question, most, rubric, tuple(texts), len(grades) - len(texts))
     return found
 
 
-def words_of(course: Path, lab: Lab, student: str, question: str) -> str | None:
-    """What a student wrote, from the copy that grading made for formgrader; None if there is none."""
+def words_of(course: Path, lab: Lab, student: str, question: str) -> tuple[str, Pictures] | None:
+    """What a student wrote, with pictures, from the copy that grading made for formgrader; None if there is none."""
     path = course / "autograded" / student / lab.topic / f"{lab.topic}.ipynb"
     if not path.is_file():
         return None
     cells = json.loads(path.read_bytes())["cells"]
-    return next((source_of(cell) for cell in cells if grade_id(cell) == question), None)
+    found = ((source_of(cell) or "", cell.get("attachments", {})) for cell in cells if grade_id(cell) == question)
+    return next(found, None)
 
 
 def save(course: Path, lab: Lab, question: str, data: Mapping[str, object]) -> int:
@@ -107,14 +116,23 @@ def save(course: Path, lab: Lab, question: str, data: Mapping[str, object]) -> i
 
 # ------------------------------------------------------------------------------------------------------ the page
 
-PAGE_STYLE = """body{max-width:60rem}nav a{margin-right:1rem}.words{white-space:pre-wrap;overflow-wrap:anywhere}
+PAGE_STYLE = """body{max-width:90rem}nav a{margin-right:1rem}.words{overflow-wrap:anywhere}.words img{max-width:100%}
+.two{display:grid;grid-template-columns:minmax(16rem,1fr) 2fr;gap:1.5rem;align-items:start}
 article{border-left:5px solid #f9a825;padding:.2rem 1rem;margin:1rem 0}article.done{border-color:#2e7d32}
 article:focus{outline:3px solid #1565c0}.rubric{position:sticky;top:0;background:#eef4fb;padding:.5rem 1rem;
-max-height:30vh;overflow:auto;white-space:pre-wrap}input{width:5rem;font:inherit}textarea{width:100%;font:inherit}
+max-height:100vh;box-sizing:border-box;overflow:auto}@media(max-width:60rem){.two{display:block}
+.rubric{position:static;max-height:none}}input{width:5rem;font:inherit}textarea{width:100%;font:inherit}
 label{display:block}.status{color:#555;margin-left:1rem}.failed{color:#b00020;font-weight:bold}kbd{border:1px solid
 #999;border-radius:3px;padding:0 .3rem}"""
 
+PICTURES, MATHJAX_FILES = "pictures", "mathjax"  # places below the secret of the address, beside the questions
+MATHJAX = f"{MATHJAX_FILES}/MathJax.js?config=TeX-AMS-MML_HTMLorMML-full"
 SCRIPT = """
+window.MathJax = {
+  extensions: ["Safe.js"], showMathMenu: false, messageStyle: "none", jax: ["input/TeX", "output/HTML-CSS"],
+  "HTML-CSS": {availableFonts: [], preferredFont: null, webFont: "STIX-Web", imageFont: null},
+  tex2jax: {inlineMath: [["$", "$"], ["\\\\(", "\\\\)"]], processEscapes: true}
+};
 const articles = [...document.querySelectorAll("article")];
 const timers = new Map();
 async function save(article) {
@@ -167,24 +185,27 @@ def texts_page(lab: Lab, texts: Texts, questions: Sequence[str], nonce: str) -> 
     links = "".join(f'<a href="{escape(name)}">{escape(name)}</a>' for name in questions)
     count = f'{counted(len(texts.answers), "answer")}, <span id="left" role="status">{left}</span> without points'
     empty = f"; {counted(texts.empty, 'student')} wrote nothing" if texts.empty else ""
-    rubric = f'<div class="rubric" tabindex="0">{escape(texts.rubric)}</div>' if texts.rubric else ""
+    rubric = f'<div class="rubric" tabindex="0">{rendered(texts.rubric)}</div>' if texts.rubric else ""
     articles = "\n".join(article(text, texts.most, i) for i, text in enumerate(texts.answers, start=1))
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
         f'<link rel="icon" href="data:,"><style>{STYLE}\n{PAGE_STYLE}</style></head><body>\n'
         f"<h1>{title}</h1><nav>{links}</nav>\n"
-        f"<p>{count}{empty}. What you type is saved at once.</p><p>{KEYS}</p>\n{rubric}\n{articles}\n"
-        f'<script nonce="{nonce}">{SCRIPT}</script>\n</body></html>\n'
+        f"<p>{count}{empty}. What you type is saved at once.</p><p>{KEYS}</p>\n"
+        f'<div class="{"two" if rubric else ""}">{rubric}\n<div>{articles}</div></div>\n'
+        f'<script nonce="{nonce}">{SCRIPT}</script>\n'
+        f'<script nonce="{nonce}" src="{MATHJAX}"></script>\n</body></html>\n'
     )
 
 
 def article(text: Text, most: float, number: int) -> str:
     """One answer, with a place for points and a comment."""
     points = "" if text.points is None else f"{text.points:g}"
+    words = rendered(text.words, text.pictures, f"{PICTURES}/{text.key}")
     kind = "" if text.points is None else ' class="done"'
     return (
         f'<article id="{escape(text.key)}" tabindex="0" aria-label="answer {number}"{kind}>'
-        f'<p class="words">{escape(text.words)}</p><label>Points of {most:g} <input type="number" min="0" '
+        f'<div class="words">{words}</div><label>Points of {most:g} <input type="number" min="0" '
         f'max="{most:g}" step="any" value="{points}"><span class="status" role="status"></span></label>'
         f'<label>Comment <textarea rows="2" maxlength="{LONGEST_COMMENT}">\n{escape(text.comment)}</textarea></label>'
         "</article>"

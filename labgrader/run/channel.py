@@ -105,7 +105,10 @@ class Worker:
             raise WorkerLost(found if isinstance(found, Problem) else Problem("ended", "its cells cannot be read"))
         programs = []
         for ways, prints in json.loads(found):
-            made, *late = (Program(tuple(map(tuple, pieces)), tuple(calls), no) for pieces, calls, no in ways)
+            made, *late = (
+                Program(tuple(map(tuple, pieces)), tuple(calls), no, copies=tuple(copies))
+                for pieces, calls, no, copies in ways
+            )
             programs.append((replace(made, late=late[0] if late else None), prints))
         return programs
 

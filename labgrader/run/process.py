@@ -121,7 +121,7 @@ class Session:
         for arguments in asked:
             made = program(cells, *arguments)
             text = "\n".join(text for _, text in made.pieces)
-            ways = [(way.pieces, way.calls, way.refused) for way in (made, made.late) if way]
+            ways = [(way.pieces, way.calls, way.refused, way.copies) for way in (made, made.late) if way]
             found.append((ways, list(fingerprints(text))))
         return b"J" + json.dumps(found).encode()
 

@@ -98,8 +98,9 @@ def test_what_is_no_notebook_is_said(content, says, tmp_path):
 
 
 TOO_LARGE = {
-    "it is larger than 20 MB": {"outputs": "x" * (21 << 20)},
-    "it holds more than 1,000,000 values: clear its outputs": {"outputs": [0] * 1_100_000},
+    "it is larger than 100 MB": {"outputs": "x" * (101 << 20)},
+    "it is larger than 20 MB without its outputs": {"metadata": {"x": "y" * (21 << 20)}},
+    "it holds more than 1,000,000 values without its outputs": {"metadata": {"x": [0] * 1_100_000}},
     "its code is longer than 1,000,000 characters": {"source": "x = 1\n" * 200_000},
 }
 

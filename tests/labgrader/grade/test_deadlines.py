@@ -4,7 +4,8 @@ import datetime
 
 import pytest
 
-from labgrader.grade.deadlines import read_deadline, strangers
+from labgrader.grade.deadlines import Lateness, read_deadline, strangers
+from labgrader.grade.totals import handed_in_late
 from labgrader.handin.roster import person_of, read_roster
 
 TOPIC = "04_iou"
@@ -15,7 +16,7 @@ due = 2026-10-05T22:00:00Z
 grace_minutes = 15
 penalty_per_day = 30
 """
-BLOCKS = "expected blocks [[change]], [[deadline]], [[extension]], [[bonus]], [[weight]], [[course]]"
+BLOCKS = "expected blocks [[change]], [[deadline]], [[extension]], [[notebook]], [[bonus]], [[weight]], [[course]]"
 EXTENSION = """
 [[extension]]
 lab = "04_iou"
@@ -49,9 +50,40 @@ def test_an_extension_moves_one_students_deadline_or_says_how_late_they_are(tmp_
 
 
 def test_a_mark_without_a_time_counts_as_one_day_and_says_so(tmp_path):
-    late = deadline(tmp_path).lateness("ada", None, marked=True)
+    late = deadline(tmp_path).lateness("ada", None, marked=datetime.datetime(2026, 10, 8))
     assert late.days == 1 and "its platform marks it late" in str(late)
     assert str(deadline(tmp_path).lateness("ada", None)) == ""
+
+
+def test_an_extension_counts_where_a_platform_says_late_and_not_since_when(tmp_path):
+    """The zip was made before it ended: nothing is off. After that nobody knows, and a person is told what to write."""
+    found, (before, after) = deadline(tmp_path), (datetime.datetime(2026, 10, day) for day in (7, 9))
+    assert found.lateness("lovelaceada_1234", None, before) == Lateness()
+    unknown = found.lateness("lovelaceada_1234", None, after)
+    assert (unknown.days, unknown.percent) == (0, 0.0) and "its [[extension]] says late_days = N" in str(unknown)
+    for days in (0, 2):
+        said = EXTENSION.replace("due = 2026-10-07T22:00:00Z", f"late_days = {days}")
+        assert deadline(tmp_path, DEADLINE + said).lateness("lovelaceada_1234", None, after).days == days
+
+
+def test_an_extension_finds_its_student_by_email_too(tmp_path):
+    (tmp_path / "roster.csv").write_text("id,name,email\n77,Ada,ada@x.org\n78,Ada,ada@x.org\n5,Ben,ben@x.org\n")
+    found, late = deadline(tmp_path, DEADLINE + EXTENSION.replace("1234", "ada@x.org")), datetime.datetime(2026, 10, 7)
+    assert [found.lateness(student, late).days for student in ("Ada_77", "Ada_78", "Ben_5")] == [0, 0, 2]
+    assert strangers(found, ["Ada_77", "Ada_78", "Ben_5"]) == []
+
+
+@pytest.mark.parametrize(
+    "late, says",
+    [
+        (Lateness(1, 0.0, free=1), "1 day late, covered by a free late day; no deduction"),
+        (Lateness(2, 0.0, free=2), "2 days late, covered by 2 free late days; no deduction"),
+        (Lateness(2, 10.0, free=1), "2 days late, 1 of them free, 10 % less"),
+        (Lateness(2), "2 days late; no deduction"),
+    ],
+)
+def test_where_nothing_is_taken_off_nothing_is_said_to_be(late, says):
+    assert str(late) == says and ("taken off" in handed_in_late(late)) == bool(late.percent)
 
 
 def test_a_date_is_its_end_and_local(tmp_path):
@@ -83,15 +115,15 @@ def test_a_date_is_its_end_and_local(tmp_path):
         ),
         (
             DEADLINE + "[[deadlines]]\n",
-            BLOCKS + ", got deadlines",
+            BLOCKS + ", [[canvas]], got deadlines",
         ),
         (
             DEADLINE.replace("[[deadline]]", "[deadline]"),
-            BLOCKS + ", got",
+            BLOCKS + ", [[canvas]], got",
         ),
         (
             "extension = [7]",
-            BLOCKS + ", got extension",
+            BLOCKS + ", [[canvas]], got extension",
         ),
         (DEADLINE.replace("2026", "0001"), "[[deadline]] number 1: expected due, a date such as 2026-10-05"),
         (DEADLINE.replace("2026", "9999"), "[[deadline]] number 1: expected due, a date such as 2026-10-05"),

@@ -98,8 +98,11 @@ def test_the_labs_own_name_is_not_said(tmp_path):
     "files, says",
     [
         ({}, "the folder 04_iou holds no 04_iou.ipynb: it is empty"),
-        ({"notes.txt": {}, "timestamp.txt": {}}, "it holds notes.txt; rename the one to be graded"),
-        ({f"{i}.ipynb": {} for i in range(5)}, "it holds 0.ipynb, 1.ipynb, 2.ipynb, ...; rename the one"),
+        ({"notes.txt": {}, "timestamp.txt": {}}, "it holds notes.txt; expected a notebook"),
+        (
+            {f"{i}.ipynb": {} for i in range(5)},
+            "it holds 0.ipynb, 1.ipynb, 2.ipynb, ...; name the one to be graded in [[notebook]]",
+        ),
         ({"a\x1b[2J.txt": {}}, r"it holds a\x1b[2J.txt;"),
         ({"other.ipynb": kit.notebook([kit.code_cell("def iou(n): ...")])}, "and other.ipynb is no copy of that lab"),
     ],

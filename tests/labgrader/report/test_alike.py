@@ -153,7 +153,8 @@ def test_what_the_class_has_in_common_is_the_tasks_but_a_text_that_many_share_is
     many = [record(f"s{i}", {"iou": text}) for i, text in enumerate(disguised)]
     assert not find_alike(course, lab, many).pairs
     ring = [record(f"s{i}", {"iou": OWN}) for i in range(8)]
-    assert len(find_alike(course, lab, ring).pairs) == 28
+    found = find_alike(course, lab, ring)
+    assert len(found.pairs) == 28 and len(found.groups) == 1
     assert len(find_alike(course, lab, many[:2]).pairs) == 1
 
 
@@ -274,6 +275,26 @@ def test_the_page_shows_both_marks_what_they_share_and_lets_nothing_run(labs, tm
     assert any("union = " in line for line in marked) and not any(line.startswith("def iou") for line in marked)
     assert (tmp_path / "alike.csv").read_text().splitlines()[1].startswith("iou,ada,'=ben,1.00,")
     assert "None." in alike_page(lab, [], Found()) and told(Found(), Path("x")) == []
-    assert told(found, Path("alike.html"))[0].startswith("1 pair of answers is alike")
-    crowd = [record(f"s{i}", {"iou": OWN}) for i in range(8)]
-    assert len(told(find_alike(course, lab, crowd), Path("x"))) == MOST_NAMED + 2
+    assert told(found, Path("alike.html"))[0].startswith("1 group of answers is alike")
+
+
+def test_twenty_with_one_answer_are_one_group_of_the_page_and_others_are_others(labs):
+    course, lab = labs["04_iou"]
+    other = kit.other_answers("04_iou")["mean_iou"][0]
+    crowd = [record(f"s{i}", {"iou": OWN if i % 2 else renamed(OWN), "mean_iou": OWN + f"# {i}"}) for i in range(20)]
+    crowd += [record(name, {"iou": "def iou(n):\n    return n", "mean_iou": other}) for name in ("ada", "ben")]
+    found = find_alike(course, lab, crowd)
+    assert sorted(len(group.hands) for group in found.groups if group.question == "iou") == [20]
+    page = alike_page(lab, crowd, found)
+    sizes = re.findall(r"<h2>(\d+) answers: ", page)
+    assert sizes == ["20"] and page.count("<section") <= 2
+    assert page.count("<pre tabindex") <= 2 + 20 + 2, "the two texts of iou stand there once each"
+    lines = told(found, Path("x"))
+    assert "20 answers: s0, s1, s10, s11, ..." in lines[1] and len(lines) <= 3
+    many = [pair(f"a{i}", f"b{i}") for i in range(MOST_NAMED + 3)]
+    assert len(told(Found(tuple(many)), Path("x"))) == MOST_NAMED + 2
+
+
+def pair(one: str, other: str) -> alike.Pair:
+    hands = (alike.Hand(name, "", {}) for name in (one, other))
+    return alike.Pair("iou", *hands, 1.0, frozenset("x"))
