@@ -91,6 +91,8 @@ def grade(topic: str, place: Path) -> str:
     lab = read_lab(course, topic)
     gather(place / "submission", work / student / topic)
     submission = read_submission(work / student, lab, next(iter(picks_of(course, topic, told)), ""))
+    if submission.reason:
+        raise ValueError(submission.reason)
     secret = (course / SECRET_FILE).read_text().strip()
     batch = Batch(lab, [submission], work, secret, limits=Limits(container=True))
     lab, (record,) = changed(lab, grade_batch(batch, progress=False)[0], read_changes(course, lab))

@@ -22,7 +22,7 @@ LONGEST_REQUEST = 100_000  # bytes
 NOTHING = "default-src 'none'"
 POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'self' 'nonce-{nonce}'; connect-src 'self'; "
-    "img-src 'self' data:; font-src 'self' about:"
+    "img-src 'self' data:; font-src 'self'"
 )
 KINDS = {".js": "text/javascript", ".woff": "font/woff"}  # of MathJax's files that a page loads
 

@@ -117,6 +117,23 @@ def test_what_the_grader_does_not_take_for_its_size_is_not_ticked(reason, tmp_pa
     assert why_its_file_is_not_graded() == ("" if "code" in reason else reason)
 
 
+def test_outputs_of_any_size_are_not_read(tmp_path, capsys):
+    notebook = lab_notebook(TOPIC, right_answers(TOPIC))
+    notebook["cells"][1]["outputs"] = [{"data": {"image/png": "x" * (21 << 20)}}]
+    assert said(saved(tmp_path, notebook), capsys)["iou"].startswith("\u2714")
+
+
+def test_which_of_several_cells_counts_is_said_and_that_a_cell_must_be_code(tmp_path, capsys):
+    notebook = lab_notebook(TOPIC, right_answers(TOPIC))
+    at = next(i for i, cell in enumerate(notebook["cells"]) if cell["id"] == "iou")
+    first_try = notebook["cells"][at] | {"source": WRONG_IOU}
+    check_file(saved(tmp_path, notebook | {"cells": [*notebook["cells"][:at], first_try, *notebook["cells"][at:]]}))
+    shown = capsys.readouterr().out
+    assert "\u2714 iou is right" in shown and "Code cells 2 and 3 both define it, and the lower one counts" in shown
+    notebook["cells"][at]["cell_type"] = "markdown"
+    assert "is Markdown, and must be code" in said(saved(tmp_path, notebook), capsys)["iou"]
+
+
 MALFORMED = {
     "a list": [],
     "cells that are none": {"cells": 3},

@@ -91,6 +91,26 @@ def test_what_cells_below_define_anew_makes_a_second_program():
     assert "labkit" in found.refused and LiveProgram("f", found.late.pieces).answer() == 3
 
 
+@pytest.mark.parametrize(
+    "marks, value, copies", [("ff", 2, (1, 2)), ("f ", 1, ()), (" f", 2, ()), ("fff", 3, (1, 2, 3))]
+)
+def test_of_several_cells_with_the_answers_grade_id_the_last_counts(marks, value, copies):
+    """As a run from top to bottom leaves it; a cell copied to try again, or split, has its grade id twice."""
+    sources = [(f"def f():\n    return {i}", mark.strip()) for i, mark in enumerate(marks, 1)]
+    assert function(*sources)() == value
+    found = program(cells(*sources), "f")
+    assert found.copies == copies and bool(found.note) == bool(copies)
+    blank = ("def f():\n    raise NotImplementedError", "f")
+    assert function(*sources, blank)() == value  # a copy that holds no answer is none
+    broken = ("def f(:", "f")
+    assert function(*sources, broken)() == value
+
+
+def test_a_split_cell_is_one_answer():
+    parts = ("def half(x):\n    return x / 2", "f"), ("def f(x):\n    return half(x)", "f"), ("f(3)", "f")
+    assert function(*parts)(3) == 1.5 and not program(cells(*parts), "f").note
+
+
 def test_in_a_kernel_what_was_run_last_counts():
     assert function("k = 1", "def f():\n    return k", *RIGHT_AND_LATER[2:], latest=True)() == 5
     refused = program(cells(*RIGHT_AND_LATER), "f", latest=True).refused

@@ -175,6 +175,23 @@ def test_one_lab_always_stays_and_a_weight_of_0_does_not_count():
     assert Policy({"a": 0.0}).total({"a": 0.1}) == (0.0, [])
 
 
+def test_what_could_not_be_graded_is_no_final_0_of_the_courses(course):
+    """A page says so, and the lab's file has no grade of that student's either."""
+    page = course / f"grades/{FIRST}/feedback/Dan_9.html"
+    page.write_text("This submission could not be graded")
+    try:
+        for platform in ("canvas", "moodle"):
+            done = CliRunner().invoke(app, ["grades", "course", f"--{platform}", "--course", str(course)])
+            assert done.exit_code == 1 and "not final yet: Dan_9" in done.stdout
+            rows = (course / f"grades/course/{platform}.csv").read_text().splitlines()
+            dan = next(row for row in rows if "Dan" in row)
+            cher = next(row for row in rows if "Cher" in row)
+            assert "0.00" not in cher and ("0.00" not in dan or "Not final" in dan)
+        assert "not graded" in (course / "grades/course/course.html").read_text()
+    finally:
+        page.unlink()
+
+
 def test_the_courses_page_and_table_forget_a_student_too(course):
     written(course)
     forget(course, "77")

@@ -13,7 +13,9 @@ from pathlib import Path
 import grading_course as kit
 import pytest
 
+from labgrader.grade.batch import Record
 from labgrader.grade.changes import change_of
+from labgrader.grade.grade import Result
 from labgrader.grade_course import grade_course
 from labgrader.report import gradescope
 from labgrader.sandbox import bwrap
@@ -134,16 +136,68 @@ def test_what_cannot_be_graded_says_why(tmp_path):
     kit.write_lab(tmp_path, TOPIC)
     with pytest.raises(ValueError, match="expected a round of grading"):
         gradescope.write_autograder(tmp_path, TOPIC)
+    kit.write_lab(tmp_path / "source", TOPIC)
     (tmp_path / "submission").mkdir()
+    for name, says in ((None, "it is empty"), ("report.pdf", "it holds report.pdf"), ("04_iou.ipynb", "it is empty")):
+        if name is not None:
+            (tmp_path / "submission" / name).touch()
+        gradescope.main(TOPIC, str(tmp_path))
+        results = json.loads((tmp_path / "results/results.json").read_text())
+        assert results["score"] == 0.0 and says in results["output"]
+
+
+COURSE = f"""
+[[deadline]]
+lab = "{TOPIC}"
+due = 2026-10-05T12:00:00Z
+penalty_per_day = 10
+
+[[extension]]
+lab = "{TOPIC}"
+student = "ada@x.org"
+due = 2026-10-12T12:00:00Z
+reason = "ill"
+"""
+
+
+@pytest.mark.parametrize(
+    "user, more, files, share, says",
+    [
+        ({"id": 7, "email": "ben@x.org"}, "", ("04_iou.ipynb",), 0.9, "Handed in 1 day late, 10 % less."),
+        ({"id": 7, "email": "ada@x.org"}, "", ("04_iou.ipynb",), 1.0, ""),
+        ({"id": 7, "email": "ben@x.org"}, "[[course]]\nlate_days = 2\n", ("04_iou.ipynb",), 1.0, ""),
+        (
+            {"id": 7, "email": "ada@x.org"},
+            "",
+            ("04_iou.ipynb", "x/04_iou (2).ipynb"),
+            1.0,
+            "Of its notebooks 04_iou.ipynb was graded, not 04_iou (2).ipynb.",
+        ),
+    ],
+)
+def test_deadline_extension_and_a_second_notebook_count_there_too(
+    tmp_path, monkeypatch, user, more, files, share, says
+):
+    source = tmp_path / "source"
+    kit.write_lab(source, TOPIC)
+    (source / "secret_seed").write_text("secret")
+    (source / "course.toml").write_text(COURSE + more)
+    for i, name in enumerate(files):
+        kit.write(tmp_path / "submission" / name, kit.lab_notebook(TOPIC, {"iou": f"def iou(n):\n    return {i}"}))
+    told = {"created_at": "2026-10-06T04:00:00-07:00", "users": [user]}
+    (tmp_path / "submission_metadata.json").write_text(json.dumps(told))
+    results = tuple(Result(name, worth, worth, "right", right=True) for name, worth in POINTS.items())
+    record = Record("student-7", "", results, True, "digest", "key")
+    monkeypatch.setattr(gradescope, "grade_batch", lambda batch, progress: ([record], 1))
     gradescope.main(TOPIC, str(tmp_path))
-    results = json.loads((tmp_path / "results/results.json").read_text())
-    assert results["score"] == 0.0 and "expected one notebook 04_iou.ipynb, got 0" in results["output"]
+    written = json.loads((tmp_path / "results/results.json").read_text())
+    assert written["score"] == pytest.approx(share * sum(POINTS.values())) and written["output"].startswith(says)
 
 
 def test_whoever_hands_in_again_has_the_same_name(tmp_path):
     """Of a group, in whatever order Gradescope names its members; a container that says nothing has one for all."""
     metadata = tmp_path / "submission_metadata.json"
-    assert gradescope.student_of(metadata) == "student"
+    assert gradescope.student_of(gradescope.read_metadata(metadata)) == "student"
     for users in ([{"id": 7}, {"id": 12}], [{"id": 12, "name": "Ada"}, {"id": 7}]):
         metadata.write_text(json.dumps({"id": len(users), "users": users}))
-        assert gradescope.student_of(metadata) == "student-12-7"
+        assert gradescope.student_of(gradescope.read_metadata(metadata)) == "student-12-7"

@@ -132,6 +132,26 @@ def test_a_second_look_shows_program_cases_and_replies_by_the_key_of_a_students_
     assert says in done.stdout and {*replies} == (set() if student == "hal" else {"public", "secret"})
 
 
+def test_a_second_look_shows_the_points_that_count(course):
+    """After a change for everybody, and after a person's points."""
+    page = (course / "grades" / TOPIC / "feedback/dan.html").read_text()
+    (key,) = re.findall("<code>(iou-.*?)</code>", page)
+    change = {"lab": TOPIC, "question": "iou", "everybody": True, "date": "2026-10-05", "reason": "unclear"}
+    (course / "changes.json").write_text(json.dumps([change]))
+    with gradebook.opened(course) as book:
+        book.find_grade("check_iou", TOPIC, TOPIC, "dan").manual_score = 1.5
+        book.db.commit()
+    try:
+        said = CliRunner().invoke(app, ["grade", TOPIC, "--course", str(course), "--look", key]).stdout
+    finally:
+        (course / "changes.json").unlink()
+        with gradebook.opened(course) as book:
+            book.find_grade("check_iou", TOPIC, TOPIC, "dan").manual_score = None
+            book.db.commit()
+    assert "2 of 2 points: " in said and "Everybody has these points: unclear" in said
+    assert "A person gave it 1.5 points, which count." in said
+
+
 @pytest.mark.bad_input
 def test_a_key_of_nobody_is_said(course):
     done = CliRunner().invoke(app, ["grade", TOPIC, "--course", str(course), "--look", "iou-\x1b"])

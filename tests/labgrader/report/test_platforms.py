@@ -18,6 +18,8 @@ from labgrader.grade.changes import change_of
 from labgrader.grade.gradebook import opened
 from labgrader.grade.totals import NOT_FINAL
 from labgrader.grade_course import grade_course
+from labgrader.handin.roster import read_roster
+from labgrader.report.platforms import canvas_heading
 
 ROOT = Path(__file__).parents[3]
 TOPIC = "04_iou"
@@ -108,6 +110,48 @@ def test_canvas_gets_its_columns_and_its_own_names_of_files(tmp_path):
         ("obrienzoe", "1235", ""),
     ]
     assert list(pages) == ["lovelaceada_1234_567890_04_iou.html", "obrienzoe_LATE_1235_567891_04_iou-2.html"]
+
+
+EXPORT = "Student,ID,SIS User ID,SIS Login ID,Section,{}\n,,,,,Manual Posting,\n    Points Possible,,,,,7,7\n{}"
+PEOPLE = '"Lovelace, Ada",1234,a,ada,S1,,\n'
+
+
+@pytest.mark.parametrize(
+    "columns, settings, number, heading",
+    [
+        ("04_iou (5511),Quiz (5512)", "", None, "04_iou (5511)"),
+        ("04_IoU (5511),Quiz (5512)", "", None, "04_IoU (5511)"),
+        ("Lab 4: IoU (5511),Quiz (5512)", "", 5511, "Lab 4: IoU (5511)"),
+        ("Lab 4: IoU (5511),Quiz (5512)", '[[canvas]]\nlab = "04_iou"\nassignment = 5511\n', None, "Lab 4: IoU (5511)"),
+        ("Lab 4: IoU (5511),Quiz (5512)", "", None, "none has the name 04_iou; name one by --assignment NUMBER"),
+        ("Lab 4: IoU (5511),Quiz (5512)", "", 7, "none has the number 7; name one by --assignment NUMBER or in"),
+        ("04_iou (5511),04_iou (5512)", "", None, "several have the name 04_iou"),
+        ("a,b", "", None, "04_iou"),
+        ("a,b", "", 5511, "04_iou (5511)"),
+    ],
+)
+def test_canvas_finds_the_assignment_by_its_number_or_it_is_asked_for(tmp_path, columns, settings, number, heading):
+    (tmp_path / "roster.csv").write_text(EXPORT.format(columns, PEOPLE))
+    (tmp_path / "course.toml").write_text(settings)
+    roster = read_roster(tmp_path)
+    assert list(roster) == ["1234"]
+    if "name" in heading or "number" in heading:
+        with pytest.raises(ValueError, match="assignment: of the columns") as refusal:
+            canvas_heading(tmp_path, TOPIC, roster, number)
+        assert heading in str(refusal.value) and "(5511)" in str(refusal.value)
+    else:
+        assert canvas_heading(tmp_path, TOPIC, roster, number) == heading
+
+
+@pytest.mark.parametrize("odd", ["a ?b", "50% c", "x%3Fy#z"])
+def test_a_course_is_graded_whatever_its_path_holds(tmp_path, odd):
+    course = tmp_path / odd
+    kit.write_lab(course, TOPIC)
+    kit.submit(course, "ada", TOPIC, {})
+    assert not grade_course(TOPIC, course, seed="secret", progress=False).failures
+    assert {path.name for path in tmp_path.iterdir()} == {odd}
+    with opened(course) as book:
+        assert [submission.student.id for submission in book.assignment_submissions(TOPIC)] == ["ada"]
 
 
 @pytest.mark.bad_input

@@ -1,6 +1,8 @@
 """Answers in words: one page per question, without names and code, saved into nbgrader's gradebook as one types."""
 
+import base64
 import json
+import re
 import threading
 import urllib.error
 import urllib.request
@@ -105,6 +107,80 @@ def test_the_page_has_no_names_and_no_code_and_others_can_neither_read_nor_save(
     assert ask(server.url, ["x"], Origin=address)[0] == 400
 
 
+PICTURE = base64.b64encode(b"\x89PNG\r\n\x1a\n" + bytes(30)).decode()
+
+
+def with_pictures(course: Path, words: str, attached: dict) -> str:
+    """A student's cell as the page has it; the key of the answer."""
+    notebook = kit.lab_notebook(TOPIC, {})
+    notebook["cells"][-1] |= {"source": words, "attachments": attached}
+    kit.submit(course, "dan", TOPIC, notebook)
+    lab = read_lab(course, TOPIC)
+    read = [one for one in read_submissions(course / "submitted", lab) if one.student == "dan"]
+    write_gradebook(course, lab, [(Record("dan", "", (), True, read[0].digest, "key"), read[0])], {}, {})
+    return key(course, "dan")
+
+
+def test_markdown_and_attached_pictures_are_shown_and_no_address_is(course, server):
+    attached = {
+        "a photo.png": {"image/png": PICTURE},
+        "b.svg": {"image/svg+xml": PICTURE},
+        "c.png": {"image/png": "PHN2Zz4="},
+    }
+    attached |= {"lost.jpg": {"image/jpeg": base64.b64encode(b"\xff\xd8\xff" + bytes(30)).decode()}}
+    words = "# Why\n\n**union** of ![it](attachment:a%20photo.png) ![](attachment:b.svg) ![x](http://evil.org/x.png)"
+    name = with_pictures(course, words, attached)
+    page = ask(server.url)[1]
+    mine = page[page.index(f'id="{name}"') :].partition("</article>")[0]
+    assert "<strong>Why</strong>" in mine and "<strong>union</strong>" in mine and "http://" not in mine
+    sources = re.findall('<img src="([^"]*)"', mine)
+    assert sources == [f"pictures/{name}/picture-1.png", f"pictures/{name}/picture-2.jpeg"]  # an unused one ends it
+    folder = server.url.rpartition("/")[0]
+    with urllib.request.urlopen(f"{folder}/{sources[0]}", timeout=20) as reply:
+        assert reply.headers["Content-Type"] == "image/png" and reply.read() == base64.b64decode(PICTURE)
+    copy = json.loads((course / f"autograded/dan/{TOPIC}/{TOPIC}.ipynb").read_bytes())["cells"][-1]
+    assert copy["attachments"].keys() == {"picture-1.png", "picture-2.jpeg"}  # formgrader shows them, too
+
+
+@pytest.mark.bad_input
+def test_nothing_but_mathjax_and_pictures_is_served_and_a_port_in_use_is_named(course, server):
+    folder = server.url.rpartition("/")[0]
+    assert ask(f"{folder}/mathjax/MathJax.js?config=x")[0] == 200
+    for path in ("mathjax/../__init__.py", "mathjax/", "mathjax", "pictures/a/b", "pictures", "mathjax//etc/passwd"):
+        assert ask(f"{folder}/{path}")[0] == 404, path
+    port = server.server_address[1]
+    with pytest.raises(ValueError, match=f"port: {port} is in use by another program; choose another one"):
+        TextsServer(course, server.lab, port)
+
+
+def errors(page) -> list[str]:
+    """The errors of a page, without the empty font that MathJax asks for and is refused."""
+    return [error for error in page.errors if "about:blank" not in error]
+
+
+@pytest.mark.debian("chromium")
+def test_formulas_are_typeset_here_and_the_rubric_covers_no_answer(course, server, page):
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    for width in (1280, 420):
+        page.set_viewport_size({"width": width, "height": 600})
+        page.goto(server.url)
+        page.wait_for_selector(".words .MathJax .math")
+        boxes = page.locator("article").evaluate_all("all => all.map(one => one.getBoundingClientRect().toJSON())")
+        rubric = page.locator(".rubric").evaluate("one => one.getBoundingClientRect().toJSON()")
+        for box in boxes:
+            assert rubric["right"] <= box["left"] or rubric["bottom"] <= box["top"]
+        page.mouse.wheel(0, 3000)
+        article = page.locator("article").last
+        article.scroll_into_view_if_needed()
+        assert article.evaluate(
+            "one => { const at = one.getBoundingClientRect(); const y = Math.max(at.top, 0) + 5;"
+            " return one.contains(document.elementFromPoint(at.left + 20, y)); }"
+        )
+    assert asked and all(url.startswith((f"http://{server.host}/", "about:")) for url in asked)
+    assert not errors(page)
+
+
 @pytest.mark.debian("chromium")
 def test_a_person_grades_with_the_keyboard_alone_and_nothing_of_a_students_runs(course, server, page):
     page.goto(server.url)
@@ -126,4 +202,4 @@ def test_a_person_grades_with_the_keyboard_alone_and_nothing_of_a_students_runs(
         page.evaluate("window.attacked") is None
         and page.locator("article script:not([type^='math/']), article img").count() == 0
     )
-    assert RUN in page.content() and not page.errors
+    assert RUN in page.content() and not errors(page)
