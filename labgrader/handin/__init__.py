@@ -3,5 +3,7 @@
 collect   whose a file is in the zip of a learning platform
 exchange  what `nbgrader collect` takes from a hub's exchange
 reading   a released lab and the submissions of it, read as data of strangers
+several   which of a student's notebooks is graded
+pictures  what is attached to answers in words
 roster    names and emails
 """
