@@ -166,7 +166,7 @@ def test_two_folders_of_one_person_in_a_lab_are_refused():
     final = Final("", 1.0, 1.0, (), Lateness(), "")
     assert len(rows_of({FIRST: {"Zo\u00eb": final}, SECOND: {"Zoe\u0308": final}}, roster, {})) == 1
     with pytest.raises(ValueError, match=r"04_iou: .* are both Zo\u00eb; rename the folder of one"):
-        rows_of({FIRST: {"Zo\u00eb": final, "Zoe\u0308": final}}, roster)
+        rows_of({FIRST: {"Zo\u00eb": final, "Zoe\u0308": final}}, roster, {})
 
 
 def test_one_lab_always_stays_and_a_weight_of_0_does_not_count():
