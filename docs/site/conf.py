@@ -96,6 +96,7 @@ GUIDES = {
         "docs/week_by_week",
         "docs/grading",
         "docs/own_pictures",
+        "docs/cameras",
         "docs/library",
         "docs/ros2",
         "docs/capstone",

@@ -173,6 +173,23 @@ def test_a_gripper_is_words_or_a_file(tmp_path):
     assert perceive.read_gripper("") == Gripper()
 
 
+HOSTILE = {
+    "deep": '{"a":' * 3000 + "1" + "}" * 3000,
+    "cyclic": "a: &a\n  b: *a\n",
+    "400 digits": '{"max_opening": ' + "1" * 400 + "}",
+    "lists": "[[1]]",
+    "a number": "5",
+    "nothing": "",
+}
+
+
+@pytest.mark.parametrize("content", HOSTILE.values(), ids=HOSTILE)
+def test_a_hostile_file_of_a_gripper_is_refused_in_words(content, tmp_path):
+    (tmp_path / "hand.json").write_text(content)
+    with pytest.raises(ValueError, match=r"^(gripper|max_opening): expected"):
+        perceive.read_gripper(str(tmp_path / "hand.json"))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

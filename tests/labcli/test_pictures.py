@@ -3,14 +3,16 @@
 import json
 import os
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from camera_files import FILES
 from scenes import png_that_claims
 from typer.testing import CliRunner
 
-from labcli import evaluate_folder, pictures
+from labcli import evaluate_folder
 from labcli.cameras import read_intrinsics
 from labcli.cli import app
 from labcli.own_data import PictureFolder
@@ -117,6 +119,23 @@ def test_float64_and_one_array_of_any_name_and_fortran_order_are_read_too(files)
     np.save(files / "depth.npy", np.asfortranarray(DEPTH))
     for end in ("tiff", "npz", "npy"):
         assert np.array_equal(read_shot(files / "color.png", files / f"depth.{end}", camera(files)).frame.depth, DEPTH)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", FILES)
+def test_a_camera_of_each_format_leads_to_a_grasp_in_one_command(kind, files):
+    name, content, *_ = FILES[kind]
+    (files / name).write_text(content)
+    K, size = np.array([[600.0, 0.0, 320.0], [0.0, 601.0, 240.0], [0.0, 0.0, 1.0]]), (640, 480)
+    depth, table = (depth_of(K, size, block) for block in (True, False))
+    units = 5000.0 if kind == "ORB-SLAM" else 10_000.0 if "BOP" in kind or "cam_K" in kind else 1000.0
+    cv2.imwrite(str(files / "depth.png"), np.rint(units * depth).astype(np.uint16))
+    cv2.imwrite(str(files / "color.png"), cv2.resize(RGB, size)[..., ::-1])
+    cv2.imwrite(str(files / "mask.png"), np.where(np.abs(depth - table) > 1e-6, 255, 0).astype(np.uint8))
+    out, said = perceived(files, intrinsics=name)
+    assert "best grasp: target 1" in out
+    closes_at = np.array(said["grasps"][0]["T_cam_grasp"])[:3, 3]
+    assert np.linalg.norm(closes_at - [0.0, 0.0, AWAY / np.cos(TILT) - 0.03]) < 0.05
 
 
 APPS = {
@@ -373,18 +392,28 @@ def test_each_picture_of_a_folder_has_the_camera_of_its_name(folder):
     assert [frame.K[0, 0] for frame in evaluate_folder.TrueThings(folder)] == pytest.approx([300.0, 297.0])
 
 
-PHOTOGRAPHS = pictures.Path(__file__).resolve().parents[3] / "shared" / "real" / "tabletop"
+PHOTOGRAPHS = Path(__file__).resolve().parents[3] / "shared" / "real" / "tabletop"
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs are not here")
-def test_depth_of_photographs_survives_the_size_of_a_phones():
-    """Its table is the same plane within a millimetre, and no pixel floats between two surfaces."""
+def test_with_depth_of_a_phones_size_as_many_things_are_found_in_photographs(tmp_path):
+    """Five tables, depth brought down to 256 x 192 and back."""
+    from bench.bench_photographs import with_outlines
     from labkit.geometry.depth_units import resize_depth
+    from labkit.instance_metrics import pool
+    from labkit.pipeline import anything
 
-    for name in range(1, 6):
-        color, depth = (PHOTOGRAPHS / kind / f"{name}.png" for kind in ("color", "depth"))
-        frame = read_shot(color, depth, read_intrinsics(str(PHOTOGRAPHS / "camera.json"))).frame
-        small = frame.depth[np.ix_(np.arange(192) * 480 // 192 + 1, np.arange(256) * 640 // 256 + 1)]
-        there = replace(frame, depth=resize_depth(small, (640, 480)))
-        (one, two) = (on_table(each)[1] for each in (frame, there))
-        assert one.normal @ two.normal > np.cos(np.radians(0.5)) and abs(one.offset - two.offset) < 0.003
+    things, found = with_outlines(PHOTOGRAPHS, tmp_path), {}
+    rows, columns = (np.rint((np.arange(n) + 0.5) * N / n - 0.5).astype(int) for n, N in ((192, 480), (256, 640)))
+
+    class Smaller(evaluate_folder.TrueThings):
+        def __getitem__(self, index):
+            frame = super().__getitem__(index)
+            return replace(frame, depth=resize_depth(frame.depth[np.ix_(rows, columns)], (640, 480)))
+
+    for name, of in (("as it is", things), ("a phone's", Smaller(tmp_path))):
+        scores = pool([one.scores for one in evaluate_folder.judge(of, anything())])
+        found[name] = scores.over_half
+    print(found)
+    assert found["a phone's"] >= found["as it is"]
