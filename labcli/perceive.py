@@ -32,13 +32,13 @@ def read_gripper(text: str) -> Gripper:
     0.14
     """
     names = [measure.name for measure in fields(Gripper)]
+    of_file = len(text) < 4000 and Path(text).is_file()
+    words = parsed("gripper", text_of("gripper", text)) if of_file else text.replace(",", " ").split()
     try:
-        of_file = len(text) < 4000 and Path(text).is_file()
-        words = parsed("gripper", text_of("gripper", text)) if of_file else text.replace(",", " ").split()
         given = words if isinstance(words, dict) else dict(str(word).split("=") for word in words)
         measures = {name: float(metres) for name, metres in given.items()}
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f'gripper: expected "NAME=METRES ..." or a JSON file of them, got {text!r}') from None
+        raise ValueError(f'gripper: expected "NAME=METRES ..." or a JSON or YAML file, got {text!r}') from None
     unknown = ", ".join(sorted(measures.keys() - set(names)))
     require("gripper", not unknown, f"measures of {', '.join(names)}", unknown)
     return Gripper(**measures)

@@ -193,7 +193,7 @@ def test_a_hostile_file_of_a_gripper_is_refused_in_words(content, tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"options": ["--gripper", "wide"]}, 'gripper: expected "NAME=METRES ..." or a JSON file'),
+        ({"options": ["--gripper", "wide"]}, 'gripper: expected "NAME=METRES ..." or a JSON or YAML file'),
         ({"options": ["--gripper", "opening=0.1"]}, "gripper: expected measures of max_opening, pad_width"),
         ({"options": ["--gripper", "max_opening=140"]}, "max_opening: expected metres above 0 and below 1"),
         ({"options": ["--workspace", "0 1 0 1"]}, "workspace: expected six numbers"),
