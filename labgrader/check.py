@@ -27,9 +27,9 @@ from labgrader.program.slice import NO_CELL, Program, program
 from labgrader.question import Question
 from labgrader.reply.judge import Verdict
 from labgrader.reply.messages import Marked
-from labgrader.run import plain
+from labgrader.run import subprocess_worker
 from labgrader.run.process import MOST_PRINTED
-from labgrader.run.run import Answer, Budget, Limits, Start, public_cases
+from labgrader.run.run import Budget, Limits, Run, Start, public_cases
 
 LIMITS = Limits()  # the grader's, so that a tick here is a tick there
 LOOKING = "Looking for the place in your program: a moment ..."
@@ -104,7 +104,7 @@ def check(name: str, answer: object) -> Callable:
         if jupyter() is not None:
             page.show(describe(question, verdict, printed, notes, LOOKING))
 
-    verdict, printed = judged(question, program_of(question, answer), meanwhile)
+    verdict, printed = reply_to(question, program_of(question, answer), meanwhile)
     if verdict.problem is not None and verdict.problem.kind == "unanswered":
         notes += ("The kit's function takes its place below.",)
     shown = describe(question, verdict, printed, notes)
@@ -113,12 +113,12 @@ def check(name: str, answer: object) -> Callable:
     return conclude(shown, giving_arrays(answer, public_cases(question)), True, page)
 
 
-def judged(
+def reply_to(
     question: Question,
     cut: Program,
     meanwhile: Callable[[Verdict, str], None] = lambda verdict, printed: None,
     budget: Budget | None = None,
-    start: Start = plain.fresh_worker,
+    start: Start = subprocess_worker.fresh_worker,
 ) -> tuple[Verdict, str]:
     """Run a program on the public cases: the verdict, with what is found in a wrong one, and what it printed.
 
@@ -128,13 +128,13 @@ def judged(
     if cut.refused and cut.late is None:
         return Verdict(Problem("refused", cut.refused), None, ""), ""
     if cut.refused:
-        return judged(question, cut.late, meanwhile, budget, start)
-    with Answer(question, cut, start, LIMITS, budget) as answer:
-        verdict, _ = answer.judged(public_cases(question))
+        return reply_to(question, cut.late, meanwhile, budget, start)
+    with Run(question, cut, start, LIMITS, budget) as answer:
+        verdict, _ = answer.judge(public_cases(question))
         printed = answer.worker.printed()
         if not verdict.passed and cut.late is not None:
-            with Answer(question, cut.late, start, LIMITS, budget) as late:
-                second, _ = late.judged(public_cases(question))
+            with Run(question, cut.late, start, LIMITS, budget) as late:
+                second, _ = late.judge(public_cases(question))
                 if second.passed:
                     return second, late.worker.printed()
         if verdict.needs_a_look:
@@ -206,11 +206,11 @@ def places_of(answer: Callable, blanks: Collection[str]) -> Iterator[list[Cell]]
     nbval keeps no history of what it runs, but Python has the text of each cell for its tracebacks.
     """
     if jupyter() is not None:
-        last = {cell: number for number, cell in ran.items()}
+        last = {cell: number for number, cell in cell_of_execution.items()}
         yield [
-            Cell(source, ran[number] if ran.get(number) in blanks else "")
+            Cell(source, cell_of_execution[number] if cell_of_execution.get(number) in blanks else "")
             for number, source in enumerate(jupyter().history_manager.input_hist_raw)
-            if number not in ran or last[ran[number]] == number
+            if number not in cell_of_execution or last[cell_of_execution[number]] == number
         ]
         entries = [entry for entry in linecache.cache.values() if len(entry) == 4 and entry[1] is None]
         yield [Cell("".join(lines)) for _, _, lines, name in entries if "ipython-input" in name or "ipykernel" in name]
@@ -230,14 +230,14 @@ def jupyter() -> object | None:
 
 # By number of execution the cell's id, from the first check on and where Jupyter tells it. A lab's answers have their
 # functions' names.
-ran: dict[int, str] = {}
+cell_of_execution: dict[int, str] = {}
 
 
 def note_cell(info: object) -> None:
     """Keep which cell is about to run."""
     cell = getattr(info, "cell_id", None)  # IPython 7, which Colab has, tells none
     if info.store_history and cell:
-        ran[len(jupyter().history_manager.input_hist_raw)] = cell  # it is put there next
+        cell_of_execution[len(jupyter().history_manager.input_hist_raw)] = cell  # it is put there next
 
 
 if jupyter() is not None:

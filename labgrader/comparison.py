@@ -1,7 +1,7 @@
 """The cases of a question, what is expected of them, and what is wrong with an output; nothing here calls an answer.
 
     expected_cases(question, seed)      arguments and expected outputs
-    plain(got)                          an output as NumPy, or the Problem that it is
+    as_numpy(got)                          an output as NumPy, or the Problem that it is
     compare(question, expected, got)    one case: None if it is right, else the Problem
 
 All functions here are pure: the same arguments, the same result, and no argument is altered.
@@ -45,7 +45,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Case:
-    """Arguments of one call, what the reference makes of them (as `plain` gives it), and whether it is by hand."""
+    """Arguments of one call, what the reference makes of them (as `as_numpy` gives it), and whether it is by hand."""
 
     args: tuple
     expected: object
@@ -71,9 +71,9 @@ def quiet() -> Iterator[None]:
 
 
 def trusted(function: Callable, args: tuple) -> object:
-    """Call the kit's own function on copies of the arguments, quietly; `plain` of its output."""
+    """Call the kit's own function on copies of the arguments, quietly; `as_numpy` of its output."""
     with quiet():
-        return plain(function(*copy.deepcopy(args)))
+        return as_numpy(function(*copy.deepcopy(args)))
 
 
 def same_argument(a: object, b: object) -> bool:
@@ -90,16 +90,16 @@ def same_argument(a: object, b: object) -> bool:
 # ------------------------------------------------------------------------------------- what an output is
 
 
-def plain(got: object) -> object:
+def as_numpy(got: object) -> object:
     """Give an output as NumPy: a scalar or an array, or a tuple of these, all copied; or the Problem that it is not.
 
     Tensors of torch are converted; subclasses of arrays lose what they add. A list of numbers, or of lists of them, is
     an array, in a tuple as well, and any other list a tuple. Nothing of an object of any other class is called, not
     even its repr.
 
-    >>> plain((1, np.ones(2, np.float32)))
+    >>> as_numpy((1, np.ones(2, np.float32)))
     (np.int64(1), array([1., 1.], dtype=float32))
-    >>> plain(None).says
+    >>> as_numpy(None).says
     'it returns None: is a `return` missing?'
     """
     if not issubclass(type(got), tuple | list):
@@ -115,7 +115,7 @@ def plain(got: object) -> object:
 
 
 def plain_part(got: object) -> object:
-    """Give one output of several as `plain` does: a list or tuple of numbers is an array here, too."""
+    """Give one output of several as `as_numpy` does: a list or tuple of numbers is an array here, too."""
     if issubclass(type(got), tuple | list) and (array := array_of_list(list(got))) is not None:
         return array
     return plain_array(got)
@@ -152,7 +152,7 @@ def array_of_list(got: list) -> np.ndarray | Problem | None:
 
 
 def plain_array(got: object) -> object:
-    """Give one array or number as `plain` does."""
+    """Give one array or number as `as_numpy` does."""
     cls = type(got)
     if got is None:
         return Problem("kind", "it returns None: is a `return` missing?")
@@ -187,7 +187,7 @@ def compare(question: Question, expected: object, got: object) -> Problem | None
     array counts as a tuple of its rows where a tuple is expected, a tuple of numbers or rows as an array where one is,
     and an array of one number, (1,), as the number. NaN is right where the reference gives NaN.
     """
-    got = as_expected(expected, plain(got))
+    got = as_expected(expected, as_numpy(got))
     if isinstance(got, Problem):
         return got
     return wrong_form(question, expected, got) or wrong_values(question, expected, got)
@@ -223,7 +223,7 @@ def number_of_one(expected: object, got: object) -> object:
 
 def right_outputs(question: Question, expected: tuple, got: object) -> list[bool]:
     """Which outputs of a tuple are right, each for itself; none of something that is no such tuple."""
-    got = as_expected(expected, plain(got))
+    got = as_expected(expected, as_numpy(got))
     if not isinstance(got, tuple) or len(got) != len(expected):
         return [False] * len(expected)
     wrong = differences(question, *canonical(question, expected, got))
@@ -330,7 +330,7 @@ def different(question: Question, expected: np.ndarray, got: np.ndarray) -> np.n
 
 def alike(question: Question, a: object, b: object) -> bool:
     """Whether two outputs, wrong ones perhaps, are the same within the question's tolerance."""
-    a, b = plain(a), plain(b)
+    a, b = as_numpy(a), as_numpy(b)
     if isinstance(a, Problem) or isinstance(b, Problem):
         return isinstance(a, Problem) and isinstance(b, Problem) and a.kind == b.kind
     return not any(wrong.any() for wrong in differences(question, *canonical(question, a, b)))

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labgrader.check import LIMITS, describe, judged, jupyter
+from labgrader.check import LIMITS, describe, jupyter, reply_to
 from labgrader.comparison import Problem
 from labgrader.course import asked, course, of_topic, topics
 from labgrader.handin.reading import released_by
@@ -23,12 +23,12 @@ from labgrader.program.open_notebook import live_notebook, running_file
 from labgrader.program.slice import NO_CELL, program
 from labgrader.question import Question
 from labgrader.reply.judge import Verdict
-from labgrader.run import plain
+from labgrader.run import subprocess_worker
 from labgrader.run.run import Budget, Start
 from labgrader.support import counted
 
 
-def check_file(path: Path | str | None = None, start: Start = plain.fresh_worker) -> bool:
+def check_file(path: Path | str | None = None, start: Start = subprocess_worker.fresh_worker) -> bool:
     """Check every answer in a lab, print the results, and tell whether all are right.
 
     Of the texts that a person grades it says which are still empty; a lab of texts alone is right if none is.
@@ -119,7 +119,7 @@ class CheckedLab:
 
     cells: Sequence[Cell]
     questions: dict[str, Question]
-    start: Start = plain.fresh_worker
+    start: Start = subprocess_worker.fresh_worker
     no_code: dict[str, str] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
@@ -129,10 +129,10 @@ class CheckedLab:
         """The verdict on an answer; answers that it calls come before, and are the kit's if they are wrong."""
         if name not in self.verdicts:
             self.verdicts[name] = Verdict(Problem("refused", "it calls itself through another answer"), None, "")
-            self.verdicts[name] = self.judged(name)
+            self.verdicts[name] = self.reply_to(name)
         return self.verdicts[name]
 
-    def judged(self, name: str) -> Verdict:
+    def reply_to(self, name: str) -> Verdict:
         """Run an answer's program on the public cases."""
         question, here = self.questions[name], course()
         asked = (name, self.questions, here.packages, question.forbidden, here.kit)
@@ -144,7 +144,7 @@ class CheckedLab:
         if wrong:
             given = {other: self.questions[other].source for other in wrong}
             cut = program(self.cells, *asked, given)
-        return judged(question, cut, budget=self.budget, start=self.start)[0]
+        return reply_to(question, cut, budget=self.budget, start=self.start)[0]
 
 
 def not_saved(names: Sequence[str], cells: Sequence[Cell]) -> list[str]:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from labgrader.grade.batch import Batch, Record, grade_batch, secret_for, with_attempts
 from labgrader.grade.changes import Change, add_change, changed, read_changes, undo
-from labgrader.grade.deadlines import read_deadline, strangers
+from labgrader.grade.deadlines import read_deadline
 from labgrader.grade.gradebook import write_gradebook
+from labgrader.grade.overview import add_comment, read_comments, standings
 from labgrader.grade.read_programs import read_all
 from labgrader.grade.students import known_students, remove_students, rename_students
 from labgrader.grade.totals import finish_pages, settle
@@ -20,7 +21,6 @@ from labgrader.report.alike import Found, find_alike, old_records
 from labgrader.report.alike_page import write_alike
 from labgrader.report.forget import keep_out_of_git
 from labgrader.report.outputs import write_outputs
-from labgrader.report.overview import add_comment, read_comments, standings
 from labgrader.sandbox.sandbox import Limits
 from labgrader.support import keep_closed
 
@@ -141,7 +141,7 @@ def grade_course(topic: str, course: Path = Path("."), **options) -> Graded:
     files = {one.student: one.file for one in read if one.file and not one.others}
     notes = {one.student: one.note for one in read if one.note}
     notes |= {name: str(final.late) for name, final in finals.items() if final.late.unknown}
-    odd = strangers(deadline, students)
+    odd = unknown_extensions(deadline, students)
     told = failures, late, odd, renamed, gone, files, new_gradebook, kept_out, alike, notes, absent
     return Graded(lab, records, graded_now, *told)
 

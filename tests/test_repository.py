@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from functools import cache
 from graphlib import TopologicalSorter
 from itertools import chain
@@ -24,13 +25,22 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 PINS = read_pins(ROOT / "constraints.txt")
 KIT = distribution_of("labkit")
-# The rooms of labkit from the bottom up: each may import what stands left of it, itself, and `labkit`.
-ROOMS = (
-    "support > labels > frame > geometry losses metrics instance_metrics crf > grasp learning > network > "
-    "notices targets > pipeline sim > node"
-)
+# The rooms of a package from the bottom up: each may import what stands left of it, itself, and the package.
+ROOMS = {
+    "labkit": (
+        "support > labels > frame > geometry losses metrics instance_metrics crf > grasp learning > network > "
+        "notices targets > pipeline sim > node"
+    ),
+    "labgrader": (
+        "support question packages > comparison languages > course > program > reply > run > sandbox handin > "
+        "grade > report > check > file_check grade_course release"
+    ),
+}
 BELOW = {
-    room: set(re.split(r"\W+", ROOMS.partition(layer)[0])) for layer in ROOMS.split(" > ") for room in layer.split()
+    (package, room): set(re.split(r"\W+", rooms.partition(layer)[0]))
+    for package, rooms in ROOMS.items()
+    for layer in rooms.split(" > ")
+    for room in layer.split()
 }
 # What each package may import of the others, and a package of packages that may import less than the whole.
 PACKAGES = {
@@ -96,10 +106,17 @@ def test_arrows_between_rooms_point_one_way_and_in_no_circle():
         entered = {other for other in found if other.split(".")[0] in PACKAGES}
         strange = {o for o in entered if not any(f"{o}.".startswith(f"{way}.") for way in PACKAGES[allowed])}
         assert not strange, f"{name} imports {sorted(strange)}"
-        if name.startswith("labkit."):
-            own = name.split(".")[1]
-            rooms = {other.split(".")[1] for other in found if other.startswith("labkit.")}
-            assert not rooms - {own, *BELOW[own]}, f"{name} imports {sorted(rooms - {own, *BELOW[own]})}"
+        package, _, rest = name.partition(".")
+        if package in ROOMS and rest:
+            own = rest.partition(".")[0]
+            rooms = {other.split(".")[1] for other in found if other.startswith(f"{package}.")}
+            above = rooms - {own, *BELOW[package, own]}
+            assert not above, f"{name} imports {sorted(above)}"
+
+
+def test_no_folder_is_longer_than_a_page():
+    folders = Counter(path.parent for path in modules().values())
+    assert not [str(folder) for folder, files in folders.items() if files > 24 and folder.name != "questions"]
 
 
 def test_what_judges_and_grades_knows_no_course():

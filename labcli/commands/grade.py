@@ -29,7 +29,7 @@ def grade(
     drop: Annotated[str | None, typer.Option(help="A question that does not count.")] = None,
     points: Annotated[str | None, typer.Option(help="A question and what it is worth now, such as iou=3.")] = None,
     partial: Annotated[str | None, typer.Option(help="A question whose outputs count one by one.")] = None,
-    reason: Annotated[str, typer.Option(help="Why; kept in changes.json, and told to students.")] = "",
+    reason: Annotated[str, typer.Option(help="Why; kept in changes.json, and terminal_lines to students.")] = "",
     undo: Annotated[str | None, typer.Option(help="A question whose change is taken back.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
     tidy: Annotated[
@@ -71,7 +71,7 @@ def grade(
 
 def tell(graded, folder: Path, tidy: bool) -> None:
     """Print the table of a grading, `run.Graded`, what an instructor should know of it, and where its files are."""
-    from labgrader.report.alike_page import told
+    from labgrader.report.alike_page import terminal_lines
     from labgrader.report.outputs import terminal_table
     from labgrader.support import counted
 
@@ -96,5 +96,5 @@ def tell(graded, folder: Path, tidy: bool) -> None:
     typer.echo(
         f"{counted(len(graded.records), 'student')}, {graded.graded_now} of them graded now: {folder / 'grades.csv'}"
     )
-    for line in told(graded.alike, folder / "alike.html"):
+    for line in terminal_lines(graded.alike, folder / "alike.html"):
         typer.echo(line)

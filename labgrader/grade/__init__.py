@@ -14,6 +14,7 @@ deadlines         who is late, and what it costs
 gradebook         nbgrader's database and the copies that formgrader shows
 students          those who were renamed, and those who are gone
 totals            what students have in the end, and the end of their pages
+overview          the class: who tried and passed, which mistakes, comments for all of them
 policy            weights, what is dropped, free late days, and points for everybody
 nbgrader_plugins  why nbgrader's own Autograde does nothing, and what its feedback leaves out
 """

@@ -79,7 +79,7 @@ def grade_batch(batch: Batch, progress: bool = True) -> tuple[list[Record], int]
     if not batch.unsafe:
         sandbox.probe(("numpy",), batch.limits)
     code = code_digest()
-    keys = {submission.student: key_of(batch, submission, code) for submission in batch.submissions}
+    keys = {submission.student: record_key(batch, submission, code) for submission in batch.submissions}
     records = {} if batch.force else kept_records(batch.out, keys)
     finished = {student for student, record in records.items() if record.key == keys[student]}
     gradings = {}
@@ -135,7 +135,7 @@ def with_attempts(record: Record, known: Mapping[str, Read | None]) -> Record:
 # ------------------------------------------------------------------------------------------------------ records
 
 
-def key_of(batch: Batch, submission: Submission, code: str) -> str:
+def record_key(batch: Batch, submission: Submission, code: str) -> str:
     """Name everything that a submission's results depend on."""
     parts = (code, batch.lab.digest, submission.digest, submission.reason, batch.secret, batch.limits, batch.unsafe)
     return hashlib.sha256(repr(parts).encode()).hexdigest()

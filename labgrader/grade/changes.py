@@ -168,12 +168,12 @@ def changed(lab: Lab, records: Sequence[Record], changes: Sequence[Change]) -> t
             mark["points"] = points.get(name, 0.0 if by_question[name].drop else mark["points"])
     now = []
     for record in records:
-        results = (under(result, by_question.get(result.question), points) for result in record.results)
+        results = (changed_result(result, by_question.get(result.question), points) for result in record.results)
         now.append(replace(record, results=tuple(results)))
     return replace(lab, points=points, notebook=notebook), now
 
 
-def under(result: Result, change: Change | None, points: dict[str, float]) -> Result:
+def changed_result(result: Result, change: Change | None, points: dict[str, float]) -> Result:
     """A result under the change to its question."""
     if change is None:
         return result

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from labgrader.course import course, files_of
 from labgrader.program.fingerprint import fingerprints
 from labgrader.question import Question
-from labgrader.run.run import drawing
+from labgrader.run.run import reference_lock
 
 
 def of_the_kit(prints: Iterable[str], question: Question) -> list[str]:
@@ -17,7 +17,7 @@ def of_the_kit(prints: Iterable[str], question: Question) -> list[str]:
 
 def known_functions() -> dict[str, str]:
     """The names of the library's functions that are long enough to be known by their fingerprint."""
-    with drawing:
+    with reference_lock:
         return _known_functions()
 
 
@@ -33,5 +33,5 @@ def _known_functions() -> dict[str, str]:
 @functools.cache
 def fingerprints_of(question: Question) -> dict[str, str]:
     """The fingerprints of a question's reference; not of the wrong answers beside it."""
-    with drawing:
+    with reference_lock:
         return fingerprints(question.source)

@@ -140,7 +140,7 @@ def in_utc(when: datetime.date) -> datetime.datetime:
     return when.astimezone(datetime.UTC).replace(tzinfo=None)
 
 
-def strangers(deadline: Deadline | None, students: Collection[str]) -> list[str]:
+def unknown_extensions(deadline: Deadline | None, students: Collection[str]) -> list[str]:
     """The names in extensions that none of the students has."""
     known = {key for student in students for key in keys_of(student)}
     return sorted(set(deadline.extensions) - known) if deadline else []

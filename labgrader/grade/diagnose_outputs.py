@@ -51,13 +51,13 @@ def diagnosed(
     pieces: the program; findings: what was found in it, None if nobody has looked yet.
     """
     question = of_topic(topic)[function]
-    judged = verdict_on(question, public_cases(question), outputs)
-    if findings is None and judged.needs_a_look:
+    verdict = verdict_on(question, public_cases(question), outputs)
+    if findings is None and verdict.needs_a_look:
         return Diagnosis(needs_a_look=True)
-    sentence = replace(judged, pieces=pieces, findings=findings or ()).sentence
+    sentence = replace(verdict, pieces=pieces, findings=findings or ()).sentence
     if sentence is None:
-        return Diagnosis(shown="\n".join(judged.shown))
-    lines = [*judged.shown, *(line for marked in sentence.marked for line in marked.plain())]
+        return Diagnosis(shown="\n".join(verdict.shown))
+    lines = [*verdict.shown, *(line for marked in sentence.marked for line in marked.plain())]
     return Diagnosis(sentence.says, sentence.names_the_mistake, "\n".join(lines))
 
 

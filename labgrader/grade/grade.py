@@ -31,7 +31,7 @@ from labgrader.program.slice import NO_CELL, Program
 from labgrader.question import Question
 from labgrader.reply.judge import Verdict
 from labgrader.run.channel import Changed, WorkerLost
-from labgrader.run.run import Answer, Budget, Limits, drawing, public_cases
+from labgrader.run.run import Budget, Limits, Run, public_cases, reference_lock
 from labgrader.sandbox import sandbox
 
 LOOK_AT = ("ended", "channel")  # kinds of problems that an instructor should look at
@@ -172,23 +172,23 @@ class Grading:
         first, late = program, program.late
         program = late if first.refused else first
         result = Result(name, 0.0, worth, "", flag="; ".join(flags), program=text_of(program), late=program is late)
-        with Answer(question, program, self.start, self.limits, self.budget) as answer:
-            judged, outputs = answer.judged(public_cases(question))
+        with Run(question, program, self.start, self.limits, self.budget) as answer:
+            verdict, outputs = answer.judge(public_cases(question))
             says = f"right in all {len(outputs)} cases"
             right = replace(result, points=worth, says=says, right=True, parts=question.outputs)
-            if judged.problem is None:
+            if verdict.problem is None:
                 return right
             if late is not None and program is first and self.is_right(question, late):
                 return replace(right, program=text_of(late), late=True)
-            problem = judged.problem
+            problem = verdict.problem
             if problem.kind in ("unanswered", "missing"):
                 return replace(result, says=problem.says, kind=problem.kind)
-            found = explained(answer, judged)
+            found = explained(answer, verdict)
         flags += [problem.says] if problem.kind in LOOK_AT else []
         flags += [found.failed] if found.failed else []
         return replace(
             result,
-            says=f"{in_a_sentence(problem)} ({judged.where})",
+            says=f"{in_a_sentence(problem)} ({verdict.where})",
             kind=problem.kind,
             hint=found.hint,
             shown=found.shown,
@@ -209,8 +209,8 @@ class Grading:
 
     def is_right(self, question: Question, program: Program) -> bool:
         """Whether a program is right in the public cases."""
-        with Answer(question, program, self.start, self.limits, self.budget) as answer:
-            return answer.judged(public_cases(question))[0].problem is None
+        with Run(question, program, self.start, self.limits, self.budget) as answer:
+            return answer.judge(public_cases(question))[0].problem is None
 
     def result(self, name: str, secret: str) -> Result:
         """What a question earned: a draft that is right, or has right parts, is judged once more, on secret cases."""
@@ -234,18 +234,18 @@ class Grading:
         if program.refused:
             return not_gradable(self.lab, name, program.refused) if draft.right else replace(draft, parts=())
         cases = secret_cases(question, secret, self.submission.student)
-        with Answer(question, program, self.start, self.limits, self.budget) as answer:
-            judged, outputs = answer.judged(cases)
-        if judged.problem is not None:
-            still = () if judged.problem.kind in LOOK_AT else right_parts(question, cases, outputs)
+        with Run(question, program, self.start, self.limits, self.budget) as answer:
+            verdict, outputs = answer.judge(cases)
+        if verdict.problem is not None:
+            still = () if verdict.problem.kind in LOOK_AT else right_parts(question, cases, outputs)
             draft = replace(draft, parts=tuple(part for part in draft.parts if part in still))
         if not draft.right:
             return draft
-        if judged.problem is None:
+        if verdict.problem is None:
             return replace(draft, says=f"right in all {len(public_cases(question)) + len(cases)} cases")
-        flags = [draft.flag, judged.problem.says if judged.problem.kind in LOOK_AT else ""]
+        flags = [draft.flag, verdict.problem.says if verdict.problem.kind in LOOK_AT else ""]
         flag = "; ".join(filter(None, flags))
-        wrong = replace(draft, points=0.0, right=False, kind=judged.problem.kind)
+        wrong = replace(draft, points=0.0, right=False, kind=verdict.problem.kind)
         return replace(wrong, says=ONLY_HIDDEN, flag=flag, behaviour=WRONG_IN_SECRET)
 
     def replies(self, name: str, secret: str) -> list[tuple[Case, object]]:
@@ -255,7 +255,7 @@ class Grading:
         if program.refused:
             return []
         cases = (*public_cases(question), *secret_cases(question, secret, self.submission.student))
-        with Answer(question, program, self.start, self.limits, Budget(self.limits)) as answer:
+        with Run(question, program, self.start, self.limits, Budget(self.limits)) as answer:
             return list(zip(cases, answer.outputs(cases), strict=True))
 
 
@@ -265,14 +265,14 @@ def secret_cases(question: Question, secret: str, student: str) -> tuple[Case, .
     secret: of the round of grading. They are twice as many as the public ones, since those by hand are not among them.
     """
     seed = int.from_bytes(hashlib.sha256(f"{secret}\0{question.name}\0{student}".encode()).digest(), "little")
-    with drawing:
+    with reference_lock:
         cases = expected_cases(replace(question, by_hand=(), random_cases=2 * question.random_cases), seed)
     return tuple(cases)
 
 
-def explained(answer: Answer, judged: Verdict) -> Diagnosis:
+def explained(answer: Run, verdict: Verdict) -> Diagnosis:
     """What to tell about a wrong answer, as its check tells it: its program is looked at where that is needed."""
-    asked = answer.question, judged.outputs, answer.program.pieces
+    asked = answer.question, verdict.outputs, answer.program.pieces
     found = diagnosers.ask(*asked)
     if not found.needs_a_look:
         return found
@@ -303,16 +303,16 @@ def not_gradable(lab: Lab, name: str, problem: str) -> Result:
 
 def behaviour_of(outputs: Sequence[object]) -> str:
     """A short name for wrong outputs on the public cases: the same for answers that give the same, up to rounding."""
-    text = "\n".join(told(output) for output in outputs)
+    text = "\n".join(outputs_as_text(output) for output in outputs)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def told(output: object) -> str:
+def outputs_as_text(output: object) -> str:
     """Kind, shape and rounded values of an output; of a Problem all but the student's line."""
     if isinstance(output, Problem):
         return f"{output.kind}: {output.says}"
     if isinstance(output, Changed):
-        return f"changes argument {output.positions[0]}: {told(output.value)}"
+        return f"changes argument {output.positions[0]}: {outputs_as_text(output.value)}"
     found = []
     for part in parts(output):
         array = np.asarray(part)

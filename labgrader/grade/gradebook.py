@@ -40,7 +40,7 @@ from labgrader.grade.nbgrader_plugins import KERNEL, RUBRIC_TAG
 from labgrader.handin.reading import Lab, Submission, source_of, text_of
 from labgrader.handin.roster import Person, person_of
 from labgrader.program.notebook import grade_id
-from labgrader.report.outputs import lines_of
+from labgrader.grade.overview import lines_of
 from labgrader.sandbox.sandbox import NO_SANDBOX
 from labgrader.support import inherited, write_atomically
 

@@ -46,7 +46,7 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             said = {comment.name: comment for comment in notebook.comments}
             for grade in notebook.grades:
                 if grade.name in said:  # an answer in words
-                    under(grade, said[grade.name], by_question.get(grade.name))
+                    apply_change(grade, said[grade.name], by_question.get(grade.name))
             gradebook.db.commit()  # which computes the scores
             late = Lateness()
             if deadline is not None:
@@ -73,7 +73,7 @@ def handed_in_late(late: Lateness) -> str:
     return f"<p>Handed in {late}.{f' {OFF}' if late.percent else ''}</p>" if late.days else ""
 
 
-def under(grade, comment, change: Change | None) -> None:
+def apply_change(grade, comment, change: Change | None) -> None:
     """Give an answer in words what a change says, and take that back when the change is gone.
 
     The score of a person stays what it is; extra credit makes the difference.

@@ -95,14 +95,14 @@ def read_roster(course: Path) -> dict[str, Person]:
 
 def people_of(rows: Iterator[list[str]], path: Path, first: str) -> dict[str, Person]:
     """The people in the rows of a file, by id; first: the file's first line."""
-    heading = [plain(cell) for cell in next(rows, [])]
+    heading = [in_one_line(cell) for cell in next(rows, [])]
     small = [cell.lower() for cell in heading]
     places = {name: next((small.index(h) for h in known if h in small), None) for name, known in COLUMNS.items()}
     if places["id"] is None:
         raise ValueError(f"{path}, line 1: expected a column id, Identifier (Moodle) or ID (Canvas), got {first!r}")
     people: dict[str, Person] = {}
     for row in rows:
-        row = [plain(cell) for cell in row]
+        row = [in_one_line(cell) for cell in row]
         is_canvass = row[:1] in (["Points Possible"], ["Student, Test"]) or not set(row) - {"", "Manual Posting"}
         if is_canvass:
             continue
@@ -121,10 +121,10 @@ def people_of(rows: Iterator[list[str]], path: Path, first: str) -> dict[str, Pe
     return people
 
 
-def plain(cell: str) -> str:
+def in_one_line(cell: str) -> str:
     r"""A cell in one line: a space for what is no letter, sign or space, such as a line's end or an escape code.
 
-    >>> plain("Ada\nLovelace "), plain("Zoe\u0308") == "Zo\u00eb"
+    >>> in_one_line("Ada\nLovelace "), in_one_line("Zoe\u0308") == "Zo\u00eb"
     ('Ada Lovelace', True)
     """
     text = unicodedata.normalize("NFC", cell)

@@ -41,7 +41,7 @@ class Program:
     pieces: (name, text) of each cell that is needed; lines that are not needed are blank, so that numbers of lines are
     those of the cell. calls: other blanks that the answer calls, directly or not. refused: why the answer cannot be
     graded, in words for its student; "" if it can. name: of the function that is called, "" for the question's. late:
-    the program with what stands lowest in the notebook, where cells below the answer define names of it anew: it counts
+    the program with the last definitions in the notebook, where cells below the answer define names of it anew: it counts
     if this one is wrong, since it is what a kernel has in the end. copies: which code cells, counted from 1, have the
     answer's grade id and differ: a cell was copied to try again, or split; the last of them is the answer.
     """
@@ -99,7 +99,7 @@ def program(
     asked = (list(map(parsed, cells)), name, blanks, given or {}, modules, without, kit, latest)
     first = Slice(*asked)
     made = first.program()
-    late = Slice(*asked, lowest=True).program() if first.lower else made
+    late = Slice(*asked, last_definitions=True).program() if first.meets_others_below else made
     if late.refused or same_text(late, made):
         return made
     return replace(made, calls=tuple(dict.fromkeys((*made.calls, *late.calls))), late=late)
@@ -124,7 +124,8 @@ class Slice:
 
     cells: in the order of the notebook, or in that in which they were run if `latest` is set. name: of the answer.
     blanks, given, kit: as in `program`. modules: those that there are where answers are graded, forbidden: those that
-    there are, but not for this task. lowest: the last definition of another name counts, wherever it stands; lower:
+    there are, but not for this task. last_definitions: those of other names
+    count, wherever they stand; meets_others_below:
     whether it would be another one then.
     """
 
@@ -136,14 +137,14 @@ class Slice:
     forbidden: Collection[str]
     kit: Collection[str]
     latest: bool
-    lowest: bool = False
+    last_definitions: bool = False
 
     def __post_init__(self):
         self.chosen: dict[int, set[int]] = {}  # positions of statements, by cell
         self.calls: dict[str, None] = {}  # other blanks, in the order in which they are met
         self.quiet: dict[str, None] = {}  # names of QUIET that no cell gives a value
         self.copies: tuple[int, ...] = ()
-        self.lower = False
+        self.meets_others_below = False
 
     def program(self) -> Program:
         """The slice as texts to run, or why the answer cannot be graded."""
@@ -224,13 +225,13 @@ class Slice:
         if self.latest and binding:
             return binding[-1]
         if above := [i for i in binding if i < asking]:
-            self.lower |= binding[-1] > asking
-            return binding[-1] if self.lowest else above[-1]
+            self.meets_others_below |= binding[-1] > asking
+            return binding[-1] if self.last_definitions else above[-1]
         if hasattr(builtins, wanted):
             return None
         if below := [i for i in binding if i > asking]:
-            self.lower |= len(below) > 1
-            return below[-1 if self.lowest else 0]
+            self.meets_others_below |= len(below) > 1
+            return below[-1 if self.last_definitions else 0]
         stars = [i for i, cell in enumerate(self.cells) if any(statement.star for statement in cell.statements)]
         return stars[-1] if stars else None
 

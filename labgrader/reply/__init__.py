@@ -1,6 +1,7 @@
 """What is wrong with an answer, and what is said of it; it knows no topic.
 
 judge       the verdict: from the outputs of all cases to words for a student
+listed      which listed mistake gives these outputs
 sentences   what is said, in order: the surest sentence that is true
 errors      what an exception means in this task
 messages    a case and a student's lines in words

@@ -18,6 +18,9 @@ class TimeIsUp(BaseException):
     """Raised in a program that runs too long; not an Exception, so that `except Exception` lets it pass."""
 
 
+ENDS = (Exception, SystemExit, KeyboardInterrupt, TimeIsUp)  # how a student's program may end
+
+
 class Alarm:
     """Watches the thread that made it. It rings again and again: a program may catch everything in an endless loop."""
 

@@ -1,7 +1,7 @@
 """The verdict on an answer: from the outputs of all cases, however they were computed, to words for its student.
 
     cases = expected_cases(question, seed)     keep them where no answer can see them
-    verdict(question, cases, outputs)          outputs by any way: a value that `plain` takes, or a Problem in its place
+    verdict(question, cases, outputs)          outputs by any way: values for `as_numpy`, or Problems in their place
 
 A student's answer runs in a worker (`labgrader.run.run`), and a Problem stands where no value came back. `judge`
 calls a function that is trusted in this process: that of a question's author.
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from labgrader.comparison import Case, Problem, compare, expected_cases, plain, quiet
+from labgrader.comparison import Case, Problem, as_numpy, compare, expected_cases, quiet
 from labgrader.program.live import altered, own_entry
 from labgrader.question import Question
 from labgrader.reply.finding import Finding
@@ -124,7 +124,7 @@ def judge(question: Question, answer: Callable, seed: int) -> Verdict:
 def outputs_of(answer: Callable, arguments: Sequence[tuple]) -> tuple[list, frozenset[int]]:
     """Call a trusted answer on copies of each tuple of arguments.
 
-    Returns for each what `plain` makes of its output, or a Problem with its exception; and the positions of the
+    Returns for each what `as_numpy` makes of its output, or a Problem with its exception; and the positions of the
     arguments that it altered.
     """
     outputs, changed = [], set()
@@ -136,10 +136,10 @@ def outputs_of(answer: Callable, arguments: Sequence[tuple]) -> tuple[list, froz
 
 
 def output_of(answer: Callable, args: tuple) -> object:
-    """`plain` of an output, or a Problem with the exception and the line of the answer that led to it."""
+    """`as_numpy` of an output, or a Problem with the exception and the line of the answer that led to it."""
     try:
         with quiet():
-            return plain(answer(*args))
+            return as_numpy(answer(*args))
     except Exception as error:
         code = getattr(answer, "__code__", None)
         entry, last = own_entry(error.__traceback__, () if code is None else (code.co_filename,))

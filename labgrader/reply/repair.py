@@ -22,10 +22,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labgrader.comparison import parts, quiet
+from labgrader.comparison import quiet
 from labgrader.program.live import LiveProgram, defines
-from labgrader.reply.alarm import TimeIsUp, alarm, limited
+from labgrader.reply.alarm import ENDS, TimeIsUp, alarm, limited
 from labgrader.reply.finding import REPAIRS, Finding
+from labgrader.reply.listed import Listed, fingerprint
 from labgrader.reply.mutation import Mutation, mutations
 
 RANK = {kind: number for number, kind in enumerate(REPAIRS)}
@@ -43,14 +44,10 @@ LEFT_OUT = (
 )  # what a mistake beside which is no mistake of its own
 
 Cases = Sequence[tuple[tuple, object]]  # (arguments, expected) each
-Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
 
 
 class SearchIsOver(Exception):
     """Raised when the time of the whole search is up."""
-
-
-ENDS = (Exception, SystemExit, KeyboardInterrupt, TimeIsUp)  # how a student's program may end
 
 
 @dataclass(frozen=True)
@@ -193,19 +190,6 @@ def rightness(search: Search, cases: Cases) -> float:
     """How many cases are right, those in part counted by their share of right numbers."""
     entries = [search.entries(expected, outcome(search, args)[0]) for args, expected in cases]
     return sum(float(right.mean()) for right in entries if right is not None and right.size)
-
-
-def fingerprint(output: object) -> bytes:
-    """The numbers of an output, rounded, and its shape; of outputs that differ by rounding most have the same.
-
-    >>> fingerprint([1, 0.1 + 0.2]) == fingerprint(np.array([1.0, 0.3]))
-    True
-    """
-    try:
-        arrays = [np.asarray(part).astype(float) for part in parts(output)]
-    except (TypeError, ValueError):
-        return b""
-    return b"".join(bytes(str(a.shape), "ascii") + (np.round(a, 7) + 0.0).tobytes() for a in arrays)
 
 
 @contextlib.contextmanager

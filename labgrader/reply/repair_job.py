@@ -9,18 +9,19 @@ from labgrader.comparison import (
     Case,
     Problem,
     as_expected,
+    as_numpy,
     canonical,
     compare,
     differences,
     parts,
-    plain,
     trusted,
 )
 from labgrader.question import PUBLIC_SEED, Question
 from labgrader.reply.finding import write
 from labgrader.reply.idle import idle
-from labgrader.reply.repair import Listed, repairs
-from labgrader.reply.watches import readings
+from labgrader.reply.listed import Listed
+from labgrader.reply.repair import repairs
+from labgrader.reply.watches import watch
 
 MOST_REPAIRS = 4  # that are told of
 FRESH = 50  # cases beside those that a check shows
@@ -29,10 +30,10 @@ COMPARING = ("name", "rtol", "atol", "same_dtype")  # the fields of a Question b
 Pairs = Sequence[tuple[tuple, object]]  # the arguments of cases, and what is expected
 
 
-class Job:
-    """A look at the program of the function `name`, where the question is not: a worker runs a student's lines.
+class Look:
+    """What a worker does to look at the program of the function `name`: `watch`, `repair`; the question is not there.
 
-    comparing, canonical: what `comparing_of` gives; pieces: the program; public, listed: as `repairs` takes them.
+    comparing, canonical: of `comparison_settings`; pieces: the program; public, listed: as `repairs` takes them.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class Job:
 
     def entries(self, expected: object, got: object) -> np.ndarray | None:
         """Which numbers of an output are right, None for one of another form."""
-        got = as_expected(expected, plain(got))
+        got = as_expected(expected, as_numpy(got))
         if isinstance(got, Problem) or [np.shape(p) for p in parts(got)] != [np.shape(p) for p in parts(expected)]:
             return None
         wrong = differences(self.question, *canonical(self.question, expected, got))
@@ -65,7 +66,7 @@ class Job:
 
     def watch(self) -> str:
         """What instruments show, as JSON."""
-        return write(readings(self.pieces, self.name, self.public, self.right))
+        return write(watch(self.pieces, self.name, self.public, self.right))
 
     def repair(self, fresh: Callable[[], Pairs]) -> str:
         """What repair finds, and what stands idle, as JSON; fresh: more cases, as `repairs` takes them."""
@@ -73,7 +74,7 @@ class Job:
         return write([*found[:MOST_REPAIRS], *idle(self.pieces, self.name)])
 
 
-def comparing_of(question: Question) -> tuple[dict, str]:
+def comparison_settings(question: Question) -> tuple[dict, str]:
     """What tells a right output from a wrong one, to be sent: fields, and the source of `Question.canonical`.
 
     That is a function complete in itself but for NumPy, as a reference is; a lambda is left out, so that outputs in

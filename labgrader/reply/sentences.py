@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labgrader.comparison import Case, Problem, alike, parts, trusted
-from labgrader.question import Misconception, Property, Question
+from labgrader.comparison import Case, Problem, alike, parts
+from labgrader.question import Property, Question
 from labgrader.reply.errors import explain
 from labgrader.reply.finding import IDLE, REPAIRS, WATCHES, Finding
+from labgrader.reply.listed import recognise
 from labgrader.reply.messages import Marked, marked, said
 from labgrader.reply.relations import View, related
-from labgrader.reply.repair import Listed, fingerprint
 
 ENDLESS = "A loop does not end, or has far too many turns: what changes in each turn, and when does it stop?"
 
@@ -108,46 +108,6 @@ def listed(question: Question, cases: Sequence[Case], outputs: Sequence[object])
     """The hint of the listed misconception that gives these outputs."""
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
-
-
-def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Misconception | None:
-    """Find the misconception that gives these outputs in every case that tells it from a right answer."""
-    if all(isinstance(got, Problem) for got in outputs):
-        return None
-    for misconception in question.misconceptions:
-        told, stray = [], False  # told: of each case that tells it from a right answer, whether there is an output
-        for case, got in zip(cases, outputs, strict=True):
-            own = output_of(misconception, case.args)
-            if alike(question, own, got):
-                if not alike(question, own, case.expected):
-                    told.append(not isinstance(got, Problem))
-            elif isinstance(got, Problem) and alike(question, own, case.expected):
-                stray = True
-            else:
-                break
-        else:
-            if any(told) or (told and not stray):  # exceptions here and there may be of any mistake
-                return misconception
-    return None
-
-
-def output_of(misconception: Misconception, args: tuple) -> object:
-    """What a misconception gives, or a Problem where it raises."""
-    try:
-        return trusted(misconception.answer, args)
-    except Exception as error:
-        return Problem("exception", type(error).__name__)
-
-
-def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
-    """What the listed mistakes of a question give in each case; those that raise give nothing."""
-    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
-    for number, mistake in enumerate(question.misconceptions):
-        for found, case in zip(told, cases, strict=True):
-            output = output_of(mistake, case.args)
-            if not isinstance(output, Problem):
-                found.setdefault(fingerprint(output), set()).add(number)
-    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
 
 
 # ----------------------------------------------------------------------------------- the student's own program

@@ -13,24 +13,21 @@ import numpy as np
 
 from labgrader.comparison import quiet
 from labgrader.program.live import LiveProgram, altered, copied, own_entry
-from labgrader.reply.alarm import limited
+from labgrader.reply.alarm import ENDS, limited
 from labgrader.reply.finding import Finding, Span
-from labgrader.reply.repair import ENDS
 
 MOST_S = 2.0  # CPU seconds of all watches together
 
 
-def readings(
-    pieces: Sequence[tuple[str, str]], name: str, cases: Sequence[tuple[tuple, object]], right
-) -> list[Finding]:
+def watch(pieces: Sequence[tuple[str, str]], name: str, cases: Sequence[tuple[tuple, object]], right) -> list[Finding]:
     """What the watches show of a wrong answer, the surest first; arguments are those of `repair.repairs`."""
     found = []
     with contextlib.suppress(*ENDS), limited(MOST_S), quiet():
         program = LiveProgram(name, pieces)
         outputs = [outcome(program, args) for args, _ in cases]
         wrong = [(a, e, out) for (a, e), out in zip(cases, outputs, strict=True) if not right(e, out)]
-        for watch, tried in ((floating_point, wrong), (written_argument, cases)):
-            if reading := watch(program, tried):
+        for look, tried in ((floating_point, wrong), (written_argument, cases)):
+            if reading := look(program, tried):
                 found.append(reading)
     return found
 

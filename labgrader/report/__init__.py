@@ -11,5 +11,4 @@ texts_server  that page in a browser of this machine
 second_look   one answer with all its cases and replies, by the key on a student's page
 platforms     tables and zips that Moodle and Canvas take back
 gradescope    an autograder for Gradescope, and what runs in its container
-overview      the class: who tried and passed, which mistakes, comments for all of them
 """

@@ -91,7 +91,7 @@ def marked(hands: Sequence[Hand], group: Group) -> str:
     return f'<div>{head}<pre tabindex="0" aria-label="{whose}">' + "\n".join(lines) + "</pre></div>"
 
 
-def told(found: Found, path: Path) -> Sequence[str]:
+def terminal_lines(found: Found, path: Path) -> Sequence[str]:
     """What the terminal says of answers that are alike: a line per group of people, and the page."""
     people = by_people(found.groups)
     if not people and not found.unread:

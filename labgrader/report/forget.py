@@ -20,12 +20,12 @@ from nbgrader.api import MissingEntry
 
 from labgrader.course import course as course_here
 from labgrader.grade.gradebook import opened
+from labgrader.grade.overview import COMMENTS_FILE, read_comments
 from labgrader.grade.settings import FILE as SETTINGS
 from labgrader.grade.settings import read_blocks
 from labgrader.handin.collect import student_and_notebook
 from labgrader.handin.roster import FILE as ROSTER
-from labgrader.handin.roster import keys_of, person_of, plain, read_roster
-from labgrader.report.overview import COMMENTS_FILE, read_comments
+from labgrader.handin.roster import in_one_line, keys_of, person_of, read_roster
 from labgrader.support import PRIVATE, counted, git, write_atomically
 
 EXTENSION = re.compile(r"(?ms)^[ \t]*\[\[[ \t]*extension[ \t]*\]\].*?(?=^[ \t]*\[|\Z)")
@@ -176,7 +176,7 @@ def from_roster(course: Path, ids: set[str]) -> list[str]:
     first = re.split(r"[\r\n]", text, maxsplit=1)[0]
     delimiter = max(",;\t", key=first.count)
     rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True))
-    kept = [row for row in rows if not ids & {plain(cell).removeprefix("Participant ") for cell in row}]
+    kept = [row for row in rows if not ids & {in_one_line(cell).removeprefix("Participant ") for cell in row}]
     written = io.StringIO(newline="")
     csv.writer(written, delimiter=delimiter, lineterminator="\n").writerows(kept)
     write_atomically(path, written.getvalue().encode())

@@ -20,13 +20,13 @@ from labgrader.course import files_of
 from labgrader.grade.batch import SECRET_FILE, Batch, grade_batch
 from labgrader.grade.changes import CHANGES, changed, read_changes
 from labgrader.grade.deadlines import Lateness, read_deadline
+from labgrader.grade.overview import COMMENTS_FILE, read_comments
 from labgrader.grade.policy import read_policy
 from labgrader.grade.settings import FILE
 from labgrader.grade.totals import OFF
 from labgrader.handin.reading import read_lab, read_submission
 from labgrader.handin.several import read_picks
 from labgrader.report.outputs import gradescope
-from labgrader.report.overview import COMMENTS_FILE, read_comments
 from labgrader.sandbox.sandbox import Limits
 from labgrader.support import write_atomically
 

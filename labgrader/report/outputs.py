@@ -15,8 +15,8 @@ from pathlib import Path
 
 from labgrader.grade.batch import ATTEMPT, Record
 from labgrader.grade.grade import Result
+from labgrader.grade.overview import COUNTED, Group, Standing, lines_of, standings
 from labgrader.handin.reading import Lab
-from labgrader.report.overview import COUNTED, Group, Standing, group_of, standings
 from labgrader.sandbox.sandbox import NO_SANDBOX
 from labgrader.support import counted, write_atomically
 
@@ -123,15 +123,6 @@ def gradescope(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     return json.dumps(content, indent=1) + "\n"
 
 
-def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
-    """What a student is told about a question."""
-    said = result.says[:1].upper() + result.says[1:] + "."
-    hint = [f"Hint: {result.hint}"] if result.hint else []
-    comment = comments.get(group_of(result), "")
-    note = [f"{result.note[:1].upper()}{result.note[1:]}."] if result.note else []
-    return [said, *note, *result.shown.splitlines(), *hint, *([f"Comment: {comment}"] if comment else [])]
-
-
 def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     """A student's page."""
     title = escape(f"{lab.topic}: {record.student}")
@@ -143,14 +134,16 @@ def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
         parts.append(f'<p class="warning">This submission could not be graded: {escape(record.reason)}.</p>')
     for result in record.results:
         told = "".join(f"<p>{escape(line)}</p>" for line in lines_of(result, comments))
-        told += f'<p class="key">Key for a second look: <code>{key_of(record.student, lab, result.question)}</code></p>'
+        told += (
+            f'<p class="key">Key for a second look: <code>{answer_key(record.student, lab, result.question)}</code></p>'
+        )
         mark, kind = ("✔", "right") if result.right else ("✘", "wrong")
         points = f'<span class="points">{result.points:g} of {result.max_points:g} points</span>'
         parts.append(f'<section class="{kind}"><h2>{points}{mark} {escape(result.question)}</h2>{told}</section>')
     return page(title, parts)
 
 
-def key_of(student: str, lab: Lab, question: str) -> str:
+def answer_key(student: str, lab: Lab, question: str) -> str:
     """What names one answer of one student, without the student's name: "iou-3f09c2ab"."""
     return f"{question}-{hashlib.sha256(repr((student, lab.topic, question)).encode()).hexdigest()[:8]}"
 
@@ -168,7 +161,7 @@ def class_csv(found: Sequence[Standing], records: Sequence[Record]) -> str:
     """One row per question, and one per group of wrong answers."""
     text, table = new_table(records, CLASS_COLUMNS)
     for standing in found:
-        counts = (standing.tried, standing.passed, worded(standing.discrimination), *standing.counts.values())
+        counts = (standing.tried, standing.passed, two_decimals(standing.discrimination), *standing.counts.values())
         table.writerow((standing.question, "", "", *counts, "", ""))
         for group in standing.groups:
             count, named = str(len(group.students)), "yes" if group.named else "no"
@@ -184,7 +177,7 @@ def class_page(lab: Lab, found: Sequence[Standing], comments: Mapping[str, str],
     parts.append("<table><tr>" + "".join(f'<th scope="col">{head}</th>' for head in heads) + "</tr>")
     for s in found:
         link = f'<a href="#{escape(s.question)}">{escape(s.question)}</a>'
-        cells = (s.tried, s.passed, worded(s.discrimination), *s.counts.values(), len(s.groups))
+        cells = (s.tried, s.passed, two_decimals(s.discrimination), *s.counts.values(), len(s.groups))
         parts.append(f'<tr><th scope="row">{link}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
     parts += ["</table>", f"<p>{DISCRIMINATION}</p>", histogram(lab, records), attempted(records)]
     for standing in found:
@@ -194,7 +187,7 @@ def class_page(lab: Lab, found: Sequence[Standing], comments: Mapping[str, str],
     return page(escape(f"{lab.topic}: the class"), parts)
 
 
-def worded(correlation: float | None) -> str:
+def two_decimals(correlation: float | None) -> str:
     """A correlation as tables have it, "-" for none."""
     return "-" if correlation is None else f"{correlation:.2f}"
 

@@ -17,12 +17,12 @@ from labgrader.grade.changes import changed, read_changes
 from labgrader.grade.diagnose_outputs import diagnosers
 from labgrader.grade.grade import Grading, Result
 from labgrader.grade.gradebook import opened
+from labgrader.grade.overview import NOT_RUN
 from labgrader.handin.reading import Lab, read_lab, read_submissions
 from labgrader.handin.several import read_picks
 from labgrader.question import Question
 from labgrader.reply.messages import call, shown_case, written
-from labgrader.report.outputs import key_of
-from labgrader.report.overview import NOT_RUN
+from labgrader.report.outputs import answer_key
 from labgrader.run.channel import Changed
 from labgrader.run.run import public_cases
 from labgrader.sandbox import sandbox
@@ -39,7 +39,7 @@ def second_look(
     lab, out = read_lab(course, topic), course / "grades" / topic if out is None else Path(out)
     folder = course / "submitted" if submissions is None else Path(submissions)
     read = read_submissions(folder, lab, read_picks(course, topic))
-    found = [(one, name) for one in read for name in lab.answers if key_of(one.student, lab, name) == key]
+    found = [(one, name) for one in read for name in lab.answers if answer_key(one.student, lab, name) == key]
     if not found:
         raise ValueError(f"look: expected the key of an answer on a page in {out / 'feedback'}, got {key!a}")
     submission, name = found[0]
@@ -53,7 +53,7 @@ def second_look(
     with closing(sandbox.servers), closing(diagnosers):
         grading = Grading(lab, submission, unsafe=unsafe)
         replies = grading.replies(name, (out / SECRET_FILE).read_text().strip())
-    lines += [line for i, (case, got) in enumerate(replies) for line in told(of_topic(topic)[name], i, case, got)]
+    lines += [line for i, (case, got) in enumerate(replies) for line in case_lines(of_topic(topic)[name], i, case, got)]
     return ["".join(c if c.isprintable() else ascii(c)[1:-1] for c in line) for line in lines]
 
 
@@ -77,7 +77,7 @@ def about(result: Result) -> Iterator[str]:
         yield f"{number:4}  {line.expandtabs(4)}"
 
 
-def told(question: Question, i: int, case: Case, got: object) -> Iterator[str]:
+def case_lines(question: Question, i: int, case: Case, got: object) -> Iterator[str]:
     """A case, and the reply to it; i: its position among all."""
     public = len(public_cases(question))
     where = f"public case {i + 1}" if i < public else f"secret case {i + 1 - public}"

@@ -15,7 +15,7 @@ from labgrader.grade.gradebook import opened, rubrics_of
 from labgrader.handin.pictures import Pictures
 from labgrader.handin.reading import Lab, plain_text, source_of
 from labgrader.program.notebook import grade_id
-from labgrader.report.outputs import STYLE, key_of
+from labgrader.report.outputs import STYLE, answer_key
 from labgrader.report.rendered import rendered
 from labgrader.support import counted
 
@@ -73,7 +73,7 @@ def read_texts(course: Path, lab: Lab) -> dict[str, Texts]:
                 is_empty = comment.auto_comment == "No response." and grade.manual_score is None
                 if not is_empty and (found_there := words_of(course, lab, student, question)) is not None:
                     (words, pictures), said = found_there, comment.manual_comment or ""
-                    key = key_of(student, lab, question)
+                    key = answer_key(student, lab, question)
                     texts.append(Text(key, student, words, grade.manual_score, said, pictures))
             texts.sort(key=lambda text: text.key[-8:])
             most = next((grade.max_score for _, grade in grades), 0.0)

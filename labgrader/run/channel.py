@@ -213,7 +213,7 @@ def decode(reply: bytes, text: bool = False, own: bool = False) -> object:
         return Problem("exception", f"it raises {exception_text(rest[5:], own)}", ((line, str(piece)),))
     if letter == b"P":
         kind, _, says = printable(rest[:300]).partition("\0")
-        return worded(kind, says, own)
+        return trusted_problem(kind, says, own)
     if letter == b"M":
         word = rest.decode("ascii", "replace")
         named = word if re.fullmatch(r"[A-Za-z_][\w.]{0,59}", word, re.ASCII) else "that"
@@ -228,7 +228,7 @@ def printable(data: bytes) -> str:
     return "".join(c if c.isprintable() or c == "\0" else " " for c in data.decode("utf-8", "replace"))
 
 
-def worded(kind: str, says: str, own: bool) -> Problem:
+def trusted_problem(kind: str, says: str, own: bool) -> Problem:
     """What is wrong with an output, in the worker's words if they are one's own or all of them are known."""
     if kind not in KNOWN:
         raise ValueError("reply: no such kind")

@@ -30,12 +30,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from labgrader.comparison import MOST_BYTES, Listed, Problem, parts, plain, quiet
+from labgrader.comparison import MOST_BYTES, Listed, Problem, as_numpy, parts, quiet
 from labgrader.program.cell import Cell
 from labgrader.program.fingerprint import fingerprints
 from labgrader.program.live import LiveProgram, altered, own_entry
 from labgrader.program.slice import program
-from labgrader.reply.repair_job import Job
+from labgrader.reply.repair_job import Look
 
 DTYPES = ("?", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
 MOST_PARTS = 16
@@ -61,9 +61,9 @@ def encode(value: object) -> bytes:
     >>> encode(True)
     b'V\\xff\\x00\\x00\\x01'
     """
-    value = plain(value)
+    value = as_numpy(value)
     if isinstance(value, Problem):
-        return worded(value)
+        return problem_reply(value)
     head = bytes([ord("V"), len(value) if isinstance(value, tuple) else ONE])
     arrays = [as_sent(part) for part in parts(value)]
     for part, array in zip(parts(value), arrays, strict=True):
@@ -71,11 +71,13 @@ def encode(value: object) -> bytes:
         for n in array.shape:
             length *= max(n, 1)
         if array.ndim > MOST_AXES or length > MOST_BYTES:
-            return worded(Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"))
+            return problem_reply(Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"))
         code = DTYPES.index(array.dtype.str[1:].replace("b1", "?")) + LISTED * isinstance(part, Listed)
         head += struct.pack(f"<BB{array.ndim}q", code, array.ndim, *array.shape)
     reply = head + b"".join(array.tobytes() for array in arrays)
-    return reply if len(reply) <= MOST_BYTES else worded(Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"))
+    if len(reply) > MOST_BYTES:
+        return problem_reply(Problem("size", f"it returns more than {MOST_BYTES >> 20} MB"))
+    return reply
 
 
 def as_sent(value: object) -> np.ndarray:
@@ -86,7 +88,7 @@ def as_sent(value: object) -> np.ndarray:
     return array.astype(array.dtype.newbyteorder("<"))
 
 
-def worded(problem: Problem) -> bytes:
+def problem_reply(problem: Problem) -> bytes:
     """A reply that says what is wrong with an output."""
     return b"P" + f"{problem.kind}\0{problem.says}".encode()
 
@@ -136,7 +138,7 @@ class Session:
         function = self.program.namespace.get(name)
         if not callable(function):
             what = "defines no function of this name" if function is None else f"makes it a {type(function).__name__}"
-            return worded(Problem("missing", f"its cell {what}{', not a function' * (function is not None)}"))
+            return problem_reply(Problem("missing", f"its cell {what}{', not a function' * (function is not None)}"))
         given = pickle.loads(content)
         with quiet():
             reply = encode(function(*given))
@@ -144,12 +146,12 @@ class Session:
         return b"C" + bytes([len(changed), *changed]) + reply if changed and reply[:1] == b"V" else reply
 
     def watch(self, *job: object) -> bytes:
-        """Look at a program with instruments: arguments are those of `repair_job.Job`."""
-        return b"J" + Job(*job).watch().encode()
+        """Look at a program with instruments: arguments are those of `repair_job.Look`."""
+        return b"J" + Look(*job).watch().encode()
 
     def repair(self, *job: object) -> bytes:
         """Look for the place of a program's mistake."""
-        return b"J" + Job(*job).repair(self.more).encode()
+        return b"J" + Look(*job).repair(self.more).encode()
 
 
 def message_of(error: BaseException) -> str:

@@ -17,40 +17,18 @@ from labgrader.program.slice import Program
 from labgrader.question import PUBLIC_SEED, Question
 from labgrader.reply.finding import MOST_FINDINGS, Finding, read
 from labgrader.reply.judge import Verdict, verdict
-from labgrader.reply.repair import Listed
-from labgrader.reply.repair_job import comparing_of, fresh_cases, pairs
-from labgrader.reply.sentences import listed_in
+from labgrader.reply.listed import Listed, listed_in
+from labgrader.reply.repair_job import comparison_settings, fresh_cases, pairs
 from labgrader.reply.watches import MOST_S as WATCH_S
 from labgrader.run.channel import MOST_FOUND, Changed, Worker, WorkerLost
+from labgrader.run.limits import Limits
 from labgrader.run.process import MORE
 from labgrader.run.stopwatch import Stopwatch
 
 LOOK_S = 5.0  # for a look: its own limits come before, but where a compiled function does not come back
 # References are called with Python's warnings off, which no thread has for itself; and Python 3.11's parser fails when
 # two threads use it at a time.
-drawing = threading.Lock()
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What one answer may use. Seconds are of CPU time (`stopwatch`), but for start_s, of the clock; MB of memory are
-    address space, with torch or without it.
-
-    case_s: for one call; question_s: for all cases of a question; submission_s: for all answers of a notebook in one
-    run, but least_s is left for each. container: whether this machine is a container that
-    is made for one submission; then there is no bubblewrap, and answers only become another user.
-    """
-
-    start_s: float = 120.0
-    case_s: float = 10.0
-    question_s: float = 20.0
-    submission_s: float = 60.0
-    least_s: float = 1.0
-    memory_mb: int = 1024
-    torch_memory_mb: int = 3072
-    file_mb: int = 16
-    threads: int = 32
-    container: bool = False
+reference_lock = threading.Lock()
 
 
 Start = Callable[[Sequence[str], Limits], AbstractContextManager[Worker]]  # a fresh worker with some packages
@@ -59,21 +37,21 @@ Start = Callable[[Sequence[str], Limits], AbstractContextManager[Worker]]  # a f
 @functools.cache
 def public_cases(question: Question) -> tuple[Case, ...]:
     """The cases that a check uses; computed once in a process."""
-    with drawing:
+    with reference_lock:
         return tuple(expected_cases(question, PUBLIC_SEED))
 
 
 @functools.cache
 def more_public_cases(question: Question) -> tuple[Case, ...]:
     """Cases of other public seeds, on which a repair is tried; computed once in a process."""
-    with drawing:
+    with reference_lock:
         return tuple(fresh_cases(question))
 
 
 @functools.cache
 def listed_mistakes(question: Question) -> list[Listed]:
     """What the listed mistakes give in the public cases; computed once in a process."""
-    with drawing:
+    with reference_lock:
         return listed_in(question, public_cases(question))
 
 
@@ -91,7 +69,7 @@ class Budget:
         return min(self.limits.question_s, left)
 
 
-class Answer:
+class Run:
     """An answer to a question as a program, in a worker that has run nothing before; a context manager.
 
     budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took,
@@ -107,7 +85,7 @@ class Answer:
         self.used_s = self.called_s = 0.0
         self.starting = start(packages_of(question, program), limits)
 
-    def __enter__(self) -> "Answer":
+    def __enter__(self) -> "Run":
         self.worker = self.starting.__enter__()
         try:
             self.not_run = self.run_pieces()
@@ -162,7 +140,7 @@ class Answer:
         self.called_s = self.used_s - before
         return outputs
 
-    def judged(self, cases: Sequence[Case]) -> tuple[Verdict, list[object]]:
+    def judge(self, cases: Sequence[Case]) -> tuple[Verdict, list[object]]:
         """The verdict on some cases, with the outputs; outputs that cannot even be compared are wrong."""
         outputs = self.outputs(cases)
         worded = [self.with_line(output) for output in outputs]
@@ -171,8 +149,8 @@ class Answer:
         if isinstance(worded[0], Problem) and worded[0].kind == "missing":
             return Verdict(worded[0], None, "", outputs=worded), outputs
         try:
-            judged = verdict_on(self.question, cases, worded)
-            return replace(judged, pieces=self.program.pieces), outputs
+            verdict = verdict_on(self.question, cases, worded)
+            return replace(verdict, pieces=self.program.pieces), outputs
         except Exception as error:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
             return Verdict(problem, 0, "some case", outputs=worded), outputs
@@ -180,7 +158,13 @@ class Answer:
     def findings(self) -> list[Finding]:
         """What instruments and repair find in the program; they get public cases and nothing else."""
         question, pieces = self.question, self.program.pieces
-        job = (*comparing_of(question), self.name, pieces, pairs(public_cases(question)), listed_mistakes(question))
+        job = (
+            *comparison_settings(question),
+            self.name,
+            pieces,
+            pairs(public_cases(question)),
+            listed_mistakes(question),
+        )
         found: list[Finding] = []
         with suppress(WorkerLost):
             looks = ("watch", "repair") if self.called_s <= WATCH_S else ("repair",)  # a watch calls it on all cases
@@ -211,7 +195,7 @@ def packages_of(question: Question, program: Program) -> tuple[str, ...]:
 
 
 def verdict_on(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Verdict:
-    """The verdict on what `Answer.outputs` gives."""
+    """The verdict on what `Run.outputs` gives."""
     changed = frozenset(k for output in outputs if isinstance(output, Changed) for k in output.positions)
     values = [output.value if isinstance(output, Changed) else output for output in outputs]
     return verdict(question, cases, values, changed)

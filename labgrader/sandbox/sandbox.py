@@ -23,15 +23,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from labgrader.run import plain
+from labgrader.run import subprocess_worker
 from labgrader.run.channel import Worker, WorkerLost
-from labgrader.run.plain import ROOT, START, limits_of, package_files, site_folders
-from labgrader.run.run import Limits
+from labgrader.run.limits import Limits
+from labgrader.run.subprocess_worker import ROOT, START, limits_of, package_files, site_folders
 from labgrader.sandbox import bwrap, seccomp
 
 START_SERVER = START + "from labgrader.sandbox.fork_server import main; main(options)"
 SITE, KIT = "/packages", "/kit"  # where a worker finds packages, and its own files
-ENVIRONMENT = plain.ENVIRONMENT | {"HOME": "/tmp", "TMPDIR": "/tmp"}
+ENVIRONMENT = subprocess_worker.ENVIRONMENT | {"HOME": "/tmp", "TMPDIR": "/tmp"}
 LOADERS = ("/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1")
 PAUSES_S = (0.2, 1.0, 5.0)  # before a worker that did not start is started again
 FIRST_UID, UIDS, UIDS_OF_ONE = 61184, 4000, 50  # of systemd's range for short-lived users: never a person's
@@ -42,7 +42,7 @@ FAREWELL_S = 10.0  # for the server to kill a child
 MODULES = ["labgrader/__init__.py", "labgrader/question.py", "labgrader/comparison.py"]
 for room, names in {
     "program": "cell effects fingerprint live slice",
-    "reply": "alarm finding idle mutation recipes repair repair_job syntax watches",
+    "reply": "alarm finding idle listed mutation recipes repair repair_job syntax watches",
     "run": "process",
     "sandbox": "fork_server",
 }.items():
@@ -188,7 +188,7 @@ def fresh_worker(packages: Sequence[str], limits: Limits, unsafe: bool = False) 
     Raises ValueError if no sandbox can be made here, or if the packages do not load in it.
     """
     if unsafe:
-        with plain.fresh_worker(packages, limits) as started:
+        with subprocess_worker.fresh_worker(packages, limits) as started:
             yield started
         return
     server, started = greeted(packages, limits)

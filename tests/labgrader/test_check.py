@@ -183,9 +183,9 @@ def test_a_cell_that_python_cannot_read_is_said_and_not_taken_for_the_kits_funct
 
 def test_an_ipython_that_tells_no_cell_ids_is_no_hindrance(monkeypatch):
     """IPython 7, which Colab has."""
-    before = dict(checking.ran)
+    before = dict(checking.cell_of_execution)
     checking.note_cell(SimpleNamespace(store_history=True))
-    assert checking.ran == before
+    assert checking.cell_of_execution == before
 
 
 def test_an_unknown_question_is_said_and_the_answer_goes_on(capsys):

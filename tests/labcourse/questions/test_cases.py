@@ -20,8 +20,8 @@ from labgrader.grade.grade import secret_cases
 from labgrader.program.live import LiveProgram
 from labgrader.program.slice import Program
 from labgrader.reply.judge import judge, output_of
-from labgrader.run import plain
-from labgrader.run.run import Answer, Limits, public_cases
+from labgrader.run import subprocess_worker
+from labgrader.run.run import Limits, Run, public_cases
 
 pytestmark = pytest.mark.bad_input  # as outside the suite
 DATA = Path(__file__).parents[2] / "data"
@@ -76,8 +76,8 @@ def cross_entropy_grad(z, y, s):
 def test_what_the_lab_could_not_run_with_is_not_done_in_time(name, source):
     """Right on each small case; the one of the lab's size takes longer than a case may."""
     question = find(name)
-    with Answer(question, Program(pieces(name, source)), plain.fresh_worker, Limits(case_s=2.0)) as run:
-        verdict, _ = run.judged(expected_cases(question, 0))
+    with Run(question, Program(pieces(name, source)), subprocess_worker.fresh_worker, Limits(case_s=2.0)) as run:
+        verdict, _ = run.judge(expected_cases(question, 0))
     assert verdict.problem.kind == "time" and len(expected_cases(question, 0)[verdict.case].args[0]) > 100
 
 

@@ -30,7 +30,7 @@ from labgrader.grade.grade import secret_cases
 from labgrader.grade_course import grade_course
 from labgrader.handin import reading
 from labgrader.program.slice import Program
-from labgrader.run.run import Answer, packages_of, public_cases
+from labgrader.run.run import Run, packages_of, public_cases
 from labgrader.sandbox import bwrap
 
 TOPIC = "04_iou"
@@ -161,13 +161,13 @@ def test_each_notebook_has_secret_cases_of_its_own_and_each_round_others():
 def test_everybody_has_run_in_public_before_anybody_runs_in_secret(course, monkeypatch):
     """So nothing of a secret case can be in what a student reads, whatever an answer leaves on the machine."""
     order = []
-    judge = Answer.judged
+    judge = Run.judge
 
     def noted(self, cases):
         order.append("public" if cases is public_cases(self.question) else "secret")
         return judge(self, cases)
 
-    monkeypatch.setattr(Answer, "judged", noted)
+    monkeypatch.setattr(Run, "judge", noted)
     grade(course, workers=2)
     public = 3 * len(POINTS)
     assert (

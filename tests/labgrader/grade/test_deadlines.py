@@ -4,7 +4,7 @@ import datetime
 
 import pytest
 
-from labgrader.grade.deadlines import Lateness, read_deadline, strangers
+from labgrader.grade.deadlines import Lateness, read_deadline, unknown_extensions
 from labgrader.grade.totals import handed_in_late
 from labgrader.handin.roster import person_of, read_roster
 
@@ -46,7 +46,7 @@ def test_an_extension_moves_one_students_deadline_or_says_how_late_they_are(tmp_
     assert found.lateness("lovelaceada_1234", noon).days == 1 and found.lateness("ada", noon).days == 3
     late_days = EXTENSION.replace("due = 2026-10-07T22:00:00Z", "late_days = 0")
     assert deadline(tmp_path, DEADLINE + late_days).lateness("lovelaceada_1234", noon).days == 0
-    assert strangers(found, ["lovelaceada_1234"]) == [] and strangers(found, ["ada"]) == ["1234"]
+    assert unknown_extensions(found, ["lovelaceada_1234"]) == [] and unknown_extensions(found, ["ada"]) == ["1234"]
 
 
 def test_a_mark_without_a_time_counts_as_one_day_and_says_so(tmp_path):

@@ -53,7 +53,7 @@ def test_an_answer_without_a_hint_is_flagged_and_the_others_are_graded(tmp_path,
     kit.submit(tmp_path, "ada", TOPIC, right)
     kit.submit(tmp_path, "ben", TOPIC, right | {"iou": "def iou(n):\n    return n.sum() / np.ones(len(n))\n"})
     monkeypatch.setattr(grading.diagnosers, "ask", lambda *asked: Diagnosis(needs_a_look=True))
-    monkeypatch.setattr(grading.Answer, "findings", broken)
+    monkeypatch.setattr(grading.Run, "findings", broken)
     ada, ben = grade_course(TOPIC, tmp_path, seed="secret", progress=False).records
     assert not ada.needs_a_look and ben.needs_a_look
     (result,) = [result for result in ben.results if not result.right]

@@ -13,8 +13,8 @@ from labgrader.grade.grade import Result
 from labgrader.grade_course import grade_course
 from labgrader.program.cell import cells_of
 from labgrader.program.slice import program
-from labgrader.run import plain
-from labgrader.run.run import Answer, Limits, public_cases
+from labgrader.run import subprocess_worker
+from labgrader.run.run import Limits, Run, public_cases
 
 HONEST = in_other_labs()
 TOPICS = sorted({submission.name.partition(".")[0] for submission in HONEST})
@@ -99,8 +99,8 @@ def is_ticked(one: Honest, topic: str) -> bool:
         live = program(ran, *asked, latest=True)
         if live.refused or live.pieces == saved.pieces:
             continue
-        with Answer(question, live, plain.fresh_worker, Limits()) as answer:
-            if answer.judged(public_cases(question))[0].passed:
+        with Run(question, live, subprocess_worker.fresh_worker, Limits()) as answer:
+            if answer.judge(public_cases(question))[0].passed:
                 return True
     return False
 

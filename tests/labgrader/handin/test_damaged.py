@@ -10,9 +10,9 @@ import pytest
 
 from labgrader.grade.batch import Record, secret_for, write_record
 from labgrader.grade.gradebook import fault_of_file, opened
+from labgrader.grade.overview import read_comments
 from labgrader.grade_course import grade_course
 from labgrader.handin.reading import read_lab, read_submissions
-from labgrader.report.overview import read_comments
 
 TOPIC = "04_iou"
 

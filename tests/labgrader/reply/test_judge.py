@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from labgrader.comparison import Problem, compare, expected_cases, plain
+from labgrader.comparison import Problem, as_numpy, compare, expected_cases
 from labgrader.question import Misconception, Property, Question, wrong
 from labgrader.reply.judge import judge, outputs_of, verdict
 from labgrader.reply.sentences import Sentence, recognise
@@ -302,7 +302,7 @@ def test_an_output_is_taken_when_it_is_returned():
 
 def test_plain_copies():
     array = np.ones(3)
-    kept = plain(array)
+    kept = as_numpy(array)
     array[0] = 5
     assert kept.tolist() == [1, 1, 1]
 

@@ -20,10 +20,10 @@ from labgrader.reply import repair as search
 from labgrader.reply.finding import IDLE, MOST_FINDINGS, WATCHES, Finding, read
 from labgrader.reply.judge import judge
 from labgrader.reply.mutation import mutations
-from labgrader.reply.repair_job import Job, comparing_of, pairs
+from labgrader.reply.repair_job import Look, comparison_settings, pairs
 from labgrader.reply.sentences import sentences
-from labgrader.run import plain
-from labgrader.run.run import Answer, Limits, more_public_cases, public_cases
+from labgrader.run import subprocess_worker
+from labgrader.run.run import Limits, Run, more_public_cases, public_cases
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 ANSWERS, REFUSED = (
@@ -72,7 +72,7 @@ def some(answers: list) -> list:
 
 def looked_at(question, pieces, repair: bool = True) -> list[Finding]:
     """What a worker finds in a program, found in this process."""
-    job = Job(*comparing_of(question), question.function, pieces, pairs(public_cases(question)))
+    job = Look(*comparison_settings(question), question.function, pieces, pairs(public_cases(question)))
     found = read(job.watch(), pieces)
     if repair:
         found += read(job.repair(lambda: pairs(more_public_cases(question))), pieces)
@@ -106,7 +106,7 @@ def test_values_that_another_type_would_mend_are_not_called_right(answer):
 @pytest.mark.parametrize("answer", [a for a in ANSWERS if a["marked"]][::15], ids=lambda a: a["thought"])
 def test_a_worker_finds_the_same(answer):
     question, pieces = find(answer["question"]), pieces_of(answer)
-    with Answer(question, Program(pieces), plain.fresh_worker, Limits()) as run:
+    with Run(question, Program(pieces), subprocess_worker.fresh_worker, Limits()) as run:
         assert run.findings() == looked_at(question, pieces)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labgrader.reply.watches import readings
+from labgrader.reply.watches import watch
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 
@@ -53,7 +53,7 @@ SILENT = [
 def watched(reference, arguments, source):
     """Kinds and marked texts of what the watches find."""
     pieces = ("quiet", "import numpy as np"), ("shares, the kit's", "def shares(n): return n"), ("f", source)
-    found = readings(pieces, "f", [((a,), reference(a)) for a in arguments], right)
+    found = watch(pieces, "f", [((a,), reference(a)) for a in arguments], right)
     texts = [source.split("\n")[span.line - 1][span.column : span.end] for f in found for span in f.spans]
     return list(zip([f.kind for f in found], texts, strict=True)), found
 

@@ -20,7 +20,7 @@ from labgrader.program.effects import without_idle
 from labgrader.program.fingerprint import fingerprints
 from labgrader.report import alike
 from labgrader.report.alike import Found, old_records
-from labgrader.report.alike_page import MOST_NAMED, alike_page, told, write_alike
+from labgrader.report.alike_page import MOST_NAMED, alike_page, terminal_lines, write_alike
 
 LABS = ("04_iou", "07_grasp", "09_other_stacks")
 
@@ -274,8 +274,8 @@ def test_the_page_shows_both_marks_what_they_share_and_lets_nothing_run(labs, tm
     marked = re.findall("<mark>(.*?)</mark>", page)
     assert any("union = " in line for line in marked) and not any(line.startswith("def iou") for line in marked)
     assert (tmp_path / "alike.csv").read_text().splitlines()[1].startswith("iou,ada,'=ben,1.00,")
-    assert "None." in alike_page(lab, [], Found()) and told(Found(), Path("x")) == []
-    assert told(found, Path("alike.html"))[0].startswith("1 group of answers is alike")
+    assert "None." in alike_page(lab, [], Found()) and terminal_lines(Found(), Path("x")) == []
+    assert terminal_lines(found, Path("alike.html"))[0].startswith("1 group of answers is alike")
 
 
 def test_twenty_with_one_answer_are_one_group_of_the_page_and_others_are_others(labs):
@@ -289,10 +289,10 @@ def test_twenty_with_one_answer_are_one_group_of_the_page_and_others_are_others(
     sizes = re.findall(r"<h2>(\d+) answers: ", page)
     assert sizes == ["20"] and page.count("<section") <= 2
     assert page.count("<pre tabindex") <= 2 + 20 + 2, "the two texts of iou stand there once each"
-    lines = told(found, Path("x"))
+    lines = terminal_lines(found, Path("x"))
     assert "20 answers: s0, s1, s10, s11, ..." in lines[1] and len(lines) <= 3
     many = [pair(f"a{i}", f"b{i}") for i in range(MOST_NAMED + 3)]
-    assert len(told(Found(tuple(many)), Path("x"))) == MOST_NAMED + 2
+    assert len(terminal_lines(Found(tuple(many)), Path("x"))) == MOST_NAMED + 2
 
 
 def pair(one: str, other: str) -> alike.Pair:

@@ -6,7 +6,7 @@ import pytest
 from labgrader.course import find
 from labgrader.grade.grade import explained
 from labgrader.program.slice import Program
-from labgrader.run.run import Answer, Limits, public_cases
+from labgrader.run.run import Limits, Run, public_cases
 from labgrader.sandbox.sandbox import fresh_worker
 
 WRONG_AXIS = """import numpy as np
@@ -28,14 +28,14 @@ def iou(n):
 LEAVES = "import os\n\ndef iou(n):\n    os._exit(0)\n"
 
 
-def run_of(source: str) -> Answer:
+def run_of(source: str) -> Run:
     limits = Limits(question_s=1.0 if "while" in source else 200.0)
-    return Answer(find("04_iou.iou"), Program((("iou", source),)), fresh_worker, limits)
+    return Run(find("04_iou.iou"), Program((("iou", source),)), fresh_worker, limits)
 
 
 def test_the_students_line_is_told():
     with run_of(WRONG_AXIS) as answer:
-        told = explained(answer, answer.judged(public_cases(answer.question))[0])
+        told = explained(answer, answer.judge(public_cases(answer.question))[0])
     assert told.named and "axis" in told.hint
     *case, line, marks = told.shown.split("\n")
     assert case[0].startswith("iou(") and "line 5" in line and marks.split() == ["^", "^"]
@@ -44,12 +44,12 @@ def test_the_students_line_is_told():
 @pytest.mark.parametrize("source", [FORGES, LEAVES, "def iou(n):\n    while True: pass\n", "def iou("])
 def test_what_cannot_be_believed_or_does_not_come_is_no_finding(source):
     with run_of(source) as answer:
-        told = explained(answer, answer.judged(public_cases(answer.question))[0])
+        told = explained(answer, answer.judge(public_cases(answer.question))[0])
     assert not told.failed and "axis" not in told.hint
 
 
 def test_a_list_of_numbers_is_an_array_for_the_grader_as_for_the_check():
     source = WRONG_AXIS.replace("axis=0) - tp", "axis=1) - tp").replace("return tp", "return list(tp").rstrip() + ")\n"
     with run_of(source) as answer:
-        judged, outputs = answer.judged(public_cases(answer.question))
+        judged, outputs = answer.judge(public_cases(answer.question))
     assert judged.passed and isinstance(outputs[0], np.ndarray)

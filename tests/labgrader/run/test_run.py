@@ -17,8 +17,8 @@ from labgrader.comparison import Problem
 from labgrader.course import find
 from labgrader.program.slice import Program
 from labgrader.reply.finding import Span
-from labgrader.run import plain
-from labgrader.run.run import Answer, Budget, Limits, public_cases
+from labgrader.run import subprocess_worker
+from labgrader.run.run import Budget, Limits, Run, public_cases
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 IOU = find("04_iou.iou")
@@ -30,8 +30,8 @@ WRONG = RIGHT.replace("- i)", "+ i)")
 def judged(*sources: str, limits: Limits = PATIENT):
     """The verdict on an answer in some cells, what it printed, and the findings."""
     pieces = [(f"cell {i}", text) for i, text in enumerate(("import numpy as np", *sources))]
-    with Answer(IOU, Program(tuple(pieces)), plain.fresh_worker, limits) as answer:
-        verdict, _ = answer.judged(public_cases(IOU))
+    with Run(IOU, Program(tuple(pieces)), subprocess_worker.fresh_worker, limits) as answer:
+        verdict, _ = answer.judge(public_cases(IOU))
         return verdict, answer.worker.printed(), answer.findings()
 
 
@@ -45,8 +45,8 @@ def test_a_right_answer_passes_and_a_wrong_one_gets_its_place():
 @pytest.mark.parametrize("seconds, looks", [(0.1, ["watch", "repair"]), (3.0, ["repair"])])
 def test_no_watch_looks_at_an_answer_that_takes_longer_than_it_may(seconds, looks):
     program, asked = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + WRONG))), []
-    with Answer(IOU, program, plain.fresh_worker, PATIENT) as answer:
-        answer.judged(public_cases(IOU))
+    with Run(IOU, program, subprocess_worker.fresh_worker, PATIENT) as answer:
+        answer.judge(public_cases(IOU))
         answer.called_s, answer.worker.ask = seconds, lambda request, *limits: asked.append(request[0])
         answer.findings()
     assert asked == looks
@@ -137,12 +137,12 @@ def test_time_in_which_it_cannot_run_is_not_an_answers():
     """Stopped by the system for longer than its limits, as on a busy machine, it is as right as before."""
     slow = Program((("numpy", "import numpy as np"), ("iou", SLOW.format(0.02) + RIGHT)))
     limits, cases = Limits(case_s=0.5, question_s=1.0), public_cases(IOU)
-    with Answer(IOU, slow, plain.fresh_worker, limits) as answer:
+    with Run(IOU, slow, subprocess_worker.fresh_worker, limits) as answer:
         process = psutil.Process(answer.worker.pid)
         process.suspend()
         threading.Timer(1.2, process.resume).start()
         begin = time.monotonic()
-        verdict, _ = answer.judged(cases)
+        verdict, _ = answer.judge(cases)
         assert verdict.passed and time.monotonic() - begin > 1.0 > answer.used_s >= 0.02 * len(cases)
 
 
@@ -151,15 +151,15 @@ def test_where_the_kernel_limits_no_memory_it_is_looked_at():
 
     @contextmanager
     def start(packages, limits):
-        with plain.fresh_worker(packages, Limits(memory_mb=8192)) as worker:
+        with subprocess_worker.fresh_worker(packages, Limits(memory_mb=8192)) as worker:
             worker.memory = 400 << 20
             yield worker
 
     fill = "import numpy as np\nkept = []\ndef iou(n):\n    while len(kept) < 60: kept.append(np.ones(1 << 21))\n"
     for source, says in ((fill + "    while True: pass", "it used more than 400 MB of memory"), (fill, "returns None")):
         source = source.replace("60", "60" if "True" in source else "2")
-        with Answer(IOU, Program((("iou", source),)), start, PATIENT) as answer:
-            assert says in answer.judged(public_cases(IOU))[0].problem.says
+        with Run(IOU, Program((("iou", source),)), start, PATIENT) as answer:
+            assert says in answer.judge(public_cases(IOU))[0].problem.says
 
 
 def test_answers_of_one_notebook_share_its_time_but_each_has_enough_for_a_right_one():
@@ -168,16 +168,16 @@ def test_answers_of_one_notebook_share_its_time_but_each_has_enough_for_a_right_
     given = []
     for _ in range(3):
         given.append(budget.for_one)
-        with Answer(IOU, endless, plain.fresh_worker, budget.limits, budget) as answer:
-            assert answer.judged(public_cases(IOU))[0].problem.kind == "time"
+        with Run(IOU, endless, subprocess_worker.fresh_worker, budget.limits, budget) as answer:
+            assert answer.judge(public_cases(IOU))[0].problem.kind == "time"
     assert given == pytest.approx([0.3, 0.2, 0.2])
 
 
 def test_an_endless_answer_leaves_no_process_and_is_not_called_again():
     endless = Program((("iou", "def iou(n):\n    while True: print('turn', flush=True)"),))
     begin = time.monotonic()
-    with Answer(IOU, endless, plain.fresh_worker, SHORT) as answer:
-        verdict, outputs = answer.judged(public_cases(IOU))
+    with Run(IOU, endless, subprocess_worker.fresh_worker, SHORT) as answer:
+        verdict, outputs = answer.judge(public_cases(IOU))
         assert answer.worker.printed().startswith("turn\nturn\n") and len(answer.worker.printed()) == 601
     assert verdict.case == 0 and len({id(output) for output in outputs}) == 1
     assert answer.worker.closed and time.monotonic() - begin < 60.0
@@ -191,13 +191,13 @@ def test_the_deepest_own_line_is_told_in_whichever_cell_it_stands():
 
 def test_a_line_of_the_kits_is_not_told_as_the_students():
     pieces = ("mean, the kit's", "def mean(x):\n    return x[99]"), ("iou", "def iou(n):\n    return mean(n)")
-    with Answer(IOU, Program(pieces), plain.fresh_worker, PATIENT) as answer:
-        assert answer.judged(public_cases(IOU))[0].problem.lines == ((2, "return mean(n)"),)
+    with Run(IOU, Program(pieces), subprocess_worker.fresh_worker, PATIENT) as answer:
+        assert answer.judge(public_cases(IOU))[0].problem.lines == ((2, "return mean(n)"),)
 
 
 def test_a_worker_that_is_killed_after_its_reply_gives_no_copies_of_it():
     program = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + RIGHT)))
-    with Answer(IOU, program, plain.fresh_worker, PATIENT) as answer:
+    with Run(IOU, program, subprocess_worker.fresh_worker, PATIENT) as answer:
         ask = answer.ask
 
         def killed_after(*request):
@@ -212,7 +212,7 @@ def test_a_worker_that_is_killed_after_its_reply_gives_no_copies_of_it():
 
 
 def test_an_interrupt_while_its_cells_run_ends_the_worker():
-    answer = Answer(IOU, Program((("iou", "while True: pass"),)), plain.fresh_worker, PATIENT)
+    answer = Run(IOU, Program((("iou", "while True: pass"),)), subprocess_worker.fresh_worker, PATIENT)
 
     def interrupted(*request):
         raise KeyboardInterrupt
@@ -241,15 +241,17 @@ def test_files_and_processes_are_refused(tmp_path):
     ]
     for attempt in tries:
         source = f"def iou(n):\n    try: {attempt}\n    except PermissionError: pass\n{WRONG}"
-        with Answer(IOU, Program((("np", "import numpy as np"), ("iou", source))), plain.fresh_worker, PATIENT) as run:
-            verdict, found = run.judged(public_cases(IOU))[0], run.findings()
+        with Run(
+            IOU, Program((("np", "import numpy as np"), ("iou", source))), subprocess_worker.fresh_worker, PATIENT
+        ) as run:
+            verdict, found = run.judge(public_cases(IOU))[0], run.findings()
         assert found and not verdict.passed and not target.exists(), attempt
 
 
 def test_a_worker_that_ended_while_it_waited_costs_nobody():
     judged("def iou(n):\n" + RIGHT, limits=Limits())
-    assert plain.spare.worker is not None
-    plain.spare.worker.kill()
+    assert subprocess_worker.spare.worker is not None
+    subprocess_worker.spare.worker.kill()
     assert judged("def iou(n):\n" + RIGHT, limits=Limits())[0].passed
 
 
@@ -259,12 +261,12 @@ def test_a_worker_ends_with_the_process_that_started_it():
     import os, threading, time
     from labgrader.program.slice import Program
     from labgrader.course import find
-    from labgrader.run import plain
-    from labgrader.run.run import Answer, Limits, public_cases
+    from labgrader.run import subprocess_worker
+    from labgrader.run.run import Run, Limits, public_cases
     text = "import os\\ndef iou(n):\\n    print(os.getpid())\\n    while True: pass"
     question, endless = find("04_iou.iou"), Program((("iou", text),))
-    with Answer(question, endless, plain.fresh_worker, Limits()) as answer:
-        threading.Thread(target=answer.judged, args=(public_cases(question),), daemon=True).start()
+    with Run(question, endless, subprocess_worker.fresh_worker, Limits()) as answer:
+        threading.Thread(target=answer.judge, args=(public_cases(question),), daemon=True).start()
         while not answer.worker.printed().endswith("\\n"):
             time.sleep(0.05)
         print(answer.worker.printed(), flush=True)

@@ -19,8 +19,8 @@ from labgrader.course import of_topic
 from labgrader.grade import gradebook
 from labgrader.grade.batch import Record
 from labgrader.grade.grade import Result, behaviour_of
+from labgrader.grade.overview import discrimination
 from labgrader.grade_course import grade_course
-from labgrader.report.overview import discrimination
 from labgrader.run.run import Limits
 
 TOPIC = "04_iou"

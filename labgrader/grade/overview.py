@@ -58,6 +58,15 @@ def group_of(result: Result) -> str:
     return f"{result.question}-{hashlib.sha256(key.encode()).hexdigest()[:6]}" if key and not result.right else ""
 
 
+def lines_of(result: Result, comments: Mapping[str, str]) -> list[str]:
+    """What a student is told about a question."""
+    said = result.says[:1].upper() + result.says[1:] + "."
+    hint = [f"Hint: {result.hint}"] if result.hint else []
+    comment = comments.get(group_of(result), "")
+    note = [f"{result.note[:1].upper()}{result.note[1:]}."] if result.note else []
+    return [said, *note, *result.shown.splitlines(), *hint, *([f"Comment: {comment}"] if comment else [])]
+
+
 def standings(lab: Lab, records: Sequence[Record]) -> list[Standing]:
     """What became of each question in a class, in the lab's order; the largest groups first."""
     found = []

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from labgrader.packages import requirements
 from labgrader.run.channel import Worker, WorkerLost
-from labgrader.run.run import Limits
+from labgrader.run.limits import Limits
 
 # A sandbox has the files of no locale, so that "" names C in both.
 ENVIRONMENT = {

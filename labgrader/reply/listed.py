@@ -1,0 +1,63 @@
+"""Listed mistakes: which one gives an answer's outputs, and what each gives in each case."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from labgrader.comparison import Case, Problem, alike, parts, trusted
+from labgrader.question import Misconception, Question
+
+Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
+
+
+def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Misconception | None:
+    """Find the misconception that gives these outputs in every case that tells it from a right answer."""
+    if all(isinstance(got, Problem) for got in outputs):
+        return None
+    for misconception in question.misconceptions:
+        told, stray = [], False  # told: of each case that tells it from a right answer, whether there is an output
+        for case, got in zip(cases, outputs, strict=True):
+            own = output_of(misconception, case.args)
+            if alike(question, own, got):
+                if not alike(question, own, case.expected):
+                    told.append(not isinstance(got, Problem))
+            elif isinstance(got, Problem) and alike(question, own, case.expected):
+                stray = True
+            else:
+                break
+        else:
+            if any(told) or (told and not stray):  # exceptions here and there may be of any mistake
+                return misconception
+    return None
+
+
+def output_of(misconception: Misconception, args: tuple) -> object:
+    """What a misconception gives, or a Problem where it raises."""
+    try:
+        return trusted(misconception.answer, args)
+    except Exception as error:
+        return Problem("exception", type(error).__name__)
+
+
+def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
+    """What the listed mistakes of a question give in each case; those that raise give nothing."""
+    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
+    for number, mistake in enumerate(question.misconceptions):
+        for found, case in zip(told, cases, strict=True):
+            output = output_of(mistake, case.args)
+            if not isinstance(output, Problem):
+                found.setdefault(fingerprint(output), set()).add(number)
+    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
+
+
+def fingerprint(output: object) -> bytes:
+    """The numbers of an output, rounded, and its shape; of outputs that differ by rounding most have the same.
+
+    >>> fingerprint([1, 0.1 + 0.2]) == fingerprint(np.array([1.0, 0.3]))
+    True
+    """
+    try:
+        arrays = [np.asarray(part).astype(float) for part in parts(output)]
+    except (TypeError, ValueError):
+        return b""
+    return b"".join(bytes(str(a.shape), "ascii") + (np.round(a, 7) + 0.0).tobytes() for a in arrays)
