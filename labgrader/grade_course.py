@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labgrader.grade.batch import Batch, Record, grade_batch, secret_for, with_attempts
 from labgrader.grade.changes import Change, add_change, changed, read_changes, undo
-from labgrader.grade.deadlines import read_deadline
+from labgrader.grade.deadlines import read_deadline, unknown_extensions
 from labgrader.grade.gradebook import write_gradebook
 from labgrader.grade.overview import add_comment, read_comments, standings
 from labgrader.grade.read_programs import read_all

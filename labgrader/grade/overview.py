@@ -7,7 +7,7 @@ public cases: a class of a hundred makes few mistakes, so one comment per group 
 import hashlib
 import json
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
