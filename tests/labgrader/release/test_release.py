@@ -345,7 +345,7 @@ def test_the_same_course_gives_the_same_bundle(course, tmp_path):
 def test_a_published_course_releases_badges_which_its_bundle_does_not_have(course, tmp_path, monkeypatch):
     published = replace(course_here(), repository="https://github.com/owner/name", wheel="kit==1.0")
     for module in ("release", "bundle"):
-        monkeypatch.setattr(f"labgrader.{module}.course_here", lambda: published)
+        monkeypatch.setattr(f"labgrader.release.{module}.course_here", lambda: published)
     files = [course / "labs/90_one/90_one.ipynb", *course.glob("lessons/*.ipynb")]
     release(course)
     assert len(files) == 2 and all(b"Open in Colab" in path.read_bytes() for path in files)
