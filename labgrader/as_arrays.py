@@ -10,7 +10,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
-from labgrader.comparison import Case, Listed, Problem, plain, with_rows_as_outputs
+from labgrader.comparison import Case, Listed, Problem, as_numpy, with_rows_as_outputs
 
 inside = ContextVar("inside", default=False)  # an answer is running: of others, and itself, it gets what a grader gives
 
@@ -51,7 +51,7 @@ def in_form(form: object, got: object) -> object:
     (array([1., 2.]), np.float64(3.0))
     """
     usual = isinstance(got, np.ndarray | np.generic | bool | int | float)
-    values = with_rows_as_outputs(form, got if usual else plain(got))
+    values = with_rows_as_outputs(form, got if usual else as_numpy(got))
     if isinstance(form, tuple):
         fits = isinstance(values, tuple) and len(values) == len(form)
         return tuple(map(part_in_form, form, values)) if fits else got

@@ -18,7 +18,7 @@ BEGIN = f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'tests')!r}]; i
 
 def as_on_windows(program: str, packages: list[str], **environment: str) -> subprocess.CompletedProcess:
     """Run a program in a process of its own that lacks what Windows lacks; workers that it starts lack it, too."""
-    begin = f"{BEGIN}as_windows.take_away({packages})\nimport labgrader.run.plain as plain\n"
+    begin = f"{BEGIN}as_windows.take_away({packages})\nimport labgrader.run.subprocess_worker as plain\n"
     begin += f"plain.START_PLAIN = {BEGIN + 'as_windows.take_away(); '!r} + plain.START_PLAIN\n"
     how = {"capture_output": True, "cwd": ROOT, "env": os.environ | {"PYTHONIOENCODING": "utf-8"} | environment}
     done = subprocess.run([sys.executable, "-c", begin + program], **how)

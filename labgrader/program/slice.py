@@ -41,9 +41,9 @@ class Program:
     pieces: (name, text) of each cell that is needed; lines that are not needed are blank, so that numbers of lines are
     those of the cell. calls: other blanks that the answer calls, directly or not. refused: why the answer cannot be
     graded, in words for its student; "" if it can. name: of the function that is called, "" for the question's. late:
-    the program with the last definitions in the notebook, where cells below the answer define names of it anew: it counts
-    if this one is wrong, since it is what a kernel has in the end. copies: which code cells, counted from 1, have the
-    answer's grade id and differ: a cell was copied to try again, or split; the last of them is the answer.
+    the program with the last definitions in the notebook, where cells below define names of it anew: it counts if this
+    one is wrong, since it is what a kernel has in the end. copies: which code cells, counted from 1, have the answer's
+    grade id and differ: a cell was copied to try again, or split; the last of them is the answer.
     """
 
     pieces: tuple[tuple[str, str], ...] = ()

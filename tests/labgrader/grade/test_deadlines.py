@@ -70,7 +70,7 @@ def test_an_extension_finds_its_student_by_email_too(tmp_path):
     (tmp_path / "roster.csv").write_text("id,name,email\n77,Ada,ada@x.org\n78,Ada,ada@x.org\n5,Ben,ben@x.org\n")
     found, late = deadline(tmp_path, DEADLINE + EXTENSION.replace("1234", "ada@x.org")), datetime.datetime(2026, 10, 7)
     assert [found.lateness(student, late).days for student in ("Ada_77", "Ada_78", "Ben_5")] == [0, 0, 2]
-    assert strangers(found, ["Ada_77", "Ada_78", "Ben_5"]) == []
+    assert unknown_extensions(found, ["Ada_77", "Ada_78", "Ben_5"]) == []
 
 
 @pytest.mark.parametrize(
