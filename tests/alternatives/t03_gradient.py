@@ -96,7 +96,7 @@ def group__bincount(foreground, votes, cell, least):
     at = np.floor((np.stack([v, u]) + votes[v, u, ::-1].T) / cell).astype(int) + 1
     inside = ((at > 0) & (at < shape[:, None] - 1)).all(axis=0)
     v, u, at = v[inside], u[inside], at[:, inside]
-    numbers = np.zeros(foreground.shape, np.uint8)
+    numbers = np.zeros(foreground.shape, np.uint16)
     for number in range(1, foreground.size + 1):
         if len(v) == 0:
             break

@@ -25,9 +25,11 @@ def _many_labels(rng):
 
 
 def _all_classes(rng, shape):
-    """Draw images of a shape with any of 255 classes, half of them not judged."""
+    """Draw images of a shape with any of 255 classes, and pixels that are not judged, but not all of an image."""
     y = LABELS.draw(rng, N=shape[0], H=shape[1], W=shape[2])
-    return np.where(rng.random(shape) < 0.5, 255, y).astype(np.uint8), MOST_CLASSES
+    unjudged = rng.random(shape) < 0.5
+    unjudged[:, 0, 0] = False
+    return np.where(unjudged, 255, np.where(y == 255, 0, y)).astype(np.uint8), MOST_CLASSES
 
 
 LABELS = labels("N H W", free=("reversed*", "sorted along [HW]"))
@@ -37,11 +39,11 @@ QUESTION = Question(
     kinds={"y": LABELS, "C": count(1, MOST_CLASSES, says="1 to 255")},
     inputs=(_many_labels, *(partial(_all_classes, shape=s) for s in ((LONG, 1, 2), (1, LONG, 2), (2, 1, LONG)))),
     by_hand=(
-        (np.array([[[1, 255, 255], [1, 1, 0]], [[0, 0, 0], [0, 0, 0]]], np.uint8), 3),
-        (np.array([[[0]]], np.uint8), 1),
         (np.array([[[1, 1], [0, 3]]], np.uint8), 5),
         (np.array([[[1, 255, 255], [1, 1, 0]], [[0, 0, 0], [0, 255, 0]]], np.uint8), 3),
         (np.tile(np.array([[0, 1, 1, 1, 2, 255], [0, 0, 2, 0, 0, 2]], np.uint8)[:, None], (1, 25, 4)), 3),  # many
+        (np.array([[[1, 255, 255], [1, 1, 0]], [[0, 0, 0], [0, 0, 0]]], np.uint8), 3),
+        (np.array([[[0]]], np.uint8), 1),
     ),
     random_cases=6,
     points=1,

@@ -68,13 +68,13 @@ QUESTION = Question(
     inputs=(_picture, *(partial(_many_colours, shape=s) for s in ((1, LONG), (LONG, 1), (5, 5)))),
     by_hand=(
         (np.array([[[15, 0, 7], [0, 9, 0]]], np.uint8), np.array([[0, 9, 0], [1, 1, 1]], np.uint8)),  # equally bright
-        (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE[:3]),
         (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE),
-        (np.array([[[9, 0, 7]], [[9, 1, 7]]], np.uint8), np.array([[9, 0, 7]], np.uint8)),  # one class
-        (np.array([[[1, 2, 3], [2, 3, 1]]], np.uint8), np.array([[2, 3, 1], [3, 1, 2], [1, 2, 3]], np.uint8)),
         (_NEARLY, _PALETTE),
         (np.array([[[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 255, 0]]], np.uint8), _PALETTE),  # 1 * 255 is 255 * 1
         (_AS_GREY, np.array([[0, 0, 34], [0, 34, 0], [34, 0, 0]], np.uint8)),
+        (np.array([[[0, 0, 255], [255, 0, 0], [128, 0, 128]]], np.uint8), _PALETTE[:3]),
+        (np.array([[[9, 0, 7]], [[9, 1, 7]]], np.uint8), np.array([[9, 0, 7]], np.uint8)),  # one class
+        (np.array([[[1, 2, 3], [2, 3, 1]]], np.uint8), np.array([[2, 3, 1], [3, 1, 2], [1, 2, 3]], np.uint8)),
     ),
     points=3,
 )

@@ -52,8 +52,6 @@ QUESTION = Question(
     },
     inputs=(_raw_mask, *(partial(_mask_of_many_links, shape=s) for s in ((1, LONG), (LONG, 1), (4, 4)))),
     by_hand=(
-        (np.array([[-1]], np.int32), np.array([[2]], np.uint8)),
-        (np.array([[-1, 0, 16777217]], np.int32), np.array([[1, 0], [3, 2]], np.uint8)),
         (
             np.array([[-1, 0, 1], [2, 1 + (1 << 24), 1 + (2 << 24)]], np.int32),
             np.array([[1, 1, 1], [3, 3, 2], [2, 0, 0]], np.uint8),
@@ -62,13 +60,15 @@ QUESTION = Question(
             np.array([[65537, 65538 + (2 << 24)]], np.int32),
             (np.arange(5, 196625) // 7 % 4).reshape(-1, 3).astype(np.uint8),
         ),
+        # sixteen links are 10 in hexadecimal
+        (np.array([[9 << 24, 16 << 24, 17 << 24]], np.int32), (np.arange(18)[None] // 3 % 4).astype(np.uint8)),
+        (np.array([[1 << 24, 3 + (1 << 24)]], np.int32), np.array([[2, 1], [0, 1], [0, 1], [1, 255]], np.uint8)),
+        (np.array([[-1]], np.int32), np.array([[2]], np.uint8)),
+        (np.array([[-1, 0, 16777217]], np.int32), np.array([[1, 0], [3, 2]], np.uint8)),
         (
             np.array([[(1 << 17) + 1, (1 << 18) + 2, (1 << 19) + 3, 0]], np.int32),  # 17 to 19 bits are too few
             (np.arange(3, 1_000_003) // 3 % 4).astype(np.uint8)[:, None],
         ),
-        # sixteen links are 10 in hexadecimal
-        (np.array([[9 << 24, 16 << 24, 17 << 24]], np.int32), (np.arange(18)[None] // 3 % 4).astype(np.uint8)),
-        (np.array([[1 << 24, 3 + (1 << 24)]], np.int32), np.array([[2, 1], [0, 1], [0, 1], [1, 255]], np.uint8)),
     ),
     random_cases=8,
     forbidden=("pybullet",),

@@ -64,10 +64,10 @@ QUESTION = Question(
         (np.array([[5], [9]], np.uint8), 11, 1),  # steps of 2 / 11, added up, are 1 too late
         (np.arange(14, dtype=np.uint8)[:, None], 9, 1),  # in floats 4.5 / (9 / 14) is not 7
         (_LONG, 4129, 1),
-        (_LONG.T, 1, 6000),
         (_ALL_DIFFERENT, 2, 3),  # a new centre falls between two old pixels
         (_LARGE, 5, 6),
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
+        (_LONG.T, 1, 6000),
     ),
     random_cases=8,
     points=4,

@@ -29,9 +29,6 @@ QUESTION = Question(
     inputs=LABELLED_MODELS,
     random_cases=10,
     by_hand=(
-        (np.array([[0, 0]], np.uint8), np.array([[[2.0], [-2.5]]]), np.zeros((4, 1, 2))),
-        (np.array([[0]], np.uint8), np.array([[[-1.5]]]), np.zeros((4, 1, 1))),
-        (np.array([[0]], np.uint8), np.array([[[-1.5]]]), np.zeros((4, 1, 1))),
         (np.array([[0, 1], [0, 1]], np.uint8), *_PENCIL),
         (np.array([[0, 0], [0, 1]], np.uint8), *_PENCIL),
         (np.zeros((2, 2), np.uint8), *_PENCIL),
@@ -40,6 +37,8 @@ QUESTION = Question(
             np.arange(9.0).reshape(1, 3, 3),
             np.stack([np.array([[0.5, 0.25, 0.0]]), *np.zeros((3, 1, 3))]),
         ),
+        (np.array([[0, 0]], np.uint8), np.array([[[2.0], [-2.5]]]), np.zeros((4, 1, 2))),
+        (np.array([[0]], np.uint8), np.array([[[-1.5]]]), np.zeros((4, 1, 1))),
     ),
     points=3,
 )

@@ -52,6 +52,8 @@ QUESTION = Question(
     inputs=tuple(partial(_pixel_of, draw=draw) for draw in LABELLED_MODELS),
     random_cases=10,
     by_hand=(
+        *((_LABELS, *_MODEL, v, u) for v, u in _PIXELS[:-1]),
+        (np.minimum(_LABELS, 1), *_MODEL, *_PIXELS[-1]),  # class 2 has a cost, though no pixel has it
         (np.array([[0]], np.uint8), np.array([[[-2.0, 0.0, 2.0]]]), np.zeros((4, 1, 1)), 0, 0),
         (
             np.array([[0, 1], [1, 0]], np.uint8),
@@ -63,8 +65,6 @@ QUESTION = Question(
         (*_LONG_ROW, 0, LONG - 1),
         (*_LONG_COLUMN, LONG - 1, 0),
         (np.array([[0, 0, 1]], np.uint8), np.array([[[0.0, 9.0], [1.0, 1.0], [9.0, 0.0]]]), _ROW, 0, 1),
-        *((_LABELS, *_MODEL, v, u) for v, u in _PIXELS[:-1]),
-        (np.minimum(_LABELS, 1), *_MODEL, *_PIXELS[-1]),  # class 2 has a cost, though no pixel has it
     ),
     points=3,
 )

@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from labcourse.kinds import LONG, image, number
+from labcourse.kinds import LONG, number
+from labcourse.kinds import image as colours
 from labcourse.questions.t02_crf import PAIRS
 from labgrader.question import Question, wrong
 
@@ -33,7 +34,7 @@ def _image(rng, shape=(4, 6), lam=(0.5, 3.0), sigma_I=(70.0, 120.0), sigma_p=(0.
 QUESTION = Question(
     reference=pair_weights,
     kinds={
-        "image": image(free=("reversed along 3", "unique along 3")),  # channels count alike
+        "image": colours(free=("reversed along 3", "unique along 3")),  # channels count alike
         "lam": number(0.0, 1000.0, says="0 to 1000"),
         "sigma_I": number(0.5, 1000.0, says="0.5 to 1000"),
         "sigma_p": number(0.5, 100.0, says="0.5 to 100"),
@@ -47,11 +48,11 @@ QUESTION = Question(
     ),
     random_cases=5,
     by_hand=(
-        (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 1.0, 0.5004, 0.5),
-        (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 0.0, 5.0, 1.0),
         (np.array([[[120, 90, 60], [123, 94, 60]]], np.uint8), 2.0, 5.0, 1.0),
         (np.array([[[250, 5, 10], [245, 10, 10]], [[245, 10, 30], [240, 5, 20]]], np.uint8), 1.0, 10.0, 2.0),
         (np.full((3, 2, 3), 77, np.uint8), 1.5, 8.0, 0.5),
+        (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 1.0, 0.5004, 0.5),
+        (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 0.0, 5.0, 1.0),
     ),
     points=3,
 )
@@ -98,7 +99,7 @@ def wrapped_words(image, lam, sigma_I, sigma_p):
 
 @wrong("lam stands before the exponential, not in its exponent: two like pixels at distance 0 weigh lam.")
 def lam_in_the_exponent(image, lam, sigma_I, sigma_p):
-    return gaussian(squares(image), 1.0, sigma_I, sigma_p) ** lam
+    return gaussian(squares(image), 1.0, sigma_I, sigma_p, ring=True) ** lam * inside(image.shape[:2])
 
 
 @wrong("np.uint8(5) - np.uint8(10) is 251 already: turn the image into floats before you subtract.")

@@ -64,6 +64,12 @@ QUESTION = Question(
         partial(_row, size=1e-3),
     ),
     by_hand=(
+        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
+        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
+        (np.array([[0.0, 3.0, 0.5], [1.0, 3.0, 0.9], [3.0, 2.5, 0.0]]), np.array([0.8, 0.3])),  # from class 0 to 2
+        (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
+        (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
+        (_PSI_OF_A_ROW, _WEIGHTS_OF_A_ROW),
         (np.array([[3.0], [4.0]]), np.array([0.5])),  # one class
         (np.array([[-1.0, 0.0]]), np.zeros(0)),
         (np.array([[0.0, -1.0]]), np.zeros(0)),
@@ -74,12 +80,6 @@ QUESTION = Question(
         (np.array([[4e-4, 2e-4]]), np.zeros(0)),
         (np.array([[0.0, 9e5], [7e5, 0.0]]), np.array([8e5])),
         (np.array([[0.0, 9e-4], [3e-4, 0.0]]), np.array([4e-4])),
-        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.4, 0.4])),
-        (np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.6, 0.6])),
-        (np.array([[0.0, 3.0, 0.5], [1.0, 3.0, 0.9], [3.0, 2.5, 0.0]]), np.array([0.8, 0.3])),  # from class 0 to 2
-        (np.array([[2.0, 1.0, 4.0]]), np.zeros(0)),
-        (np.array([[0.4, 0.5], [2.0, 0.0], [0.4, 0.5]]), np.array([0.5, 0.5])),  # both ends alone would choose 0
-        (_PSI_OF_A_ROW, _WEIGHTS_OF_A_ROW),
     ),
     random_cases=12,
     points=3,

@@ -47,12 +47,12 @@ QUESTION = Question(
         partial(_strokes, shape=(4, 4), size=4e5, large=(6e5, 1e6)),
     ),
     by_hand=(
-        (np.array([[[2.0, 5.0], [1.0, -3.0]]]), np.array([[255, 0]], np.uint8), 100.0),
-        (np.array([[[-2.0, -5.0], [0.0, 3.0]]]), np.array([[0, 0]], np.uint8), 1.0004),
         (np.array([[[2.0, 5.0]]]), np.array([[255]], np.uint8), 100.0),
         (np.array([[[4.0, 1.0], [-1.0, -3.0]]]), np.array([[255, 255]], np.uint8), 50.0),
         (np.array([[[2.0, 5.0]], [[1.0, -3.0]]]), np.array([[255], [0]], np.uint8), 100.0),
         (np.array([[[0.5, 0.5], [0.0, 2.0], [3.0, 1.0]]]), np.array([[1, 0, 1]], np.uint8), 80.0),
+        (np.array([[[2.0, 5.0], [1.0, -3.0]]]), np.array([[255, 0]], np.uint8), 100.0),
+        (np.array([[[-2.0, -5.0], [0.0, 3.0]]]), np.array([[0, 0]], np.uint8), 1.0004),
     ),
 )
 

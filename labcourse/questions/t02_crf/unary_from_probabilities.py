@@ -32,9 +32,9 @@ QUESTION = Question(
         partial(_probabilities, shape=(2, 2), C=MOST_CLASSES, eps=(1e-12, 1.5e-12)),
     ),
     by_hand=(
-        (np.array([[[0.5, 0.5, 0.0]]]), 0.03),
         (np.array([[[0.5, 0.25, 0.25], [1.0, 0.0, 0.0]]]), 0.03),
         (np.array([[[0.7, 0.3]], [[0.05, 0.95]], [[0.1, 0.9]]]), 0.1),
+        (np.array([[[0.5, 0.5, 0.0]]]), 0.03),
     ),
     points=1,
 )

@@ -74,6 +74,12 @@ QUESTION = Question(
         partial(_row_or_column, shape=(400, 1)),
     ),
     by_hand=(
+        (*_TWO, 2, 2),
+        (*_OUT, 2, 2),
+        (*_SPREAD, 1, 4),
+        (*_FEW, 1, 5),
+        (np.array([[0.5, 0.51], [0.4, 0.9]]), np.zeros((2, 2, 2)), 1, 1),
+        (np.zeros((2, 3)), np.ones((2, 3, 2)), 2, 1),  # nobody votes
         (np.ones((50, 50)), np.zeros((50, 50, 2)), 1, 1),  # 289 things, each of nine pixels or fewer
         (np.ones((30, 25)), pointing((30, 25), dict.fromkeys(np.ndindex(30, 25), (12, 15)))[1], 3, 1000),
         (np.ones((1, 400)), np.zeros((1, 400, 2)), 100, 1),
@@ -83,12 +89,6 @@ QUESTION = Question(
         (np.array([[0.9]]), np.array([[[-0.0004, 0.0]]]), 1, 1),
         (*pointing((1, 301), {(0, 300): (-0.01, 0), (0, 299): (0.5, 0)}), 1, 1),
         (np.array([[0.9]]), np.array([[[0.0, -0.0004]]]), 1, 1),
-        (*_TWO, 2, 2),
-        (*_OUT, 2, 2),
-        (*_SPREAD, 1, 4),
-        (*_FEW, 1, 5),
-        (np.array([[0.5, 0.51], [0.4, 0.9]]), np.zeros((2, 2, 2)), 1, 1),
-        (np.zeros((2, 3)), np.ones((2, 3, 2)), 2, 1),  # nobody votes
     ),
     random_cases=10,
     points=4,

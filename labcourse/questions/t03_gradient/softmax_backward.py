@@ -32,10 +32,10 @@ QUESTION = Question(
     ),
     random_cases=12,
     by_hand=(
-        (np.array([0.5, 0.5]), np.array([1.0, 0.0])),
         (np.array([[0.5, 0.5]]), np.array([[1.0, 0.0]])),
         (np.array([[0.2, 0.3, 0.5]]), np.array([[-1.0, 0.0, 2.0]])),
         (np.array([[[0.0, 1.0], [0.1, 0.9]]]), np.array([[[4.0, -3.0], [4.0, -3.0]]])),
+        (np.array([0.5, 0.5]), np.array([1.0, 0.0])),
     ),
     points=3,
     forbidden=("scipy", "torch"),

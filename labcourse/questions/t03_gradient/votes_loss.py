@@ -50,12 +50,12 @@ QUESTION = Question(
         partial(_scattered_things, shape=(20, 20), size=0.1, beta=(0.01, 0.011)),
     ),
     by_hand=(
-        (np.zeros((1, 3, 2)), np.array([[3, 3, 3]], np.uint8), 2.0),
-        (np.array([[[-0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
         (np.zeros((1, 5, 2)), ONE_ROW, 2.0),
         (np.array([[[1.0, 0.0], [3.0, 4.0], [-1.0, 0.0], [9.0, 9.0], [9.0, 9.0]]]), ONE_ROW, 2.0),
         (np.ones((2, 6, 2)) * [2.0, -1.0], TOUCHING, 1.0),
         (np.ones((2, 3, 2)), np.array([[0, 255, 0], [0, 0, 255]], np.uint8), 1.0),  # no thing at all
+        (np.zeros((1, 3, 2)), np.array([[3, 3, 3]], np.uint8), 2.0),
+        (np.array([[[-0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
     ),
     random_cases=10,
     points=3,
