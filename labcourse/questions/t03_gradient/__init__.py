@@ -60,16 +60,16 @@ def pixels_of(rng, shape, C, size=2.0, s=(0.05, 0.4)):
     return z, y.astype(np.uint8), float(rng.uniform(*s))
 
 
-LOGITS = array("... C", -1e6, 1e6, says="-1e6 to 1e6")
+LOGITS = array("... C", -1e6, 1e6, lengths={"C": (2, MOST_CLASSES)}, says=("-1e6 to 1e6", "C 2 to 255"))
 SMOOTHED_PIXELS = {"z": LOGITS, "y": labels("..."), "s": array("", 0.0, 0.99, dtype="float", says="0 to 0.99")}
-# A picture; a pixel, a long row, a batch; as many classes as there may be, with large logits; a row of one class.
+# A picture; a pixel, a long row, a batch; as many classes as there may be, with large logits; two classes.
 SMOOTHED_DRAWS = (
     random_smoothed_pixels,
     partial(pixels_of, shape=(), C=4),
     partial(pixels_of, shape=(LONG,), C=3, s=(0.6, 0.99)),
     partial(pixels_of, shape=(3, 3, 4), C=3),
     partial(pixels_of, shape=(5,), C=MOST_CLASSES, size=4e5),
-    partial(pixels_of, shape=(3,), C=1),
+    partial(pixels_of, shape=(3,), C=2),
 )
 
 
