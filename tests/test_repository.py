@@ -32,8 +32,8 @@ ROOMS = {
         "notices targets > pipeline sim > node"
     ),
     "labgrader": (
-        "support question packages > comparison languages > as_arrays > course > program > reply > run > sandbox handin "
-        "> grade > report > check > file_check grade_course release"
+        "support question packages > comparison languages > as_arrays > course > program > reply > run "
+        "> sandbox handin > grade > report > check > file_check grade_course release"
     ),
 }
 BELOW = {
