@@ -31,6 +31,7 @@ from labcli.commands.sheet import sheet
 from labcli.commands.study import study
 from labcli.commands.texts import texts
 from labcli.commands.train import train
+from labcli.commands.trust import trust
 
 app = typer.Typer(
     help="Semantic segmentation for robotic manipulation: from one RGB-D image to a lifted object.",
@@ -41,7 +42,7 @@ app = typer.Typer(
 )
 for command in (doctor, check, train, evaluate, export, compare, study, demo, perceive, sheet, calibrate):
     app.command()(command)
-for command in (release, renumber, grade, texts, grades, forget, exam):
+for command in (release, renumber, grade, texts, grades, forget, exam, trust):
     app.command()(command)
 app.add_typer(node.app, name="node")
 app.add_typer(new.app, name="new")

@@ -9,8 +9,11 @@ A course says so in its pyproject.toml, and this package knows nothing else of i
     kit = ["sums"]                # the course's own packages, which no answer may import
     command = "lab"               # what a student and an instructor type; messages name it
 
-The course is the one that `use` named, else that of the working directory or a folder above it, else the one that this
-package was installed with. Questions are imported when they are asked for.
+Its questions are Python, which runs, so its user says which course it is: the one that `use` or LABGRADER_COURSE
+named; else that of the working directory or a folder above it, if it was trusted (`labgrader.trust`) or its package is
+imported already; else the one that this package was installed with. Any other course around the working directory is
+refused in words, and nothing of it is imported. A copy of the installed course is that course. Questions are imported
+when they are asked for.
 """
 
 import functools
@@ -27,9 +30,12 @@ from pathlib import Path
 
 from labgrader.languages import CHOSEN, ENGLISH, translated
 from labgrader.question import Question
+from labgrader.trust import is_of_another_account, is_trusted, refusal
 
 FILE = "pyproject.toml"
+MOST_BYTES = 1 << 20  # of such a file
 NAMED = "LABGRADER_COURSE"  # the environment variable that `use` sets, so that processes started later know it, too
+HERE = Path(__file__).resolve().parent
 
 
 @dataclass(frozen=True)
@@ -38,7 +44,8 @@ class Course:
 
     root: the folder from which its packages can be imported; file: its pyproject.toml. version: of its project. copied:
     the packages of kit whose functions an answer may have copied, which is flagged. bundle: folders and files of what
-    students get; withheld: those of them that they do not. templates: folder in root of what `new` begins from.
+    students get; withheld: those of them, and folders in them, that they do not get. templates: folder in root of what
+    `new` begins from.
     start: file in root with the page on which students begin; weeks: the topics of each week, one a week if it is not
     said. ignored: the label of what nobody judged, if the course has one; no_text: what a text that is to be written
     holds in a released lab. language: of hints, "de", where they were translated (`labgrader.languages`). dropped:
@@ -73,29 +80,56 @@ class Course:
 
 
 def use(folder: Path) -> None:
-    """Take the course of a folder, from now on and in the processes that this one starts; others stay as they are."""
-    if file_above(Path(folder).resolve()):
+    """Take the course of a folder, from now on and in the processes that this one starts; others stay as they are.
+
+    A folder without settings of its own, which may hold labs of the installed course, names none: what stands above it
+    may be anybody's.
+    """
+    if settings_in(Path(folder)):
         os.environ[NAMED] = str(Path(folder).resolve())
 
 
 def course() -> Course:
-    """The course; raises ValueError if there is none."""
-    return course_of(os.environ.get(NAMED) or os.getcwd())
+    """The course; raises ValueError if there is none, or if nobody said that the one around here is to be trusted."""
+    named = os.environ.get(NAMED)
+    return course_named(named) if named else course_around(os.getcwd())
+
+
+def environment() -> dict[str, str]:
+    """The variable by which a process that is started has this course, if it has a folder of its own."""
+    here = course()
+    return {NAMED: str(here.root)} if here.file.parent == here.root else {}
 
 
 @functools.cache
-def course_of(folder: str) -> Course:
-    """The course of a folder, else the one that came with this package."""
-    here = Path(__file__).resolve().parent
-    path = file_above(Path(folder)) or file_above(here)
-    if path is None:
-        raise ValueError(f"course: expected a {FILE} with [tool.labgrader] in {folder} or above it, found none")
+def course_named(folder: str) -> Course:
+    """The course of a folder that somebody named."""
+    if not settings_in(Path(folder)):
+        raise ValueError(f"{NAMED}: expected a folder that has a {FILE} with [tool.labgrader], got {folder}")
+    return read(Path(folder).resolve() / FILE)
+
+
+@functools.cache
+def course_around(folder: str) -> Course:
+    """The course of a folder or of one above it, if it may be; the installed one where there is none."""
+    own, path = installed(), file_above(Path(folder))
+    if path is None or path == own or (own is not None and questions_of(path) == questions_of(own)):
+        if own is None:
+            raise ValueError(f"course: expected a {FILE} with [tool.labgrader] in {folder} or above it, found none")
+        return read(own)
+    if is_trusted(path.parent) or is_imported(str(questions_of(path)), path.parent):
+        return read(path)
+    raise ValueError(refusal(path, questions_of(path), read(own).command if own else "labkit"))
+
+
+def read(path: Path) -> Course:
+    """The course of a file, whose packages can be imported from now on."""
     settings = tomllib.loads(path.read_text(encoding="utf-8"))
     said = {name: tuple(v) if isinstance(v, list) else v for name, v in settings["tool"]["labgrader"].items()}
     unknown = said.keys() - Course.__dataclass_fields__.keys() | {"questions", "packages", "command"} - said.keys()
     if unknown:
         raise ValueError(f"{path}: [tool.labgrader] holds {', '.join(Course.__dataclass_fields__)}; see {min(unknown)}")
-    root = path.parent.parent if path.parent == here else path.parent
+    root = HERE.parent if path.parent == HERE else path.parent
     if str(root) not in sys.path:
         sys.path.append(str(root))
     project = settings.get("project", {})
@@ -104,15 +138,41 @@ def course_of(folder: str) -> Course:
     return Course(root, path, **of_project | said)
 
 
+def installed() -> Path | None:
+    """The settings of the course that this package was installed with, in a wheel or from its folder."""
+    return next((place / FILE for place in (HERE, HERE.parent) if settings_in(place)), None)
+
+
 def file_above(folder: Path) -> Path | None:
-    """The nearest pyproject.toml with [tool.labgrader], in a folder or above it."""
-    for path in (place / FILE for place in (folder, *folder.parents)):
-        try:
-            if "labgrader" in tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {}):
-                return path
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-            continue
+    """The nearest settings in a folder or above it; another account's are nobody's, unless they are trusted."""
+    for place in (folder, *folder.parents):
+        path = place / FILE
+        if settings_in(place) and (path == installed() or is_trusted(place) or not is_of_another_account(path)):
+            return path
     return None
+
+
+def settings_in(folder: Path) -> dict:
+    """What a folder says of a course, {} if nothing; a file of a stranger's is read as one."""
+    path = folder / FILE
+    try:
+        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+            return {}
+        found = tomllib.loads(path.read_text(encoding="utf-8"))["tool"]["labgrader"]
+    except (OSError, ValueError, RecursionError, LookupError, TypeError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def questions_of(path: Path) -> object:
+    """Where a course says that its questions are."""
+    return settings_in(path.parent).get("questions")
+
+
+def is_imported(questions: str, root: Path) -> bool:
+    """Whether a course's package was imported from its folder already: its code has run in this process."""
+    module = sys.modules.get(questions.partition(".")[0])
+    return any(Path(place).resolve().is_relative_to(root) for place in getattr(module, "__path__", ()))
 
 
 # ---------------------------------------------------------------------------------------------- its questions
@@ -145,9 +205,17 @@ def of_topic(topic: str) -> dict[str, Question]:
     Those are there, too, that its lab asks no more. Raises ValueError for a topic that there is not.
     """
     if topic not in topics():
-        raise ValueError(f"topic: expected one of {', '.join(topics())}, got {topic!r}")
+        raise ValueError(f"topic: expected one of {', '.join(topics())}, got {topic!r}{of_another_copy()}")
     folder = f"{course().questions}.t{topic}"
     return {name: question_of(f"{folder}.{name}", chosen_language()) for name in modules_in(folder)}
+
+
+def of_another_copy() -> str:
+    """What to say of a topic that there is not, where the folder around is another copy of the installed course."""
+    path, here = file_above(Path(os.getcwd())), course()
+    if path is None or path.parent == here.root or questions_of(path) != here.questions:
+        return ""
+    return f"; this Python has the course of {here.root}, not that of {path.parent}: start the Python of that folder"
 
 
 def chosen_language() -> str:

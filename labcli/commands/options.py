@@ -27,11 +27,16 @@ MeasuredMm = Annotated[
 ]
 
 
-def of_course(folder: Path) -> Path:
-    """Take the settings of the course that a command is told, before anything asks for the course."""
+def of_course(context: typer.Context, parameter: typer.CallbackParam, folder: Path) -> Path:
+    """Take the settings of the course that a command is told, before anything asks for the course.
+
+    Only what somebody typed names a course: the folder in which a command is started may be a stranger's.
+    """
     from labgrader.course import use
 
-    use(folder)
+    source = context.get_parameter_source(parameter.name)
+    if source is None or source.name != "DEFAULT":
+        use(folder)
     return folder
 
 

@@ -33,5 +33,9 @@ def release(
     if not changed:
         typer.echo("labs, solutions and lessons are as they should be")
     if bundle is not None:
-        typer.echo(f"wrote {bundle}: {len(bundling.bundle(course, bundle, topics or ()))} files")
+        made = bundling.bundle(course, bundle, topics or ())
+        for name, reason in made.left_out.items():
+            typer.echo(f"left out {name}: {reason}")
+        everything = "" if made.tracked else ", all that lies there: this is no git repository"
+        typer.echo(f"wrote {bundle}: {len(made.names)} files{everything}")
     raise typer.Exit(1 if check and changed else 0)

@@ -1,6 +1,6 @@
 """Write an exam: a page to print per version, and one key for whoever corrects."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 from html import escape
 from pathlib import Path
@@ -40,17 +40,16 @@ RULES = (
 )
 
 
-def write(
+def exam(
     topics: Sequence[str],
     minutes: int,
     seed: int,
     versions: int,
-    out: Path,
     without: Collection[str] = (),
     course: str = "",
     aids: str = "",
-) -> list[Path]:
-    """Write exam_A.html, exam_B.html, ... and key.html into a folder, and return their paths.
+) -> dict[str, str]:
+    """The pages of an exam by their names: exam_A.html, exam_B.html, ... and key.html.
 
     without: names of questions that are not asked. aids: AIDS if left out. Raises ValueError as `choose` does, or for
     more versions than there are numbers.
@@ -64,10 +63,26 @@ def write(
         f"exam_{letter}.html": exam_page(questions, [drawn[i] for drawn in papers], letter, minutes, course, aids)
         for i, letter in enumerate(letters)
     }
-    pages["key.html"] = key_page(questions, papers, letters, seed)
-    for name, text in pages.items():
-        write_atomically(out / name, text.encode())
-    return [out / name for name in pages]
+    return pages | {"key.html": key_page(questions, papers, letters, seed)}
+
+
+def write(out: Path, pages: Mapping[str, str], overwrite: bool = False) -> list[Path]:
+    """Write the pages of an exam into a folder, and return their paths.
+
+    overwrite: remove another exam's pages from the folder; without it they raise ValueError: they would lie beside a
+    key that is not theirs.
+    """
+    contents = {out / name: text.encode() for name, text in pages.items()}
+    there = [*sorted(out.glob("exam_*.html")), *out.glob("key.html")]
+    others = [path for path in there if path.read_bytes() != contents.get(path)]
+    if others and not overwrite:
+        names = ", ".join(path.name for path in others)
+        raise ValueError(f"out: expected a folder without another exam, {out} has {names}; --overwrite removes it")
+    for path in others:
+        path.unlink()
+    for path, data in contents.items():
+        write_atomically(path, data)
+    return list(contents)
 
 
 def page(title: str, body: str) -> str:

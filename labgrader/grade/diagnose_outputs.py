@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from labgrader.course import of_topic
+from labgrader.course import environment, of_topic
 from labgrader.question import Question
 from labgrader.reply.finding import Finding
 from labgrader.run.run import public_cases, verdict_on
@@ -73,7 +73,7 @@ class Diagnoser:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env=os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"},
+            env=os.environ | environment() | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"},
         )
 
     def ask(self, topic: str, function: str, *outputs_and_program: object) -> Diagnosis:

@@ -21,8 +21,9 @@ from labgrader.handin.pictures import Pictures, pictures_of
 from labgrader.handin.roster import keys_of
 from labgrader.handin.several import OTHERS, SEVERAL
 from labgrader.program.cell import Cell
-from labgrader.program.notebook import LARGEST_FILE, MOST_SOURCE, Unreadable, code_of, grade_id, no_code, parse
+from labgrader.program.notebook import LARGEST_FILE, Unreadable, code_of, grade_id, no_code, parse
 
+MOST_WRITTEN = 100_000  # characters of a written answer, fifty pages: pages show less
 LONGEST_NAME = 220  # bytes: the names of a student's pages are longer, and no file's has more than 255
 LONGEST_SHOWN = 60  # characters of a name that will not do
 LONGEST_SAID = 200  # characters of what stands for a notebook
@@ -336,16 +337,21 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]:
-    """The code cells, and by grade id the sources that the lab asks for; where several have one, all of them."""
+    """The code cells, and by grade id the sources that the lab asks for; where several have one, all of them.
+
+    Those of answers are code, which has a limit for all cells; what a person grades is cut where it is very long.
+    """
     code = tuple(Cell(plain_text(cell.source), cell.grade_id) for cell in code_of(cells))
     texts = {name: {} for name in (*lab.answers, *lab.written)}
     for cell in cells:
         name = grade_id(cell)
         if name in texts and (text := source_of(cell)) is not None:
-            texts[name][text[:MOST_SOURCE]] = None
+            is_kept = name in lab.written or cell.get("cell_type") == "code"
+            texts[name][text if is_kept else ""] = None
     if not any(texts.values()) and not any(f"def {name}" in cell.source for name in lab.answers for cell in code):
         raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
-    return code, {name: "\n\n".join(found) for name, found in texts.items() if found}
+    whole = {name: "\n\n".join(filter(None, found)) for name, found in texts.items() if found}
+    return code, {name: text if name in lab.answers else text[:MOST_WRITTEN] for name, text in whole.items()}
 
 
 def source_of(cell: dict) -> str | None:

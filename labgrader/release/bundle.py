@@ -3,7 +3,10 @@
     bundle(course, "course.zip")                 everything
     bundle(course, "week.zip", ["04_iou"])       this lab, its lessons, and the kit
 
-The solutions, which hold the model answers, and the tests stay with the instructor.
+The solutions, which hold the model answers, and the tests stay with the instructor. Of what lies in the folders that
+students get, only what git tracks is taken, where there is a repository: no draft, no key that was written there. A
+link is left out, wherever it leads, and so is what bears the marks of a solution, a rubric or a key. The references of
+the questions are there, since a check needs them: of some topics' bundle up to the last of these.
 """
 
 import io
@@ -12,17 +15,37 @@ import re
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from labgrader.course import course as course_here
 from labgrader.course import is_taught, taught_rows
 from labgrader.course import topics as all_topics
 from labgrader.release.publishing import unpublished
 from labgrader.release.release import START, read, release, start_page, to_bytes
-from labgrader.support import PRIVATE, write_atomically
+from labgrader.support import PRIVATE, git, write_atomically
+
+# What a file that students get does not hold, and what it would be.
+MARKS = {
+    b"### BEGIN SOLUTION": "a solution",
+    b"### BEGIN HIDDEN TESTS": "hidden tests",
+    b"**Rubric": "a rubric",
+    b"Not for students": "a key",
+}
 
 
-def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> list[str]:
-    """Write a zip of what students get, in a folder of its name; returns the names in it, in order.
+class Bundle(NamedTuple):
+    """What is in a zip, by names in order; what was left out that lies beside it, and why.
+
+    tracked: whether there is a repository, whose files alone were taken.
+    """
+
+    names: list[str]
+    left_out: dict[str, str]
+    tracked: bool
+
+
+def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> Bundle:
+    """Write a zip of what students get, in a folder of its name.
 
     topics: whose lessons and labs; all if none is given, and then the guides are there, too. The same course gives the
     same bytes. Raises ValueError if a topic is not there, or the labs are not as the solutions make them.
@@ -31,8 +54,11 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> list[str]:
     if drift := release(course, topics, check=True):
         raise ValueError(f"course: run `{here.command} release` first, {drift[0]} is not what it makes")
     found = [path for name in here.bundle for path in (course / name, *(course / name).rglob("*"))]
-    names = {path.relative_to(course).as_posix(): path for path in found if path.is_file()}
-    kept = sorted(name for name in names if name not in here.withheld and not is_left_over(name) and of(topics, name))
+    names = {path.relative_to(course).as_posix(): path for path in found if path.is_symlink() or path.is_file()}
+    wanted = sorted(name for name in names if not (is_withheld(name) or is_left_over(name)) and of(topics, name))
+    tracked = tracked_files(course)
+    why = {name: reason_against(course, name, tracked) for name in wanted}
+    kept = [name for name in wanted if not why[name]]
     contents = {name: names[name].read_bytes() for name in kept}
     for name in kept:
         if name.endswith(".md"):
@@ -49,17 +75,53 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> list[str]:
             entry.external_attr = (0o755 if name in names and os.access(names[name], os.X_OK) else 0o644) << 16
             archive.writestr(entry, contents[name])
     write_atomically(target, archived.getvalue())
-    return sorted(contents)
+    return Bundle(sorted(contents), {name: said for name, said in why.items() if said}, tracked is not None)
+
+
+def tracked_files(course: Path) -> set[str] | None:
+    """The files of a course's folder that git tracks, None where there is no repository."""
+    try:
+        done = git(course, "ls-files", "-z")
+    except OSError:
+        return None
+    return None if done.returncode else set(os.fsdecode(done.stdout).split("\0")) - {""}
+
+
+def reason_against(course: Path, name: str, tracked: set[str] | None) -> str:
+    """Why students do not get a file of the folders that they get, "" if they do."""
+    path = course / name
+    if path.resolve() != course.resolve() / name:
+        return "a link"
+    if tracked is not None and name not in tracked:
+        return "git does not track it"
+    if name.endswith(".py") and name.partition("/")[0] in course_here().kit:  # which writes those marks
+        return ""
+    data = path.read_bytes()
+    if found := next((what for mark, what in MARKS.items() if mark in data), ""):
+        return f"{found}, by its marks"
+    if name.endswith(".ipynb") and not name.startswith("labs/"):
+        marks = (cell.metadata.get("nbgrader", {}) for cell in read(path).cells)
+        return "a notebook with solution cells" if any(mark.get("solution") for mark in marks) else ""
+    return ""
+
+
+def is_withheld(name: str) -> bool:
+    """Whether the course withholds a file, or a folder that it is in."""
+    return any(name == kept or name.startswith(f"{kept}/") for kept in course_here().withheld)
 
 
 def of(topics: Sequence[str], name: str) -> bool:
     """Whether a file belongs to some topics: files of lessons and labs begin with their number, guides are of none.
+
+    Questions of earlier topics belong to them, too: a student may still work on those.
 
     >>> [of(["04_iou"], f"lessons/{name}") for name in ("04_iou_edges.ipynb", "07_grasp.ipynb", "schematics/04_a.svg")]
     [True, False, True]
     """
     folder, _, rest = name.partition("/")
     numbers = {topic[:2] for topic in topics}
+    if questions := re.match(rf"{course_here().questions.replace('.', '/')}/t(\d\d)_", name):
+        return not topics or questions[1] <= max(numbers)
     number = re.match(r"(?:schematics/)?(\d\d)_", rest)
     if folder not in ("lessons", "labs", "docs"):
         return True

@@ -73,6 +73,12 @@ def doubled(source: str | None) -> Callable[[list], list]:
     return change
 
 
+def with_markdown_cells(cells: list) -> None:
+    """Nineteen Markdown cells of a million characters, with the grade id of a code cell."""
+    mark = {"metadata": copy.deepcopy(cell(cells, "iou")["metadata"]), "cell_type": "markdown", "id": "x"}
+    cells += [mark | {"source": f"{i}" + "x" * 1_000_000} for i in range(19)]
+
+
 def better_marks(cells: list) -> None:
     """A wrong answer whose tests, points and marks the student has improved."""
     cell(cells, "iou")["source"] = "import numpy as np\n" + WRONG
@@ -195,6 +201,7 @@ ODD = (
     Odd("cell_removed", as_notebook(lambda cells: cells.remove(cell(cells, "iou"))), says="no cell defines iou"),
     Odd("raw_cell", with_iou(cell_type="raw"), says="is raw text, and must be code"),
     Odd("markdown_cell", with_iou(cell_type="markdown"), says="is Markdown, and must be code"),
+    Odd("nineteen_markdown_cells", as_notebook(with_markdown_cells), right=True),
     Odd("number_as_source", with_iou(source=7), says="no cell defines iou"),
     Odd("endless_source", with_iou(source="x = 1\n" * 200_000), "its code is longer than 1,000,000 characters"),
     Odd("half_a_character", with_iou(source=WRONG + "x = '\ud800'"), says="2 of 2 values are not right"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from labcourse.exam.draw import bank, choose, draw, topics, topics_of
-from labcourse.exam.page import write
+from labcourse.exam.page import exam, write
 from labcourse.exam.paper import LARGEST_DENOMINATOR, Paper
 
 SAMPLES = Path(__file__).parents[2] / "docs" / "exams"
@@ -473,7 +473,7 @@ def test_a_wrong_value_tells_one_mistake_and_versions_share_no_answer(question, 
 
 @pytest.mark.parametrize(("folder", "wanted", "seed"), [("weeks_1_to_5", "01-05", 1), ("weeks_6_to_9", "06-09", 2)])
 def test_the_samples_are_what_the_bank_writes(tmp_path, folder, wanted, seed):
-    write(topics_of(wanted), 60, seed, 2, tmp_path)
+    write(tmp_path, exam(topics_of(wanted), 60, seed, 2))
     written = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert written.keys() == {"exam_A.html", "exam_B.html", "key.html"}
     assert written == {path.name: path.read_bytes() for path in (SAMPLES / folder).iterdir()}
@@ -511,3 +511,27 @@ def test_the_command_says_what_it_wrote(labkit, tmp_path, capsys):
     assert "½ point</span>" in key
     assert said == [f"wrote {tmp_path / name}" for name in ("exam_A.html", "key.html")]
     assert topics_of("01-09", ["04_iou", "10_capstone"]) == ("04_iou",)
+
+
+def test_no_other_exam_lies_beside_a_key(labkit, tmp_path, capsys):
+    """Of three versions one is left, and the key is of the second exam; the same exam may be written again."""
+    words = ("exam", "--topics", "04", "--minutes", 30, "--out", tmp_path)
+    assert labkit(*words, "--seed", 1, "--versions", 3) == 0 and labkit(*words, "--seed", 1, "--versions", 3) == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    capsys.readouterr()
+    assert labkit(*words, "--seed", 2) == 2
+    assert "has exam_A.html, exam_B.html, exam_C.html, key.html; --overwrite removes it" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert labkit(*words, "--seed", 2, "--overwrite") == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["exam_A.html", "key.html"]
+
+
+def test_the_system_draws_a_seed_that_nobody_tries_and_the_key_alone_says_it(labkit, tmp_path, capsys):
+    seeds = []
+    for name in ("one", "two"):
+        assert labkit("exam", "--topics", "04", "--minutes", 30, "--out", tmp_path / name) == 0
+        key, sheet = ((tmp_path / name / page).read_text() for page in ("key.html", "exam_A.html"))
+        seeds.append(re.search(r"seed (\d+)", key)[1])
+        assert seeds[-1] not in sheet + capsys.readouterr().out
+    assert seeds[0] != seeds[1] and min(map(int, seeds)) > 2**40
+    assert labkit("exam", "--topics", "04", "--minutes", 30, "--seed", seeds[0], "--out", tmp_path / "one") == 0

@@ -216,6 +216,7 @@ def test_a_hostile_account_hands_in_reads_and_renames_nothing_of_anothers(place)
     (line,) = (line for line in (ROOT / "docs/hub.md").read_text().splitlines() if "chmod -R go-rwx" in line)
     (kit / "solutions").mkdir()
     (kit / "tests").mkdir()
+    (kit / "labcourse/exam").mkdir(parents=True)
     subprocess.run(line.partition("#")[0].split(), cwd=kit, check=True)
     (own,) = [path for path in (exchange / "labkit/inbound").iterdir() if path.owner() == HONEST]
     tries = {

@@ -210,7 +210,7 @@ def test_a_new_round_or_lab_grades_everything_again_and_late_work_joins_the_roun
 def test_results_depend_on_the_settings_of_the_course(monkeypatch, settings):
     before = batch.code_digest()
     here = replace(the_course(), **settings)
-    monkeypatch.setattr("labgrader.course.course_of", lambda folder: here)
+    monkeypatch.setattr("labgrader.course.course_around", lambda folder: here)
     assert batch.code_digest() != before
 
 
@@ -218,7 +218,7 @@ def test_results_depend_on_the_hints_of_the_language_that_is_chosen(tmp_path, mo
     (tmp_path / "questions_of_mine").mkdir()
     monkeypatch.syspath_prepend(tmp_path)
     here = replace(the_course(), questions="questions_of_mine")
-    monkeypatch.setattr("labgrader.course.course_of", lambda folder: here)
+    monkeypatch.setattr("labgrader.course.course_around", lambda folder: here)
 
     def digests() -> dict[str, str]:
         found = {}

@@ -277,16 +277,29 @@ def test_the_command_runs_by_itself(course):
 
 def test_the_bundle_holds_what_students_need_and_no_model_answer(tmp_path):
     """Of this course, whose labs are as its solutions make them: the whole kit, no solution, no test, no rest."""
-    names = bundle(ROOT, tmp_path / "course.zip")
+    names, left_out, _ = bundle(ROOT, tmp_path / "course.zip")
+    assert left_out == {}
     assert {name.split("/")[0] for name in names} >= {"lessons", "labs", *course_here().kit, "Makefile", "README.md"}
     command = ["git", "ls-files", *course_here().kit]
     kit = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-    assert len(kit) > 100 and not set(kit) - set(names)
+    withheld = ("labcourse/exam/", "labcourse/templates/")
+    assert len(kit) > 100 and {name for name in kit if not name.startswith(withheld)} <= set(names)
     with zipfile.ZipFile(tmp_path / "course.zip") as archive:
         start = archive.read("course/README.md").decode()
     assert start.startswith("# Start here")
     assert set(re.findall(r"\]\((?!https?:)([^)]+)\)", start)) <= {*names}
-    kept = ("solutions", "tests", "docs/grading.md", "nbgrader_config.py", "grades", "submitted", "gradebook", ".git")
+    kept = (
+        "solutions",
+        "tests",
+        "docs/grading.md",
+        "docs/exams",
+        *withheld,
+        "nbgrader_config.py",
+        "grades",
+        "submitted",
+        "gradebook",
+        ".git",
+    )
     assert not [name for name in names if name.startswith(kept) or "__pycache__" in name or "checkpoint" in name]
     with zipfile.ZipFile(tmp_path / "course.zip") as archive:
         archive.extractall(tmp_path)
@@ -314,7 +327,11 @@ def test_a_lab_in_the_bundle_runs(tmp_path):
 
 
 def test_a_weeks_bundle_holds_its_labs_their_lessons_and_nothing_else_of_the_course(tmp_path):
-    names = bundle(ROOT, tmp_path / "week.zip", ["01_labels", "04_iou"])
+    names = bundle(ROOT, tmp_path / "week.zip", ["01_labels", "04_iou"]).names
+    asked_of = {name.split("/")[2][:3] for name in names if re.match(r"labcourse/questions/t\d", name)}
+    assert asked_of == {"t01", "t02", "t03", "t04"} and not [
+        name for name in names if name.startswith("labcourse/exam")
+    ]
     material = [name for name in names if name.startswith(("lessons/", "labs/", "docs/"))]
     assert {re.search(r"\d\d_", name)[0] for name in material} == {"01_", "04_"}
     assert {"labs/04_iou/04_iou.ipynb", "lessons/04_iou_edges.ipynb", "lessons/schematics/04_counts.svg"} <= {*material}
@@ -339,7 +356,45 @@ def test_a_week_has_the_topics_of_the_syllabus(monkeypatch):
 def test_the_same_course_gives_the_same_bundle(course, tmp_path):
     release(course)
     twice = [(bundle(course, tmp_path / "course.zip"), (tmp_path / "course.zip").read_bytes()) for _ in range(2)]
-    assert twice[0] == twice[1] and "labs/90_one/90_one.ipynb" in twice[0][0]
+    assert twice[0] == twice[1] and "labs/90_one/90_one.ipynb" in twice[0][0].names and not twice[0][0].tracked
+
+
+def test_a_bundle_takes_what_git_tracks_and_no_link_solution_or_key_and_says_so(course, tmp_path, labkit, capsys):
+    """Links lead out of the tree, to what stays with the instructor, and to what is in the bundle anyway."""
+    (course / "docs").mkdir()
+    (course / "docs/guide.md").write_text("A guide.")
+    (course / "docs/key.html").write_text("<h1>Key, seed 1</h1><p>9 points. Not for students.</p>")
+    (course / "docs/notes.md").write_text("**Rubric (3 points).** one for the union")
+    (course / "docs/hosts.md").symlink_to("/etc/hosts")
+    (course / "docs/solved").symlink_to("../solutions/90_one", target_is_directory=True)
+    (course / "docs/again.md").symlink_to("guide.md")
+    (course / "data").mkdir()
+    (course / "data/table.md").write_text("1")
+    (course / "labkit").symlink_to("data", target_is_directory=True)
+    nbformat.write(solution_notebook(), course / "lessons/91_two.ipynb")
+    shown = solution_notebook(SOLUTION.replace("### BEGIN SOLUTION", "").replace("### END SOLUTION", ""))
+    nbformat.write(shown, course / "lessons/92_three.ipynb")
+    nbformat.write(new_notebook(cells=[new_markdown_cell("# Read")]), course / "lessons/93_four.ipynb")
+    (course / "lessons/90_one.ipynb").unlink()
+    release(course)
+    subprocess.run(["git", "init", "-q"], cwd=course, check=True)
+    subprocess.run(["git", "add", "-A"], cwd=course, check=True)
+    nbformat.write(new_notebook(cells=[new_markdown_cell("# A draft")]), course / "lessons/94_draft.ipynb")
+    release(course)
+    assert labkit("release", "--course", course, "--bundle", tmp_path / "x.zip") == 0
+    lines = capsys.readouterr().out.splitlines()
+    said = dict(line.removeprefix("left out ").split(": ") for line in lines if line.startswith("left out "))
+    links = dict.fromkeys(("docs/again.md", "docs/hosts.md", "docs/solved", "labkit"), "a link")
+    assert {name: why for name, why in said.items() if why == "a link"} == links
+    assert said["docs/key.html"] == "a key, by its marks" and said["docs/notes.md"] == "a rubric, by its marks"
+    assert said["lessons/91_two.ipynb"] == "a solution, by its marks"
+    assert said["lessons/92_three.ipynb"] == "a notebook with solution cells"
+    assert said["lessons/94_draft.ipynb"] == "git does not track it"
+    with zipfile.ZipFile(tmp_path / "x.zip") as archive:
+        names = {name.removeprefix("x/") for name in archive.namelist()}
+        texts = [archive.read(name) for name in archive.namelist()]
+    assert {"docs/guide.md", "lessons/93_four.ipynb", "labs/90_one/90_one.ipynb"} <= names and not names & said.keys()
+    assert not [text for text in texts if b"2 * x" in text or b"localhost" in text]
 
 
 def test_a_published_course_releases_badges_which_its_bundle_does_not_have(course, tmp_path, monkeypatch):

@@ -1,0 +1,17 @@
+"""`labkit trust`: a course of one's own, whose code may run."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def trust(
+    folder: Annotated[
+        Path, typer.Argument(help="A course's folder, with a pyproject.toml; this one if left out.")
+    ] = Path("."),
+) -> None:
+    """Trust another course than the installed one: its questions, which are code, run for commands in its folder."""
+    from labgrader.trust import trust as trust_folder
+
+    typer.echo(f"{folder.resolve()} is trusted from now on; {trust_folder(folder)} lists such folders")
