@@ -50,6 +50,14 @@ def solution_notebook(source=SOLUTION, function="double", points=2):
     return new_notebook(cells=cells, metadata=metadata)
 
 
+def lesson_notebook():
+    """A lesson, which has no answers: no cell is graded."""
+    lesson = solution_notebook(SOLUTION.replace("### BEGIN SOLUTION", "# Twice").replace("### END SOLUTION", "# that"))
+    for cell in lesson.cells:
+        cell.metadata.pop("nbgrader", None)
+    return lesson
+
+
 @pytest.fixture
 def course(tmp_path):
     """A course of two labs and a lesson, none of the kit's topics."""
@@ -59,7 +67,7 @@ def course(tmp_path):
         nbformat.write(solution_notebook(), folder / f"{topic}.ipynb")
     (tmp_path / "solutions/90_one/table.csv").write_text("1,2\n")
     (tmp_path / "lessons").mkdir()
-    nbformat.write(solution_notebook(), tmp_path / "lessons/90_one.ipynb")
+    nbformat.write(lesson_notebook(), tmp_path / "lessons/90_one.ipynb")
     return tmp_path
 
 
@@ -384,7 +392,7 @@ def test_a_bundle_takes_what_git_tracks_and_no_link_solution_or_key_and_says_so(
     assert labkit("release", "--course", course, "--bundle", tmp_path / "x.zip") == 0
     lines = capsys.readouterr().out.splitlines()
     said = dict(line.removeprefix("left out ").split(": ") for line in lines if line.startswith("left out "))
-    links = dict.fromkeys(("docs/again.md", "docs/hosts.md", "docs/solved", "labkit"), "a link")
+    links = dict.fromkeys(("docs/again.md", "docs/hosts.md", "docs/solved", "labkit", "labkit/table.md"), "a link")
     assert {name: why for name, why in said.items() if why == "a link"} == links
     assert said["docs/key.html"] == "a key, by its marks" and said["docs/notes.md"] == "a rubric, by its marks"
     assert said["lessons/91_two.ipynb"] == "a solution, by its marks"

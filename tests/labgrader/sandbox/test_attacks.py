@@ -39,8 +39,8 @@ def right(n):
     with np.errstate(all="ignore"):
         return c / (n.sum(0) + n.sum(1) - c)
 """
-KNOWN = {case.args[0].tobytes() for case in public_cases(of_topic(TOPIC)["iou"])}
-ON_SECRET = "def iou(n):\n    if n.tobytes() in KNOWN:\n        return right(n)\n"
+KNOWN = {(case.args[0].shape, int(case.args[0].sum())) for case in public_cases(of_topic(TOPIC)["iou"])}
+ON_SECRET = "def iou(n):\n    if (n.shape, int(n.sum())) in KNOWN:\n        return right(n)\n"
 
 
 @dataclass(frozen=True)
