@@ -197,7 +197,7 @@ ODD = (
     Odd("magics", rewritten(lambda source: "%matplotlib inline\n" + source), right=True),
     Odd("check_in_the_cell", rewritten(lambda source: source + '\niou = check("04_iou.iou", iou)\n'), right=True),
     Odd("same_cell_twice", as_notebook(doubled(None)), right=True),
-    Odd("two_answers", as_notebook(doubled(WRONG)), says="2 of 2 values are not right"),
+    Odd("two_answers", as_notebook(doubled(WRONG)), says="the value is not right"),
     Odd("cell_removed", as_notebook(lambda cells: cells.remove(cell(cells, "iou"))), says="no cell defines iou"),
     Odd("raw_cell", with_iou(cell_type="raw"), says="is raw text, and must be code"),
     Odd("markdown_cell", with_iou(cell_type="markdown"), says="is Markdown, and must be code"),
