@@ -175,10 +175,12 @@ def grad_of_counted_pixels_alone(z, y, s):
     return cross_entropy_grad(z, y, s)[y != 255]
 
 
-@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
-def grad_that_overflows(z, y, s):
-    p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
-    return (p - target(z, y, s)) * (y != 255)[..., None]
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?", ignored=("chosen", "multiplied"))
+def grad_that_overflows(z, y, s, ignored):
+    """Where a label is 255, 0 is chosen, or what came is multiplied by 0, and NaN stays NaN."""
+    counted = (y != 255)[..., None]
+    grad = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True) - target(z, y, s)
+    return np.where(counted, grad, 0.0) if ignored == "chosen" else grad * counted
 
 
 @wrong("Each pixel has probabilities of its own: how many numbers does your sum add up?")
