@@ -25,7 +25,8 @@ def _turn(axis, angle):
     """The rotation by an angle round an axis (Rodrigues)."""
     x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
     S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * S @ S
+    R = np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * S @ S
+    return np.clip(R, -1.0, 1.0)  # rounding may lead out by a hair
 
 
 def _one_of_two(q):
