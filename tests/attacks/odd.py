@@ -136,7 +136,7 @@ ODD = (
     Odd("linked_folder", linked("folder"), "the folder 04_iou is a symbolic link"),
     Odd("linked_student", linked("student"), "the student's folder is a symbolic link"),
     Odd("pipe", in_its_place(FILE, lambda path, text: os.mkfifo(path)), "04_iou.ipynb is no file"),
-    Odd("two_hundred_megabytes", in_its_place(FILE, sparse), "it is larger than 20 MB"),
+    Odd("two_hundred_megabytes", in_its_place(FILE, sparse), "it is larger than 100 MB"),
     Odd("other_name", in_its_place("iou (1).ipynb", Path.write_text), right=True),  # the lab's own key tells what it is
     Odd(
         "loose.ipynb",
@@ -159,11 +159,15 @@ ODD = (
             "ada;=1+1",
         )
     ),
-    Odd("nothing", as_bytes(b""), "it is not JSON, so not a notebook"),
-    Odd("half", as_bytes(b'{"cells": [{"cell_type": "code", "sou'), "it is not JSON, so not a notebook"),
+    Odd("nothing", as_bytes(b""), "it is empty"),
+    Odd("half", as_bytes(b'{"cells": [{"cell_type": "code", "sou'), "it ends in the middle"),
     Odd("nested", as_bytes(b"[" * 200_000), "it is not JSON, so not a notebook"),
     Odd("long_number", as_bytes(b"1" * 1_000_000), "it is not JSON, so not a notebook"),
-    Odd("utf16", lambda folder, right: put(folder, json.dumps(right).encode("utf-16")), "it is not UTF-8 text"),
+    Odd(
+        "utf16",
+        lambda folder, right: put(folder, json.dumps(right).encode("utf-16")),
+        "it is no notebook but UTF-16 text",
+    ),
     Odd(
         "many_empty_cells",
         as_bytes(b'{"cells": [' + b"[]," * 6_000_000 + b"1]}"),
@@ -174,7 +178,7 @@ ODD = (
     Odd(
         "format_3",
         as_bytes(b'{"nbformat": 3, "worksheets": [{"cells": []}]}'),
-        "it is not a notebook of format 4: there is no list of cells",
+        "it is a notebook of format 3",
     ),
     Odd("other_lab", as_notebook(lambda cells: []), "it is not this lab: no cell has a grade id of 04_iou"),
     Odd(

@@ -200,9 +200,9 @@ def test_what_instructors_should_look_at_is_flagged(hostile_class):
         ("forged_length", "channel"),
         ("kit_by_import", "labkit"),
         ("another_library", "sklearn"),
-        ("two_answers", "2 different cells"),
+        ("two_answers", "both define it"),
     ]:
-        flags = {result.question: result.flag for result in records[name].results}
+        flags = {result.question: result.flag or result.note for result in records[name].results}
         assert word in flags["iou"], name
     assert not any(result.flag for result in records["honest"].results)
 
