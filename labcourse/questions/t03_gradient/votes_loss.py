@@ -56,6 +56,7 @@ QUESTION = Question(
         (np.ones((2, 3, 2)), np.array([[0, 255, 0], [0, 0, 255]], np.uint8), 1.0),  # no thing at all
         (np.zeros((1, 3, 2)), np.array([[3, 3, 3]], np.uint8), 2.0),
         (np.array([[[-0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
+        (np.array([[[0.003, -0.004]]]), np.array([[1]], np.uint8), 0.0104),
     ),
     random_cases=10,
     points=3,
