@@ -32,9 +32,13 @@ def translated(question: Question, module: Path, language: str) -> Question:
     said = tomllib.loads(path.read_text(encoding="utf-8"))
     hints, statements = said.pop("hints", {}), said.pop("statements", {})
     wrong = {one.answer.__name__ for one in question.misconceptions}
-    unknown = said.keys() | hints.keys() - wrong | statements.keys() - {p.holds.__name__ for p in question.properties}
-    if unknown:
-        raise ValueError(f"{path}: expected lines named like functions of {module.name}, see {min(unknown)}")
+    properties = {one.holds.__name__ for one in question.properties}
+    for table, lines, names in (("hints", hints, wrong), ("statements", statements, properties)):
+        if unknown := lines.keys() - names:
+            expected = f"expected functions of {module.name} ({', '.join(sorted(names)) or 'there are none'})"
+            raise ValueError(f"{path}: {table}: {expected}, got {min(unknown)}")
+    if said:
+        raise ValueError(f"{path}: expected the tables hints and statements, got {min(said)}")
     return replace(
         question,
         misconceptions=[replace(one, hint=hints.get(one.answer.__name__, one.hint)) for one in question.misconceptions],

@@ -181,10 +181,26 @@ def test_a_cell_that_python_cannot_read_is_said_and_not_taken_for_the_kits_funct
     assert checking.broken_cell(QUESTION) is None
 
 
+def test_a_first_answer_that_is_not_python_is_said_by_its_check(monkeypatch, capsys):
+    """Nothing has the answer's name, so that the check's line would be a NameError."""
+    space, history = {}, ["def share(n):\n    return n.sum("]
+    shell = SimpleNamespace(history_manager=SimpleNamespace(input_hist_raw=history), user_ns=space)
+    monkeypatch.setattr(checking, "jupyter", lambda: shell)
+    monkeypatch.setattr(checking.Page, "show", lambda page, shown: print(shown))
+    line = "share = check('00_test.share', share)"
+    checking.note_cell(SimpleNamespace(store_history=True, raw_cell=line))
+    exec(line, space | {"check": check})
+    assert capsys.readouterr().out.startswith("✘ share: its cell is not Python: look at line 2")
+    space.clear()
+    history[:] = ["def share(n):\n    return n"]  # one that is Python, and has not run
+    checking.note_cell(SimpleNamespace(store_history=True, raw_cell=line))
+    assert not space
+
+
 def test_an_ipython_that_tells_no_cell_ids_is_no_hindrance(monkeypatch):
     """IPython 7, which Colab has."""
     before = dict(checking.cell_of_execution)
-    checking.note_cell(SimpleNamespace(store_history=True))
+    checking.note_cell(SimpleNamespace(store_history=True, raw_cell="1 + 1"))
     assert checking.cell_of_execution == before
 
 
