@@ -215,7 +215,7 @@ def as_expected(expected: object, got: object) -> object:
 
 def number_of_one(expected: object, got: object) -> object:
     """The number in an array of shape (1,), where a number is expected; an empty list as the empty array that is."""
-    if isinstance(got, Listed | tuple) and np.shape(got) == (0,) and not np.size(expected):
+    if isinstance(got, Listed | tuple) and len(got) == 0 and not np.size(expected):
         return np.empty_like(expected)
     alone = isinstance(got, np.ndarray) and got.shape == (1,) and np.shape(expected) == ()
     return got[0] if alone else got
