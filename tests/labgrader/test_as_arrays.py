@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labgrader.as_arrays import giving_arrays, in_form
-from labgrader.comparison import Case, compare, plain
+from labgrader.comparison import Case, as_numpy, compare
 from labgrader.question import Question
 from labgrader.run.channel import decode
 from labgrader.run.process import encode
@@ -68,4 +68,4 @@ def test_of_numbers_in_a_list_no_dtype_is_asked_and_an_empty_list_is_an_empty_ar
         == compare(blob, expected, decode(encode(np.ones((1, 2))))).kind
     )
     for empty in ([], ()):
-        assert compare(blob, np.zeros((0, 3), np.float32), decode(encode(plain(empty)))) is None
+        assert compare(blob, np.zeros((0, 3), np.float32), decode(encode(as_numpy(empty)))) is None
