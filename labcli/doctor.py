@@ -24,6 +24,8 @@ USERS = {
     "instructor": "`labkit release` and `labkit grade` need",
     "stacks": "`labkit export` and the engines of topic 09 need",
     "cluster": "`--dask` needs",
+    "exr": "depth as OpenEXR needs",
+    "heic": "photographs of an iPhone, HEIC, need",
     "test": "`make test` needs",
 }
 

@@ -95,6 +95,7 @@ class Settings:
         """
         from labcli.poses import read_pose
         from labkit.node.messages import DEFAULT_TOPICS
+        from labkit.support.validation import require
 
         topics = topics or DEFAULT_TOPICS
         for name, _, given in (item.partition("=") for item in self.topic or ()):

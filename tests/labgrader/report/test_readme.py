@@ -88,5 +88,5 @@ def test_grading_elsewhere_says_in_one_line_that_it_needs_linux(monkeypatch, lab
     monkeypatch.setattr(sys, "platform", "darwin")
     assert labkit("grade", "04_iou") == 2
     assert capsys.readouterr().err == (
-        "labkit: labkit grade needs Linux, this is darwin: grade on Linux, in WSL or in a container\n"
+        "labkit: labkit grade needs Linux, and this is darwin: use Linux, WSL or a container (docs/install.md)\n"
     )
