@@ -235,7 +235,7 @@ def test_the_counterexample_comes_at_once_and_the_marked_line_joins_it(tmp_path)
     cells = [
         "import numpy as np\nfrom labkit import check\nfrom labgrader import check as checking\n"
         "from labgrader.run import run\nrun.LOOK_S = 200.0\n"
-        "checking.LIMITS = answer.Limits(case_s=200.0, question_s=200.0)\n"
+        "checking.LIMITS = run.Limits(case_s=200.0, question_s=200.0)\n"
         "seen, show = [], checking.Page.show\n"
         "checking.Page.show = lambda page, shown: (seen.append(repr(shown)), show(page, shown))",
         "def iou(n):\n    i = np.diag(n)\n    return i / (n.sum(0) - n.sum(1) - i)",
