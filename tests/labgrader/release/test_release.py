@@ -286,7 +286,7 @@ def test_the_command_runs_by_itself(course):
 def test_the_bundle_holds_what_students_need_and_no_model_answer(tmp_path):
     """Of this course, whose labs are as its solutions make them: the whole kit, no solution, no test, no rest."""
     names, left_out, _ = bundle(ROOT, tmp_path / "course.zip")
-    assert left_out == {}
+    assert not [name for name in left_out if not name.endswith("_attempts.json")]  # of a run of the notebooks
     assert {name.split("/")[0] for name in names} >= {"lessons", "labs", *course_here().kit, "Makefile", "README.md"}
     command = ["git", "ls-files", *course_here().kit]
     kit = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
