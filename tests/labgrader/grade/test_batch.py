@@ -527,11 +527,11 @@ def test_an_answer_out_of_the_kits_to_a_later_task_is_for_a_person_to_judge(grad
 
 
 def table(name: str, otherwise: str) -> str:
-    """An answer that knows the public cases by heart."""
-    known = {case.args[0].tobytes(): np.asarray(case.expected).tolist() for case in public_cases(of_topic(TOPIC)[name])}
-    known = repr(known).replace("nan", "float('nan')")
-    line = f"np.array({name}_known[n.tobytes()]) if n.tobytes() in {name}_known else {otherwise}"
-    return f"{name}_known = {known}\ndef {name}(n):\n    return {line}\n"
+    """An answer that knows the public cases, by shape and sum: their numbers would not fit into a notebook."""
+    cases = [(case.args[0], np.asarray(case.expected).tolist()) for case in public_cases(of_topic(TOPIC)[name])]
+    known = repr({(n.shape, int(n.sum())): expected for n, expected in cases}).replace("nan", "float('nan')")
+    line = f"np.array({name}_known[key]) if key in {name}_known else {otherwise}"
+    return f"{name}_known = {known}\ndef {name}(n):\n    key = n.shape, int(n.sum())\n    return {line}\n"
 
 
 def test_a_later_task_that_is_wrong_in_secret_alone_is_for_a_person_to_judge_too(graded):
