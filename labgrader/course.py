@@ -30,7 +30,7 @@ from pathlib import Path
 
 from labgrader.languages import CHOSEN, ENGLISH, translated
 from labgrader.question import Question
-from labgrader.trust import is_of_another_account, is_trusted, refusal
+from labgrader.trust import is_of_another_account, is_trusted, keep_trusted, refusal
 
 FILE = "pyproject.toml"
 MOST_BYTES = 1 << 20  # of such a file
@@ -119,7 +119,7 @@ def course_around(folder: str) -> Course:
         return read(own)
     if is_trusted(path.parent) or is_imported(str(questions_of(path)), path.parent):
         return read(path)
-    raise ValueError(refusal(path, questions_of(path), read(own).command if own else "labkit"))
+    raise ValueError(refusal(path, questions_of(path), read(own).command if own else "COMMAND"))
 
 
 def read(path: Path) -> Course:
@@ -260,3 +260,14 @@ def files_of(package: str, pattern: str = "*.py") -> Iterator[tuple[str, Path]]:
     for folder in folders:
         for path in sorted(folder.rglob(pattern)):
             yield f"{package.replace('.', '/')}/{path.relative_to(folder).as_posix()}", path
+
+
+def trust(folder: Path) -> Path:
+    """Trust the course of a folder from now on; returns the file that says so.
+
+    Raises ValueError for a folder without a course.
+    """
+    folder = Path(folder).resolve()
+    if not settings_in(folder) or not str(folder).isprintable():
+        raise ValueError(f"folder: expected a course, with a {FILE} that has [tool.labgrader], got {folder}")
+    return keep_trusted(folder)

@@ -30,16 +30,8 @@ def is_trusted(folder: Path) -> bool:
     return str(folder.resolve()) in trusted()
 
 
-def trust(folder: Path) -> Path:
-    """Trust the course of a folder from now on; returns the file that says so.
-
-    Raises ValueError for a folder without a course.
-    """
-    from labgrader.course import FILE, settings_in
-
-    folder = Path(folder).resolve()
-    if not settings_in(folder) or not str(folder).isprintable():
-        raise ValueError(f"folder: expected a course, with a {FILE} that has [tool.labgrader], got {folder}")
+def keep_trusted(folder: Path) -> Path:
+    """Note that the course of a folder is trusted from now on; returns the file that says so."""
     if not is_trusted(folder):
         write_atomically(file(), "\n".join([*trusted(), str(folder), ""]).encode())
     return file()

@@ -12,6 +12,6 @@ def trust(
     ] = Path("."),
 ) -> None:
     """Trust another course than the installed one: its questions, which are code, run for commands in its folder."""
-    from labgrader.trust import trust as trust_folder
+    from labgrader.course import trust as trust_folder
 
     typer.echo(f"{folder.resolve()} is trusted from now on; {trust_folder(folder)} lists such folders")
