@@ -23,8 +23,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from labgrader.grade.settings import fault_of_fields, read_blocks
 from labgrader.handin.roster import ids_of, keys_of, read_roster
+from labgrader.settings import fault_of_fields, read_blocks
 from labgrader.support import counted
 
 DAY_S = 86400.0

@@ -21,9 +21,9 @@ from pathlib import Path
 
 from labgrader.course import topics
 from labgrader.grade.deadlines import read_deadline
-from labgrader.grade.settings import fault_of_fields, read_blocks
 from labgrader.handin.collect import marked_late
 from labgrader.handin.roster import identity, read_roster
+from labgrader.settings import fault_of_fields, read_blocks
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from labgrader.grade.settings import fault_of_fields, read_blocks
 from labgrader.handin.roster import ids_of, read_roster
+from labgrader.settings import fault_of_fields, read_blocks
 
 OTHERS, SEVERAL = "others", "several"
 COPY = re.compile(r"(?P<name>.+?)(?: ?\((?P<saved>\d+)\)|-(?P<uploaded>\d+))?\.ipynb")  # saved, or handed in, again

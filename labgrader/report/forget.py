@@ -21,11 +21,11 @@ from nbgrader.api import MissingEntry
 from labgrader.course import course as course_here
 from labgrader.grade.gradebook import opened
 from labgrader.grade.overview import COMMENTS_FILE, read_comments
-from labgrader.grade.settings import FILE as SETTINGS
-from labgrader.grade.settings import read_blocks
 from labgrader.handin.collect import student_and_notebook
 from labgrader.handin.roster import FILE as ROSTER
 from labgrader.handin.roster import in_one_line, keys_of, person_of, read_roster
+from labgrader.settings import FILE as SETTINGS
+from labgrader.settings import read_blocks
 from labgrader.support import PRIVATE, counted, git, write_atomically
 
 EXTENSION = re.compile(r"(?ms)^[ \t]*\[\[[ \t]*extension[ \t]*\]\].*?(?=^[ \t]*\[|\Z)")

@@ -22,12 +22,12 @@ from labgrader.grade.changes import CHANGES, changed, read_changes
 from labgrader.grade.deadlines import Lateness, read_deadline
 from labgrader.grade.overview import COMMENTS_FILE, read_comments
 from labgrader.grade.policy import read_policy
-from labgrader.grade.settings import FILE
 from labgrader.grade.totals import OFF
 from labgrader.handin.reading import read_lab, read_submission
 from labgrader.handin.several import read_picks
 from labgrader.report.outputs import gradescope
 from labgrader.sandbox.sandbox import Limits
+from labgrader.settings import FILE
 from labgrader.support import write_atomically
 
 SETUP = """#!/bin/sh

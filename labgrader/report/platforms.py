@@ -20,13 +20,13 @@ from labgrader.grade.batch import read_record, record_path
 from labgrader.grade.changes import changed, read_changes
 from labgrader.grade.deadlines import read_deadline
 from labgrader.grade.gradebook import register
-from labgrader.grade.settings import fault_of_fields, read_blocks
 from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
 from labgrader.handin.collect import extracted, read_name, student_and_notebook
 from labgrader.handin.reading import LEFT_OUT, Lab, read_lab
 from labgrader.handin.roster import FILE as ROSTER
 from labgrader.handin.roster import Person, absent_of, keys_of, person_of, read_roster
 from labgrader.report.outputs import NOTHING, harmless
+from labgrader.settings import fault_of_fields, read_blocks
 from labgrader.support import write_atomically
 
 CANVAS = ("SIS User ID", "SIS Login ID", "Section")  # columns beside name and ID
