@@ -42,7 +42,7 @@ class Intrinsics:
         return self.lens.coefficients if self.lens else ()
 
 
-def matrix_of(numbers: Sequence[float] | None) -> Float[np.ndarray, "3 3"] | None:
+def matrix_of(numbers: Sequence[int | float] | None) -> Float[np.ndarray, "3 3"] | None:
     """K of fx, fy, cx, cy, or of a matrix row by row, 3x3, 3x4 or 4x4 with nothing else in it; None of others.
 
     >>> matrix_of([8, 0, 4, 0, 0, 9, 3, 0, 0, 0, 1, 0, 0, 0, 0, 1]).tolist()

@@ -32,8 +32,8 @@ ROOMS = {
         "notices targets > pipeline sim > node"
     ),
     "labgrader": (
-        "support question packages > comparison languages trust > as_arrays > course > settings > program > reply > run "
-        "> sandbox handin > grade > report > check > file_check grade_course release"
+        "support question packages > comparison languages trust > as_arrays > course > settings > program > reply "
+        "> run > sandbox handin > grade > report > check > file_check grade_course release"
     ),
 }
 BELOW = {

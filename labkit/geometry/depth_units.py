@@ -95,7 +95,7 @@ def _depth_of(unit: float, middle: float) -> str:
 def fitting_units(middle: float) -> list[float]:
     """The usual units, metres, of which `middle` make the depth of a table.
 
-    >>> fitting_units(7800), fitting_units(2600)
+    >>> fitting_units(7800.0), fitting_units(2600.0)
     ([0.0001], [0.001, 0.0001])
     """
     return [unit for unit in UNITS if LIKELY[0] <= unit * middle <= LIKELY[1]]

@@ -12,7 +12,7 @@ from labros import ros
 def asked(monkeypatch):
     """What `run` would have been asked to do, without any ROS."""
     asked = []
-    monkeypatch.setattr(ros, "require", lambda version: None)
+    monkeypatch.setattr(ros, "check_ros_installed", lambda version: None)
     monkeypatch.setattr(ros, "run", lambda build, **options: asked.append((build(Bus(), None), options)))
     return asked
 
