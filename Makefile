@@ -19,7 +19,7 @@
 #   make evidence write docs/evidence.md, README's promises and what shows them, from results that are there
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
 #   make everywhere  the same on two Debians, with Python 3.11 and 3.13; what both make of fixed seeds is compared
-#   make colab   lessons and labs with Google Colab's versions and the wheel alone; a stand-in is no Colab
+#   make colab   lessons and labs with Google Colab's versions and the wheel alone; a mock, not Colab itself
 #   make clean   remove what can be made again in seconds; environments and data/ stay
 # make PYTHON=/path/to/python3.12 chooses an interpreter, make TORCH_INDEX=URL one of PyTorch's builds (docs/install.md).
 
@@ -55,7 +55,7 @@ lab: export JUPYTER_CONFIG_PATH := $(CURDIR)/labcourse/jupyter
 lab: export JUPYTER_PATH := $(JUPYTER_CONFIG_PATH)
 lab: $(or $(wildcard .venv/installed),.venv/installed-lab)
 	@if [ ! -e .venv/installed ] && [ ! -e .venv/torch ]; then
-	    echo "PyTorch comes in the background, and this terminal says when it is there. Topics 01 and 04 do without it."
+	    echo "PyTorch comes in the background, and this terminal says when it is there. Topics 01 and 04 do not need it."
 	    (
 	        pip="$(BIN)/python -m pip install --disable-pip-version-check --progress-bar off"
 	        if { [ -z "$(TORCH_INDEX)" ] || $$pip $(TORCH_BUILD); } > .venv/torch.log 2>&1 &&
@@ -136,7 +136,7 @@ WORKERS ?= 2
 EPOCHS ?=
 DEVICE ?= auto
 
-# Each step goes on where it was stopped, and does nothing if it was finished; the last ones replace the shipped weights.
+# Each step resumes where it was stopped, and does nothing if it was finished; the last ones replace the shipped weights.
 train: .venv/installed
 	$(BIN)/python -m data_gen data/train --scenes $(TRAIN_SCENES) --first-seed 0 --config train --size $(SIZE) --workers $(WORKERS)
 	$(BIN)/python -m data_gen data/val --scenes $(VAL_SCENES) --first-seed 800000 --config test --size $(SIZE) --workers $(WORKERS)

@@ -23,7 +23,7 @@ def main(
     depth_noise: Annotated[bool, typer.Option(help="spoil depth as a real sensor does")] = False,
     verify: Annotated[bool, typer.Option("--verify", help="write nothing, check the files of OUT")] = False,
 ) -> None:
-    """Render random scenes into OUT; interrupted, the same command goes on where it was."""
+    """Render random scenes into OUT; interrupted, the same command resumes."""
     import data_gen
 
     if verify:

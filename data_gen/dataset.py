@@ -1,4 +1,4 @@
-"""Datasets on disk in the BOP benchmark's layout, written so that a killed run goes on where it was.
+"""Datasets on disk in the BOP benchmark's layout, written so that a killed run can be resumed.
 
     OUT/rgb/000000.png  depth/000000.png (16 bit)  labels/000000.png  instances/000000.png
     OUT/scene_camera.json   cam_K, cam_R_w2c, cam_t_w2c (millimetres), depth_scale (millimetres for one unit of depth),

@@ -62,7 +62,7 @@ def make_table(
     """Try every scene and write the rows to `out`, scene by scene in the order of `seeds`; returns them.
 
     kind: the dataclass of a row, with a field `seed`. trials_of_scene: seed -> its rows. What is finished is kept in
-    OUT.unfinished: stopped with Ctrl-C, the same call goes on where it was. Raises ValueError if that file is of other
+    OUT.unfinished: stopped with Ctrl-C, the same call resumes. Raises ValueError if that file is of other
     scenes.
     """
     unfinished = Path(f"{out}.unfinished")

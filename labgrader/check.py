@@ -32,7 +32,7 @@ from labgrader.run.process import MOST_PRINTED
 from labgrader.run.run import Budget, Limits, Run, Start, public_cases
 
 LIMITS = Limits()  # the grader's, so that a tick here is a tick there
-LOOKING = "Looking for the place in your program: a moment ..."
+LOOKING = "Looking for the place in your program ..."
 COLOURS = {"✔": "#2e7d32", "✘": "#c62828", "○": "#b26a00"}
 
 
@@ -87,7 +87,7 @@ def check(name: str, answer: object) -> Callable:
     if answer is question.reference:
         lines = (
             f"{question.function}: this is the kit's function, not yours",
-            "The last check put it in the place of your answer: run the cell of your answer again, then this one.",
+            "The last check put it in place of your answer: run the cell of your answer again, then this one.",
         )
         return conclude(Shown("○", *lines), question.reference, passed=False)
     if not callable(answer):
@@ -95,9 +95,9 @@ def check(name: str, answer: object) -> Callable:
         return conclude(shown, question.reference, passed=False)
     notes = ()
     if jupyter() is not None and not is_of_the_notebook(question, answer):
-        notes += (f"This is another function than {question.function} of your notebook, which will be graded.",)
+        notes += (f"This is not the {question.function} of your notebook, which is the one that will be graded.",)
     if reason := why_its_file_is_not_graded():
-        notes += (f"The grader would not take this notebook as it is saved: {reason}. Mend that, and save it.",)
+        notes += (f"The grader would not take this notebook as it is saved: {reason}. Fix that, and save it.",)
     page = Page()
 
     def meanwhile(verdict: Verdict, printed: str) -> None:
@@ -106,7 +106,7 @@ def check(name: str, answer: object) -> Callable:
 
     verdict, printed = reply_to(question, program_of(question, answer), meanwhile)
     if verdict.problem is not None and verdict.problem.kind == "unanswered":
-        notes += ("The kit's function takes its place below.",)
+        notes += ("The kit's function stands in for it below.",)
     shown = describe(question, verdict, printed, notes)
     if not verdict.passed:
         return conclude(shown, question.reference, False, page)
@@ -154,7 +154,7 @@ def broken_cell(question: Question) -> Shown | None:
     number = re.search(r"line (\d+)", cell.problem)
     n = int(number[1]) if number else 0
     lines = [f"line {n}:  {line.strip()}" for line in last.splitlines()[n - 1 : n]] if n else []
-    again = "Nothing of it has run. Mend it, run it again, then this cell."
+    again = "None of it has run. Fix it, run it again, then this cell."
     return Shown("✘", f"{question.function}: {cell.problem}", *lines, again)
 
 
@@ -285,13 +285,13 @@ def describe(
     said += ["..."] if len(printed) > MOST_PRINTED or printed.count("\n") > 3 else []
     if problem is None:
         by_hand = len(question.by_hand)
-        tried = ([f"{by_hand} by hand"] if by_hand else []) + [f"{question.random_cases} random"]
-        return Shown("✔", f"{name} is right", f"Cases tried: {', '.join(tried)}.", *said, *notes)
+        tried = f"{by_hand} hand-made and {question.random_cases}" if by_hand else f"{question.random_cases}"
+        return Shown("✔", f"{name} is right", f"Passed {tried} random cases.", *said, *notes)
     if problem.kind == "unanswered":
         return Shown("○", f"{name}: not answered yet", *notes)
     if problem.kind == "refused":
         refused = f"{name} cannot be graded: {problem.says}"
-        return Shown("✘", refused, "So the grader would not take it.", *notes)
+        return Shown("✘", refused, "The grader would not take it either.", *notes)
     lines: list[str | Marked] = [f"line {number}:  {text}" for number, text in problem.lines]
     lines += [f"In {verdict.where}:", *(f"    {line}" for line in verdict.shown)] if verdict.shown else []
     sentence = None if looking else verdict.sentence

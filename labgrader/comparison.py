@@ -298,8 +298,9 @@ def wrong_values(question: Question, expected: object, got: object) -> Problem |
     if not count:
         return None
     if size != sum(np.size(part) for part in parts(got)):  # of the canonical form, which a student does not see
-        return Problem("values", "some values are not right")
-    return Problem("values", f"{count} of {size} values are not right" if size > 1 else "the value is not right")
+        return Problem("values", "some values are wrong")
+    verb = "is" if count == 1 else "are"
+    return Problem("values", f"{count} of {size} values {verb} wrong" if size > 1 else "the value is wrong")
 
 
 def canonical(question: Question, expected: object, got: object) -> tuple[object, object]:

@@ -17,13 +17,16 @@ def grade(
     new_round: Annotated[
         bool, typer.Option("--new-round", help="Take another seed, and grade everybody with it; else late work joins.")
     ] = False,
-    workers: Annotated[int | None, typer.Option(help="Submissions at a time; one a core if not given.", min=1)] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Submissions graded at a time; by default one per core.", min=1)
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
     course: Annotated[
         Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.", callback=of_course)
     ] = Path("."),
     comment: Annotated[
-        tuple[str, str] | None, typer.Option(help="A group of wrong answers, see class.html, and what all in it read.")
+        tuple[str, str] | None,
+        typer.Option(help="A group of wrong answers, see class.html, and the comment they all see."),
     ] = None,
     everybody: Annotated[str | None, typer.Option(help="A question whose points everybody gets.")] = None,
     drop: Annotated[str | None, typer.Option(help="A question that does not count.")] = None,

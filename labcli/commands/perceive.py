@@ -56,7 +56,7 @@ def perceive(
         Path, typer.Option(help="Folder for overlay.png, targets.png, clouds, grasps.json, report.html.")
     ] = Path("out"),
 ) -> None:
-    """Find targets and grasps in a picture of your own camera; no target is an answer, too."""
+    """Find targets and grasps in a picture of your own camera; finding none is a valid result."""
     from dataclasses import replace
 
     from labcli import perceive as own

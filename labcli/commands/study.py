@@ -18,7 +18,7 @@ def study(
     workers: Workers = 1,
     dask: Dask = None,
 ) -> None:
-    """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it goes on where it was."""
+    """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it resumes."""
     from labcli import mask_study, score_study
 
     out = out or Path("out/07_scores.csv" if scores else "out/07_grasp.csv")

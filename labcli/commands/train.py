@@ -12,7 +12,7 @@ def train(
     data: Annotated[
         list[Path], typer.Argument(help="Data sets of data_gen, or folders of color/, depth/ and mask/ PNGs.")
     ] = (Path("data/train"),),
-    scenes: Annotated[int | None, typer.Option(help="Take only the first so many scenes of each.", min=1)] = None,
+    scenes: Annotated[int | None, typer.Option(help="Use only the first N scenes of each.", min=1)] = None,
     val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
     model: Annotated[
         str | None, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet; that of --init, or else unet.")
@@ -37,7 +37,7 @@ def train(
     out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in OUT, if there is one.")] = True,
 ) -> None:
-    """Train a network; stopped with Ctrl-C, the same command goes on where it was. Under torchrun, on many cores."""
+    """Train a network; stopped with Ctrl-C, the same command resumes. Under torchrun, on many cores."""
     from dataclasses import replace
 
     import data_gen

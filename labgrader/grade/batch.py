@@ -27,7 +27,7 @@ from labgrader.sandbox.sandbox import Limits
 from labgrader.support import write_atomically
 
 SECRET_FILE = "secret_seed"
-ATTEMPT = "an attempt: "  # begins a flag
+ATTEMPT = "suspicious code: "  # begins a flag
 DRAFT = ", public cases"  # ends the key of a record whose answers have not run on secret cases yet
 
 

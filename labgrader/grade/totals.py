@@ -16,14 +16,14 @@ from labgrader.grade.policy import free_days, read_bonus, read_policy
 from labgrader.handin.collect import marked_late
 from labgrader.support import counted, write_atomically
 
-NOT_FINAL = "Not final: a person has still to grade an answer, or to look at one"
+NOT_FINAL = "Not final: an answer still has to be graded or reviewed"
 OFF = "That is taken off above."
 BEGIN, END = "<!-- what a person graded, and the total -->", "</body></html>\n"
 
 
 @dataclass(frozen=True)
 class Final:
-    """A student's grade. waits: the questions that a person has still to grade; section: the page's end, HTML."""
+    """A student's grade. waits: the questions that still have to be graded by hand; section: the page's end, HTML."""
 
     student: str
     score: float
@@ -58,7 +58,7 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             grades = sorted(notebook.grades, key=lambda grade: grade.name)
             sections = [section_by_hand(grade, said[grade.name.removeprefix("check_")]) for grade in grades]
             waits = tuple(grade.name.removeprefix("check_") for grade in grades if grade.needs_manual_grade)
-            begin = "So far" if waits else "All together"
+            begin = "So far" if waits else "Total"
             total = f"<h2>{begin}: {score:g} of {submission.max_score:g} points</h2>"
             notes = [f"<p>{NOT_FINAL}.</p>" if waits else "", handed_in_late(late)]
             more = [f"<p>{counted(extra, 'point')} more for everybody: {escape(reason)}</p>" for extra, reason in bonus]

@@ -56,11 +56,11 @@ def compared(text: str, line: str) -> str:
     chains = [node for node in expressions_of(line) if isinstance(node, ast.Compare) and len(node.ops) > 1]
     inside = [part for node in chains for part in (node.left, *node.comparators)]
     if chains and not any(isinstance(getattr(part, "op", None), bits) for part in inside):
-        return "a <= b <= c is for numbers: of arrays, write (a <= b) & (b <= c)."
+        return "a <= b <= c is for numbers: for arrays, write (a <= b) & (b <= c)."
     unbracketed = re.search(r"[&|]", line) and re.search(r"[<>=!]=|[<>]", line)
     if not unbracketed:
         return ""
-    return "& and | bind closer than comparisons: put each comparison into brackets, as in (a > 0) & (b > 0)."
+    return "& and | bind more tightly than comparisons: put each comparison in brackets, as in (a > 0) & (b > 0)."
 
 
 def called(text: str, line: str) -> str:
@@ -95,7 +95,7 @@ def divided_first(text: str, program: str) -> str:
     found = re.search(r"//\s*\d+\s*\*\s*\w+", program)
     if not found or not re.match(r"IndexError: index \d.* with size [1-9]", text):
         return ""
-    return f"a {found[0]} is (a {found[0].replace(' *', ') *', 1)}: what should be below the line needs brackets."
+    return f"a {found[0]} is (a {found[0].replace(' *', ') *', 1)}: the denominator needs brackets."
 
 
 def flattened(text: str, program: str) -> str:
@@ -104,7 +104,7 @@ def flattened(text: str, program: str) -> str:
         return ""
     calls = [node for node in expressions_of(program) if isinstance(node, ast.Call)]
     if any(ast.unparse(node.func) == "np.delete" and len(node.args + node.keywords) == 2 for node in calls):
-        return "np.delete without an axis makes one long row of the array first: along which axis do you delete?"
+        return "np.delete without an axis flattens the array first: along which axis do you delete?"
     return ""
 
 
@@ -115,7 +115,7 @@ def joined(text: str, line: str) -> str:
     for node in expressions_of(line):
         sides = (node.left, node.right) if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add) else ()
         if sides and all(isinstance(getattr(side, "slice", None), ast.Slice) for side in sides):
-            return "+ joins lists. Of arrays it adds the numbers, entry by entry: np.concatenate joins those."
+            return "+ concatenates lists. With arrays it adds the numbers, entry by entry: use np.concatenate."
     return ""
 
 
@@ -123,14 +123,14 @@ def nothing_to_average(text: str, line: str) -> str:
     """int() of the mean of nothing."""
     if not text.startswith("ValueError: cannot convert float NaN") or "mean(" not in line:
         return ""
-    return "The mean of nothing is NaN, and no whole number: what selects nothing in this case, and is it asked for?"
+    return "The mean of nothing is NaN, not an integer: what selects nothing in this case, and is it asked for?"
 
 
 def counted(text: str, line: str) -> str:
     """Counts of unlike length."""
     if "bincount" not in line or "same shape" not in text:
         return ""
-    return "np.bincount is as long as its largest number, so with 255 in it 256: leave those out before you count."
+    return "np.bincount counts up to the largest number, so 256 with a 255 in it: leave those out before you count."
 
 
 OF_THE_LINE = (compared, called, of_one_vector, transformed, joined, nothing_to_average, counted)
@@ -162,7 +162,7 @@ def outside(found: re.Match, args: dict) -> str:
         return f"You take entry {index} of an array that has none: which slice, or which mask, selects nothing here?"
     holding = [name for name, a in arrays(args).items() if a.dtype.kind in "iu" and (a == index).any()]
     if index == course().ignored and holding:
-        return f"The ignored pixels of {holding[0]}, labelled {index}, are used as an index: leave them out before."
+        return f"The ignored pixels of {holding[0]}, labelled {index}, are used as an index: leave them out first."
     if index < 0:
         return f"The index {index} counts from the end, and there are only {size} entries along axis {axis}."
     if index == size:
@@ -174,7 +174,7 @@ def outside(found: re.Match, args: dict) -> str:
     ]
     lengths = [which for which, n in others if index < n]
     if lengths:
-        return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes exchanged?"
+        return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes swapped?"
     return f"An index of {index} into an axis of {size}: what does the index count, and what does this array hold?"
 
 
@@ -191,7 +191,7 @@ def shapes_do_not_fit(found: re.Match, args: dict) -> str:
     if len(a) != len(b):
         return f"Shapes {said} do not fit: is an axis missing, as [..., None] or keepdims=True gives it?"
     if sorted(a) == sorted(b):
-        return f"Shapes {said} have the same lengths in another order: which one has its axes exchanged?"
+        return f"Shapes {said} have the same lengths in another order: which one has its axes swapped?"
     unlike = [(m, n) for m, n in zip(a, b, strict=True) if m != n and 1 not in (m, n)]
     m, n = unlike[0] if unlike else (a[0], b[0])
     return f"Shapes {said} do not fit: one has {m} entries where the other has {n}. Which of the two did you expect?"
@@ -239,7 +239,7 @@ def signature(found: re.Match, args: dict) -> str:
 def no_such_name(found: re.Match, args: dict) -> str:
     """A name that nobody defined."""
     if found[1] in ("np", "numpy"):
-        return "NumPy is not imported: run the cell with `import numpy as np`, which stands at the top of the lab."
+        return "NumPy is not imported: run the cell with `import numpy as np` at the top of the lab."
     near = difflib.get_close_matches(found[1], [*args, "np"], 1, 0.7)
     return (
         f"No cell defines {found[1]}: do you mean {near[0]}?"
@@ -261,7 +261,7 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
     if found[1] == "NoneType":
         return "Something is None there: a function without `return`, or one that works in place, gives None."
     near = difflib.get_close_matches(found[2], dir(np.ndarray), 1, 0.6) if found[1] == "ndarray" else []
-    article = "An" if found[1][0].lower() in "aeio" else "A"
+    article = "An" if found[1] == "ndarray" or found[1][0].lower() in "aeio" else "A"
     return f"{article} {found[1]} has no {found[2]}" + (
         f": do you mean .{near[0]}?" if near else ": is it what you think it is?"
     )
@@ -270,13 +270,13 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
 # Exceptions that one sentence explains; {1} is what the first bracket of the pattern holds.
 TABLE = {
     r"IndexError: (?:arrays used as indices|only integers|.*is not a valid index)|TypeError: \w+ indices must be": (
-        "An index must be whole numbers or truth values: is it the right one? Then .astype(int), or a comparison."
+        "An index must be integers or booleans: is it the right one? If so, use .astype(int), or a comparison."
     ),
     r"IndexError: boolean index did not match .*?axis (\d+); .*?is (\d+) but .*?is (\d+)": (
-        "A mask of {3} entries along axis {1} selects from an array of {2}: whose mask is it?"
+        "A mask with {3} entries along axis {1} selects from an array with {2}: whose mask is it?"
     ),
     r"IndexError: too many indices.*?(\d+)-dimensional, but (\d+)": (
-        "{2} indices for an array of {1} axes: which argument has how many axes? Print its shape."
+        "{2} indices for an array with {1} axes: which argument has how many axes? Print its shape."
     ),
     r"IndexError: invalid index to scalar|TypeError: .*object is not subscriptable": (
         "You take an entry of something that is a single number: does a sum lack its axis?"
@@ -285,22 +285,22 @@ TABLE = {
         "The list is shorter than you think in this case: how long is it, and where does the index start?"
     ),
     r"ValueError: matmul.*?size (\d+) is different from (\d+)": (
-        "In a product A @ B the columns of A ({2}) must be as many as the rows of B ({1}). Print both "
-        "shapes: has one of them other axes than you meant, a .T too many, or one too few?"
+        "In a product A @ B, A must have as many columns ({2}) as B has rows ({1}). Print both "
+        "shapes: does one have other axes than you meant, a .T too many, or one too few?"
     ),
     r"ValueError: shapes \(([\d,]*)\) and \(([\d,]*)\) not aligned": (
-        "Shapes ({1}) and ({2}) have no product: the first has other columns than the second has rows."
+        "Shapes ({1}) and ({2}) cannot be multiplied: the first's columns do not match the second's rows."
     ),
     r"ValueError: could not broadcast input array from shape \(([\d,]*)\) into shape \(([\d,]*)\)": (
         "You put something of shape ({1}) into a place of shape ({2})."
     ),
     r"(?:Value|Index)Error: (?:shape mismatch|could not be broadcast|.*shape mismatch)": (
-        "Index arrays are taken together entry by entry, so that their shapes have to fit: print them. Where each row "
-        "is meant with each column, one of them has an axis more, as in rows[:, None]."
+        "Index arrays are paired entry by entry, so their shapes must fit: print them. To pair each row "
+        "with each column, give one of them an extra axis, as in rows[:, None]."
     ),
-    r"ValueError: need at least one array": "In this case there is nothing to stack or join: is a list empty?",
+    r"ValueError: need at least one array": "In this case there is nothing to stack or concatenate: is a list empty?",
     r"ValueError: all the input array|ValueError: all input arrays": (
-        "Arrays that are stacked or joined must agree in all other axes: print the shape of each."
+        "Arrays that are stacked or concatenated must agree in all other axes: print the shape of each."
     ),
     r"ValueError: The truth value of an array|ValueError: The truth value of a": (
         "`if`, `and`, `or`, `min` and `max` take one truth value, not an array: is a sum missing? For arrays there are "
@@ -314,26 +314,26 @@ TABLE = {
         "{1} gets an empty array: is an input empty, does a mask select nothing, or does an index run too far?"
     ),
     r"ValueError: zip\(\) argument (\d+) is (\w+) than": (
-        "Of the lists that you go through together, number {1} is {2} than those before: print them."
+        "Of the lists that you loop over together, number {1} is {2} than those before: print them."
     ),
-    r"ValueError: array is not broadcastable": "What you add at places has another shape than the places: print both.",
+    r"ValueError: array is not broadcastable": "What you add has another shape than the places it goes to: print both.",
     r"ValueError: The weights and list don't have the same length": (
-        "np.bincount needs one weight for each number that it counts, in the same order: print both."
+        "np.bincount needs one weight for each number it counts, in the same order: print both."
     ),
     r"ValueError: kth\(=(-?\d+)\) out of bounds \((\d+)\)": "There are only {2} numbers, and you ask for number {1}.",
     r"ValueError: slice step cannot be zero": "The step of a slice is 0 in this case: which number should it be?",
     r"ValueError: .*(?:enough dimensions|too small depth)": (
-        "A function gets one number where it wants a row or a matrix: was a sum, or an index, taken too early?"
+        "A function gets one number where it expects a vector or a matrix: was a sum, or an index, taken too early?"
     ),
     r"ValueError: .*(?:too many subscripts|too deep|must be 1 dimensional|mismatch in its core)": (
-        "A function gets an array of another shape than it wants: print the shape of each of its arguments."
+        "A function gets an array of another shape than it expects: print the shape of each of its arguments."
     ),
     r"ValueError: index can't contain negative": "A width, length or index is below 0: which difference is it?",
     r"ValueError: strides is incompatible|ValueError: buffer is smaller": (
-        "The buffer holds fewer bytes than the shape and the steps need: which of them is too large?"
+        "The buffer holds fewer bytes than the shape and the strides need: which of them is too large?"
     ),
     r"ValueError: (?:not enough|too many) values to unpack": (
-        "The left side names another number of values than there are on the right: print what stands there."
+        "The number of names on the left differs from the number of values on the right: print what is on the right."
     ),
     r"ValueError: (?:setting an array element|.*inhomogeneous)": (
         "The parts of the array have different lengths. Print each of them: which one is longer or shorter than you "
@@ -341,67 +341,67 @@ TABLE = {
     ),
     r"ZeroDivisionError": "Something that you divide by is 0 in this case.",
     r"OverflowError: Python integer (-?\d+) out of bounds for (\w+)": (
-        "{1} does not fit into {2}: make the array wider before, with .astype(int) or .astype(float)."
+        "{1} does not fit into {2}: convert the array first, with .astype(int) or .astype(float)."
     ),
     r"OverflowError|FloatingPointError": "A number grows too large: which exponential, power or cast is it?",
     r"(?:(?:numpy\.linalg\.)?LinAlgError|an exception): Singular matrix": (
-        "This matrix has no inverse: is it the one that you mean, and are all its rows filled?"
+        "This matrix has no inverse: is it the one you mean, and are all its rows filled?"
     ),
-    r"(?:numpy\.linalg\.)?LinAlgError": "np.linalg wants square matrices of finite numbers, in the last two axes.",
+    r"(?:numpy\.linalg\.)?LinAlgError": "np.linalg expects square matrices of finite numbers, in the last two axes.",
     r".*?: Cannot cast (?:ufunc '\w+' output|array data) from dtype\('(\w+)'\) to dtype\('(\w+)'\)": (
-        "An array of {2} cannot hold {1} in place: write x = x + ..., or x.astype(float) before."
+        "An array of {2} cannot hold {1} in place: write x = x + ..., or use x.astype(float) first."
     ),
     r"TypeError: (?:unsupported operand type|bad operand type).*?'NoneType'": (
         "One of the operands is None: a function without `return`, or one that works in place, gives None."
     ),
     r"TypeError: (?:unsupported operand type|can only concatenate).*?(list|tuple)": (
-        "You calculate with a {1}: for Python, + joins such and * repeats it. Make an array of it before."
+        "You calculate with a {1}: for Python, + concatenates lists and * repeats them. Make it an array first."
     ),
     r"TypeError: numpy boolean (?:subtract|negative)|TypeError: The numpy boolean (?:negative|subtract)": (
-        "Truth values have no minus: use ~ for not, ^ for different, or .astype(int)."
+        "Booleans have no minus: use ~ for not, ^ for different, or .astype(int)."
     ),
     r"TypeError: ufunc '(\w+)' not supported|TypeError: unsupported operand type\(s\) for ([&|^~]+)": (
-        "&, |, ^ and ~ work on truth values and whole numbers: compare first, in brackets, as in (a > 0) & (b > 0)."
+        "&, |, ^ and ~ work on booleans and integers: compare first, in brackets, as in (a > 0) & (b > 0)."
     ),
     r"TypeError: only (?:length-1|0-dimensional|integer scalar|size-1) arrays": (
-        "Python wants one number there and gets an array: is a sum or an index missing, or np.exp for math.exp?"
+        "Python expects one number there and gets an array: is a sum or an index missing, or np.exp for math.exp?"
     ),
     r"TypeError: (?:int|float)\(\) argument must be .*'NoneType'": (
         "Something is still None there: in this case nothing has given it a value. Which condition was never true?"
     ),
     r"TypeError: (?:int|float)\(\) argument must be|TypeError: must be real number, not": (
-        "Python wants one number there and gets a list or a tuple: which of its entries do you mean?"
+        "Python expects one number there and gets a list or a tuple: which of its entries do you mean?"
     ),
     r"TypeError: 'numpy\.ndarray' object is not callable|TypeError: '(\w+)' object is not callable": (
-        "Round brackets call a function; entries are taken with square ones. Or has a variable taken a function's name?"
+        "Round brackets call a function; square brackets take entries. Or has a variable taken a function's name?"
     ),
     r"TypeError: '(?:numpy\.)?\w+' object is not iterable|TypeError: Value after \* must be an iterable": (
-        "You go through something that is one number: is it the length, where `range` or the array itself is meant?"
+        "You loop over a single number: is it the length, where `range` or the array itself is meant?"
     ),
     r"ValueError: invalid literal for int|ValueError: cannot convert float NaN": (
-        "A whole number cannot be NaN or infinite: is float() meant? An array of integers needs .astype(float) before."
+        "An integer cannot be NaN or infinite: is float() meant? An array of integers needs .astype(float) first."
     ),
     r"TypeError: '(\w+)' object does not support item assignment": (
-        "You assign to an entry of a {1}, which has none that can change: was an array meant?"
+        "You assign to an entry of a {1}, which cannot be changed: was an array meant?"
     ),
     r"TypeError: (.+?)\(\) got an unexpected keyword argument '(\w+)'": (
         "{1} has no option {2}: look it up with `{1}?`."
     ),
     r"TypeError: (?:'\w+' object cannot be interpreted as an int|expected a sequence of int|slice indices must be)": (
-        "A length, bound or axis must be whole: / gives a float, // a whole number; np.max(a, b) takes b for an axis."
+        "A length, bound or axis must be an integer: / gives a float, // an integer; np.max(a, b) takes b for an axis."
     ),
     r"TypeError: return arrays must be of ArrayType": (
         "Too many arguments: np.max and np.min take one array, as in np.max([a, b, c]), np.maximum and np.minimum two."
     ),
-    r"TypeError: data type '(.*)' not understood": "There is no dtype {1}: are a field's name and its type exchanged?",
+    r"TypeError: data type '(.*)' not understood": "There is no dtype {1}: are a field's name and its type swapped?",
     r"TypeError: .*?expected at most (\d+) arguments?, got (\d+)": (
         "A function gets {2} arguments and takes {1}: look it up."
     ),
     r"UnboundLocalError: cannot access local variable '(\w+)'": (
-        "{1} is read before it gets a value: in this case no branch, or no turn of the loop, sets it."
+        "{1} is read before it gets a value: in this case no branch, and no iteration of the loop, sets it."
     ),
     r"KeyError": "The dictionary has no such key in this case: which values can occur?",
-    r"RecursionError": "It calls itself some thousand times: does it stop in this case, and after how many calls?",
+    r"RecursionError": "It calls itself about a thousand times: does it stop in this case, and after how many calls?",
     r"MemoryError|numpy\._core\._exceptions\._ArrayMemoryError|_ArrayMemoryError": (
         "An array of that size does not fit into memory: which length is wrong?"
     ),

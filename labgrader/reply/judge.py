@@ -94,7 +94,7 @@ def verdict(
         return Verdict(problem, None, "all cases" if changed else "", question, (), cases, outputs)
     _, first = min(told)
     by_hand = sum(case.by_hand for case in cases)
-    here, number, of = ("case by hand", first + 1, by_hand)
+    here, number, of = ("hand-made case", first + 1, by_hand)
     if first >= by_hand:
         here, number, of = ("random case", first + 1 - by_hand, len(cases) - by_hand)
     return Verdict(problems[first], first, f"{here} {number} of {of}", question, changed, cases, outputs)

@@ -227,7 +227,7 @@ FUNCTIONS = {
     "Each of your numbers is the exponential of the right one: a logarithm is missing.": np.exp,
     "Your numbers are the right ones without their fractions. Where do they become whole numbers?": np.trunc,
     "Your numbers are the right ones, rounded. Where do they become whole numbers?": np.round,
-    "Your numbers begin again at 256: somewhere they are bytes (uint8).": lambda e: np.mod(e, 256),
+    "Your numbers wrap around at 256: somewhere they are bytes (uint8).": lambda e: np.mod(e, 256),
     "Yours is true exactly where the right one is false.": lambda e: ~e if e.dtype.kind == "b" else None,
 }
 

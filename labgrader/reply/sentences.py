@@ -20,7 +20,7 @@ from labgrader.reply.listed import recognise
 from labgrader.reply.messages import Marked, marked, said
 from labgrader.reply.relations import View, related
 
-ENDLESS = "A loop does not end, or has far too many turns: what changes in each turn, and when does it stop?"
+ENDLESS = "A loop does not end, or runs far too many iterations: what changes in each iteration, and when does it stop?"
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def outputs_exchanged(question: Question, cases: Sequence[Case], outputs: Sequen
     for i, j in itertools.combinations(range(count), 2):
         order = [j if k == i else i if k == j else k for k in range(count)]
         if all(alike(question, tuple(parts(case.expected)[k] for k in order), got) for case, got in pairs):
-            yield Sentence("relation", f"Outputs {i + 1} and {j + 1} are exchanged. In which order are they asked for?")
+            yield Sentence("relation", f"Outputs {i + 1} and {j + 1} are swapped. In which order are they asked for?")
 
 
 # ------------------------------------------------------------------------------------------- the last resort
@@ -201,7 +201,7 @@ def broken_properties(question: Question, pairs: Sequence[tuple[Case, object]]) 
     pairs = [(case, got) for case, got in pairs if finite(got) or not finite(case.expected)]
     for prop in question.properties:
         if not all(fulfilled(prop, case, got) for case, got in pairs):
-            yield Sentence("property", f"This holds of every right answer, and not of yours: {prop.says}.")
+            yield Sentence("property", f"Every right answer has this property, and yours does not: {prop.says}.")
 
 
 def finite(output: object) -> bool:

@@ -45,7 +45,7 @@ class Row:
 
     @property
     def waits(self) -> bool:
-        """Whether a person has still to grade something of it."""
+        """Whether something of it still has to be graded by hand."""
         return bool(self.unread) or any(final.waits for final in self.finals.values())
 
     @property

@@ -72,7 +72,7 @@ def forget(course: Path, student: str) -> list[str]:
     done += from_roster(course, {person.id} if person is not None else set())
     done += from_settings(course, keys)
     if not done:
-        raise ValueError(f"student: expected a folder, a number or an id of {ROSTER}, found nothing of {student}")
+        raise ValueError(f"student: expected a folder, a number or an id of {ROSTER}, no student matches {student!r}")
     return done
 
 
@@ -126,7 +126,7 @@ def from_grades(out: Path, names: set[str], told: set[str]) -> list[str]:
         path.unlink()
     for folder in results:
         shutil.rmtree(folder)
-    anew = f"; `{course_here().command} grade` and `grades` make it anew without them"
+    anew = f"; `{course_here().command} grade` and `grades` recreate it without them"
     done = [f"removed {path}" for path in found + results] + [f"removed {path}{anew}" for path in of_class]
     comments = read_comments(out)
     kept = {group: text for group, text in comments.items() if not names_one(text, told)}

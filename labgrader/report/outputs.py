@@ -127,8 +127,8 @@ def feedback_page(lab: Lab, record: Record, comments: Mapping[str, str]) -> str:
     """A student's page."""
     title = escape(f"{lab.topic}: {record.student}")
     total = f"{record.points:g} of {sum(lab.points.values()):g} points for the functions"
-    by_hand = " Answers in words stand at the end, once a person has graded them." if lab.written else ""
-    look = " Is something graded wrongly? Ask for a second look, and name the key that stands below the answer."
+    by_hand = " Written answers appear at the end once graded." if lab.written else ""
+    look = " Is something graded wrongly? Ask for a second look, and quote the key below the answer."
     parts = [f"<h1>{title}</h1>\n<p>{total}.{by_hand}{look}</p>", warning_of([record])]
     if record.reason:
         parts.append(f'<p class="warning">This submission could not be graded: {escape(record.reason)}.</p>')

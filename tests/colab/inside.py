@@ -1,4 +1,4 @@
-"""Run in the environment of Colab's versions: each notebook in an empty folder, with a stand-in for google.colab.
+"""Run in the environment of Colab's versions: each notebook in an empty folder, with a mock of google.colab.
 
 The first cell of a notebook installs the wheel. A released lab must run to its end, a solution must tick every answer,
 and its first tick come within BUDGET_S of the first import, with nothing compiled before. On a machine that does other

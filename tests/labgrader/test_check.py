@@ -89,16 +89,16 @@ def flags(n):
 
 
 ITS_LINE = Marked(alters.__code__.co_firstlineno + 1, "n /= n.sum()", ((0, 12),))
-HERE = "  In case by hand 1 of 1:\n      share([[1, 3]])\n"
+HERE = "  In hand-made case 1 of 1:\n      share([[1, 3]])\n"
 CASES = [
-    (right, "✔ share is right\n  Cases tried: 1 by hand, 4 random."),
-    (blank, "○ share: not answered yet\n  The kit's function takes its place below."),
-    (rows, "✘ share: 2 of 2 values are not right\n" + HERE +
+    (right, "✔ share is right\n  Passed 1 hand-made and 4 random cases."),
+    (blank, "○ share: not answered yet\n  The kit's function stands in for it below."),
+    (rows, "✘ share: 2 of 2 values are wrong\n" + HERE +
            "      returns   [[0.25, 0.75]]\n      expected  [[0.98127, 1.4813]]\n  Hint: Do all of them sum to one?"),
     (transposed, "✘ share: expected shape (1, 2), got (2, 1)\n" + HERE +
            "      returns   [[0.25], [0.75]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
-    (nine_more, "✘ share: 2 of 2 values are not right\n" + HERE +
+    (nine_more, "✘ share: 2 of 2 values are wrong\n" + HERE +
            "      returns   [[10, 12]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: This holds of every right answer, and not of yours: shares are not over two."),
     (flags, "✘ share: expected real numbers, got dtype bool: write .astype(float) or .astype(int)\n" + HERE +
@@ -106,7 +106,7 @@ CASES = [
            "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
     (alters, "✘ share: it changes its argument n: work on a copy; what calls it still needs the old values\n  "
            + "\n  ".join((*ITS_LINE.plain(), f"Hint: {WATCHES['writes']}"))),
-    (loud, "✔ share is right\n  Cases tried: 1 by hand, 4 random.\n"
+    (loud, "✔ share is right\n  Passed 1 hand-made and 4 random cases.\n"
            "  It prints: hello\n  It prints: hello\n  It prints: hello\n  ..."),
     (7, "✘ share is not a function\n  It is of type int."),
     (None, "✘ share is not a function\n  It is of type NoneType."),
@@ -174,7 +174,7 @@ def test_a_cell_that_python_cannot_read_is_said_and_not_taken_for_the_kits_funct
     monkeypatch.setattr(checking, "jupyter", lambda: shell)
     first, line, again = repr(checking.broken_cell(QUESTION)).splitlines()
     assert first == "✘ share: its cell is not Python: look at line 2" and line == "  line 2:  total = n.sum("
-    assert "Nothing of it has run" in again
+    assert "None of it has run" in again
     ran += ["shared = share(2", "def sharing(n:"]  # cells that only use it, or define another
     assert checking.broken_cell(QUESTION) is not None
     ran += ["def share(n):\n    return n"]

@@ -57,5 +57,5 @@ def test_an_answer_without_a_hint_is_flagged_and_the_others_are_graded(tmp_path,
     ada, ben = grade_course(TOPIC, tmp_path, seed="secret", progress=False).records
     assert not ada.needs_a_look and ben.needs_a_look
     (result,) = [result for result in ben.results if not result.right]
-    assert result.question == "iou" and "values are not right" in result.says
+    assert result.question == "iou" and "values are wrong" in result.says
     assert result.flag == "its program cannot be looked at: RecursionError"

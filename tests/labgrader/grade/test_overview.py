@@ -115,7 +115,7 @@ def test_an_attempt_stands_in_the_table_as_such_and_on_no_students_page(course):
     page, out = (course / "grades" / TOPIC / "class.html").read_text(), course / "grades" / TOPIC
     assert "jim, iou: os.system (line 3)" in page and page.count("<li>") == 1
     with (out / "grades.csv").open() as table:
-        flagged = [row["student"] for row in csv.DictReader(table) if row["look_at"].startswith("an attempt: ")]
+        flagged = [row["student"] for row in csv.DictReader(table) if row["look_at"].startswith("suspicious code: ")]
     assert flagged == ["jim"] and "attempt" not in (out / "feedback/jim.html").read_text()
 
 

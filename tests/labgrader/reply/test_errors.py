@@ -18,7 +18,7 @@ ARGS = {"y": np.array([[0, 255]]), "P": np.zeros((5, 3)), "R": np.eye(3)}
 EXCEPTIONS = [
     (lambda: np.zeros(3)[np.array([[0, 255]])], "ignored pixels of y, labelled 255"),
     (lambda: np.zeros(3)[3], "one past the end: the last one along axis 0 (as long as that of R) is 2"),
-    (lambda: np.zeros((3, 2))[0, 4], "an index up to 4 fits axis 0 of P: are two axes exchanged?"),
+    (lambda: np.zeros((3, 2))[0, 4], "an index up to 4 fits axis 0 of P: are two axes swapped?"),
     (lambda: np.zeros(2)[4], "An index of 4 into an axis of 2"),  # P's first axis is no other one
     (lambda: np.zeros(3)[1.5], "whole numbers or truth values"),
     (lambda: np.zeros(3)[np.ones(4, bool)], "A mask of 4 entries"),

@@ -186,9 +186,9 @@ def itself(n):
         (lambda n: torch.from_numpy(iou(n)).to_sparse(), "dtype", "torch.sparse_coo"),
         (lambda n: iou(n)[:, None], "shape", "expected shape (2,), got (2, 1)"),
         (lambda n: 0.5, "shape", "expected shape (2,), got ()"),
-        (lambda n: np.zeros(len(n)).view(AlwaysEqual), "values", "2 of 2 values are not right"),
-        (lambda n: iou(n) * 1.01, "values", "2 of 2 values are not right"),
-        (lambda n: iou(n) * 9, "values", "2 of 2 values are not right"),
+        (lambda n: np.zeros(len(n)).view(AlwaysEqual), "values", "2 of 2 values are wrong"),
+        (lambda n: iou(n) * 1.01, "values", "2 of 2 values are wrong"),
+        (lambda n: iou(n) * 9, "values", "2 of 2 values are wrong"),
         (lambda n: np.where(np.arange(len(n)) == 1, np.nan, iou(n)), "finite", "1 of 2 values are NaN"),
         (lambda n: n[7], "exception", "IndexError: index 7 is out of bounds"),
         (lambda n, m: n, "exception", "missing 1 required positional argument: 'm'"),
@@ -207,7 +207,7 @@ def test_tuples_are_judged_part_by_part():
     assert problem(lambda x: (x.sum(), x.mean(0), 1), both).kind == "length"
     assert problem(lambda x: (x.sum(), x.mean(1)), both).says == "output 2 of 2: expected shape (2,), got (3,)"
     assert problem(lambda x: (x.sum(0), x.mean(0)), both).says == "output 1 of 2: expected a number, got shape (2,)"
-    assert problem(lambda x: (x.sum() + 1, x.mean(0)), both).says == "1 of 3 values are not right"
+    assert problem(lambda x: (x.sum() + 1, x.mean(0)), both).says == "1 of 3 values is wrong"
 
 
 def test_the_first_problem_is_told_with_its_case():
@@ -215,7 +215,7 @@ def test_the_first_problem_is_told_with_its_case():
         return iou(n) + (len(n) == 3)
 
     found = judge(QUESTION, wrong_on_three_classes, seed=3)
-    assert (found.case, found.where) == (1, "case by hand 2 of 2")
+    assert (found.case, found.where) == (1, "hand-made case 2 of 2")
     only_random = judge(replace(QUESTION, by_hand=QUESTION.by_hand[:1]), wrong_on_three_classes, seed=3)
     assert (only_random.case, only_random.where) == (1, "random case 1 of 4")
 

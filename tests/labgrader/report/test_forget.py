@@ -125,7 +125,7 @@ def test_a_student_who_is_forgotten_is_in_no_file(course, asked):
     assert list(read_roster(course)) == ["7654321"] and "[[deadline]]" in (course / "course.toml").read_text()
     gone = ("grades.csv", "class.html")  # of the class, made anew by the next grading
     assert others - len(holding(course, BEN, "7654321")) == len(gone)
-    with pytest.raises(ValueError, match="found nothing of"):
+    with pytest.raises(ValueError, match="no student matches"):
         forget(course, asked)
 
 

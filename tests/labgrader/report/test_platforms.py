@@ -88,7 +88,7 @@ def test_moodle_gets_its_worksheet_and_pages_by_participant(tmp_path):
     assert first == "Ada Lovelace_1234567_assignsubmission_file_04_iou.html" and second.startswith("Zoë O'Brien_12_")
     assert "explain: 2.5 of 3 points" in pages[first] and "Union, &lt;not&gt; sum." in pages[first]
     assert f"So far: {late:g} of {TOTAL + 3} points" in pages[second] and NOT_FINAL in pages[second]
-    assert f"All together: {TOTAL + 2.5:g} of {TOTAL + 3} points" in pages[first] and NOT_FINAL not in pages[first]
+    assert f"Total: {TOTAL + 2.5:g} of {TOTAL + 3} points" in pages[first] and NOT_FINAL not in pages[first]
     assert "Handed in 1 day late, 10 % less. That is taken off above." in pages[second] and "late" not in pages[first]
     page = tmp_path / f"grades/{TOPIC}/feedback/Ada Lovelace_1234567.html"
     assert page.read_text() == pages[first]  # one page for students, the same everywhere
