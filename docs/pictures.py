@@ -1,4 +1,4 @@
-"""Makes the pictures of README anew: the demo, a lab in JupyterLab, the site (`make pictures`, after `make site`).
+"""Regenerates README's pictures: the demo, a lab in JupyterLab, the site (`make pictures`, after `make site`).
 
 It needs Debian's Chromium. NAMES as arguments choose: demo, lab, site.
 """
@@ -91,5 +91,5 @@ if __name__ == "__main__":
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for name in sys.argv[1:] or ALL:
             ALL[name](chromium)
-            print(f"{name}: made anew in docs/")
+            print(f"{name}: regenerated in docs/")
         chromium.close()

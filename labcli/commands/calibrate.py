@@ -10,18 +10,18 @@ from labcli.commands.options import MeasuredMm, tell_written
 
 def calibrate(
     folder: Annotated[Path, typer.Argument(help="Photographs of the sheet from at least six sides.")],
-    out: Annotated[Path | None, typer.Option(help="Folder for camera.json and calibration.html; else FOLDER.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for camera.json and calibration.html; FOLDER by default.")
+    ] = None,
     measured_mm: MeasuredMm = 150.0,
-    chessboard: Annotated[
-        str, typer.Option(help="A chessboard of your own in place of the sheet: inner corners, 9x6.")
-    ] = "",
+    chessboard: Annotated[str, typer.Option(help="Your own chessboard instead of the sheet: inner corners, 9x6.")] = "",
     square: Annotated[float | None, typer.Option(help="Side of a square of --chessboard, metres.")] = None,
     arm: Annotated[
         Path | None,
         typer.Option(help="The arm's pose for each photograph, a CSV of name,x,y,z,qx,qy,qz,qw: hand in base."),
     ] = None,
     camera: Annotated[
-        Path | None, typer.Option(help="With --arm: a camera.json that is there, in place of calibrating first.")
+        Path | None, typer.Option(help="With --arm: an existing camera.json, instead of calibrating first.")
     ] = None,
 ) -> None:
     """Find a camera's matrix and lens from photographs of the sheet; with --arm, where it is on or beside an arm."""

@@ -8,7 +8,7 @@ import typer
 
 
 def check(lab: Annotated[Path, typer.Argument(help="A saved lab, a notebook file.")]) -> None:
-    """Check a saved lab as the grader will, on public cases; exit status 1 if an answer is not right.
+    """Check a saved lab as the grader will, on public cases; exit status 1 if an answer is wrong.
 
     Answers run in the grader's sandbox where there is one (Linux), else with your rights, which is said before: a
     stranger's notebook is not for such a machine.

@@ -9,13 +9,11 @@ from labcli.commands.options import Model, Refine
 
 
 def demo(
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of the scene; drawn, and printed, if not given.", min=0)
-    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the scene; drawn and printed if omitted.", min=0)] = None,
     model: Model = "unet_rgbd",
     crf: Refine = None,
     calm: Annotated[
-        bool, typer.Option(help="Wooden table, quiet walls, seven colours; or those of the scenes that are scored.")
+        bool, typer.Option(help="Wooden table, plain walls, seven colours; or the look of the scored scenes.")
     ] = True,
     out: Annotated[Path, typer.Option(help="Folder for demo.png and demo.gif.")] = Path("out"),
 ) -> None:

@@ -7,7 +7,7 @@ import typer
 
 def doctor(
     warm: Annotated[
-        bool, typer.Option("--warm", help="Compile now what first runs would, beside the code, for all who use it.")
+        bool, typer.Option("--warm", help="Compile now, for all users, what first runs would compile.")
     ] = False,
 ) -> None:
     """Check Python, packages, PyBullet, a render, disk, cores and GPU; exit status 1 if something needed is missing."""

@@ -1,4 +1,4 @@
-"""`labkit evaluate`: scores of masks and lifts over random scenes, or of things in pictures of one's own."""
+"""`labkit evaluate`: scores of masks and lifts over random scenes, or of things in your own pictures."""
 
 import inspect
 from pathlib import Path
@@ -24,10 +24,12 @@ def evaluate(
     perturb: Annotated[
         bool, typer.Option("--perturb", help="Depth as a sensor measures it, pose off by 5 mm and 0.5 degree.")
     ] = False,
-    json: Annotated[Path | None, typer.Option(help="Write the scores, and a row per trial, to this file, too.")] = None,
-    worst: Annotated[int, typer.Option(help="Show so many of the worst in OUT/worst.html.", min=0)] = 0,
+    json: Annotated[Path | None, typer.Option(help="Also write the scores, and a row per trial, to this file.")] = None,
+    worst: Annotated[int, typer.Option(help="Show this many of the worst in OUT/worst.html.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for worst.html.")] = Path("out"),
-    anything: Annotated[bool, typer.Option("--anything", help="With FOLDER: things of any class, each apart.")] = False,
+    anything: Annotated[
+        bool, typer.Option("--anything", help="With FOLDER: objects of any class, told apart.")
+    ] = False,
     depth_scale: DepthScale = None,
     aligned: Aligned = False,
     camera_name: CameraName = None,

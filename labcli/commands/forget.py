@@ -14,7 +14,7 @@ def forget(
         Path, typer.Option(help="Folder that holds submitted/, grades/ and roster.csv.", callback=of_course)
     ] = Path("."),
 ) -> None:
-    """Remove a student from submissions, grades, gradebook, roster and extensions, and say where that was."""
+    """Remove a student from submissions, grades, gradebook, roster and extensions, and list each place."""
     needs_linux("forget")
     from labgrader.grade_course import private
     from labgrader.report.forget import forget as forget_student

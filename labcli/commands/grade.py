@@ -11,16 +11,19 @@ from labcli.commands.options import needs_linux, of_course
 def grade(
     topic: Annotated[str, typer.Argument(help="Which lab, such as 04_iou.")],
     submissions: Annotated[
-        Path | None, typer.Option(help="Folder of STUDENT/TOPIC/TOPIC.ipynb; COURSE/submitted if not given.")
+        Path | None, typer.Option(help="Folder of STUDENT/TOPIC/TOPIC.ipynb; by default COURSE/submitted.")
     ] = None,
-    seed: Annotated[str | None, typer.Option(help="Secret seed of a round; drawn if not given; kept in OUT.")] = None,
+    seed: Annotated[str | None, typer.Option(help="Secret seed of a round; drawn by default; kept in OUT.")] = None,
     new_round: Annotated[
-        bool, typer.Option("--new-round", help="Take another seed, and grade everybody with it; else late work joins.")
+        bool,
+        typer.Option(
+            "--new-round", help="Draw a new seed and grade everybody with it; otherwise late work joins the old round."
+        ),
     ] = False,
     workers: Annotated[
         int | None, typer.Option(help="Submissions graded at a time; by default one per core.", min=1)
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the results; COURSE/grades/TOPIC if not given.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; by default COURSE/grades/TOPIC.")] = None,
     course: Annotated[
         Path, typer.Option(help="Folder that holds labs/ and nbgrader's gradebook.", callback=of_course)
     ] = Path("."),
@@ -31,16 +34,14 @@ def grade(
     everybody: Annotated[str | None, typer.Option(help="A question whose points everybody gets.")] = None,
     drop: Annotated[str | None, typer.Option(help="A question that does not count.")] = None,
     points: Annotated[str | None, typer.Option(help="A question and what it is worth now, such as iou=3.")] = None,
-    partial: Annotated[str | None, typer.Option(help="A question whose outputs count one by one.")] = None,
-    reason: Annotated[str, typer.Option(help="Why; kept in changes.json, and terminal_lines to students.")] = "",
-    undo: Annotated[str | None, typer.Option(help="A question whose change is taken back.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Grade again what has not changed, too.")] = False,
+    partial: Annotated[str | None, typer.Option(help="A question whose outputs count separately.")] = None,
+    reason: Annotated[str, typer.Option(help="Why; kept in changes.json, and shown to students.")] = "",
+    undo: Annotated[str | None, typer.Option(help="A question whose change is undone.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Also grade again what has not changed.")] = False,
     tidy: Annotated[
         bool, typer.Option("--tidy", help="Remove pages and grades of students whose submission is gone.")
     ] = False,
-    against: Annotated[
-        Path | None, typer.Option(help="An earlier course, whose answers these are compared with, too.")
-    ] = None,
+    against: Annotated[Path | None, typer.Option(help="An earlier course whose answers are compared too.")] = None,
     look: Annotated[
         str | None, typer.Option(help="A key on a student's page: show that program, its cases and replies.")
     ] = None,
@@ -48,7 +49,7 @@ def grade(
         bool, typer.Option("--unsafe-no-sandbox", help="Without bubblewrap: submissions may do anything here.")
     ] = False,
 ) -> None:
-    """Grade submissions of a lab in a sandbox; exit status 1 if something needs a look, 2 if it could not be done."""
+    """Grade a lab in a sandbox; exit status 1 if something needs attention, 2 if grading was impossible."""
     import os
 
     needs_linux("grade")
@@ -73,7 +74,7 @@ def grade(
 
 
 def tell(graded, folder: Path, tidy: bool) -> None:
-    """Print the table of a grading, `run.Graded`, what an instructor should know of it, and where its files are."""
+    """Print the table of a grading, what an instructor should know about it, and where its files are."""
     from labgrader.report.alike_page import terminal_lines
     from labgrader.report.outputs import terminal_table
     from labgrader.support import counted

@@ -7,7 +7,7 @@ import typer
 
 from labcli.commands.options import of_course, tell_written
 
-app = typer.Typer(help="Begin a question or a lab; `make test` then names each TODO of it.", no_args_is_help=True)
+app = typer.Typer(help="Start a question or a lab; `make test` then lists its TODOs.", no_args_is_help=True)
 Checkout = Annotated[Path, typer.Option(help="The checkout to write into.", callback=of_course)]
 
 

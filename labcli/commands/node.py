@@ -23,29 +23,35 @@ class Settings:
     """The options of every way to run the node, as they were typed."""
 
     model: Model = "unet_rgbd"
-    engine: Annotated[str, typer.Option(help="What runs the network: torch, opencv or onnxruntime.")] = "torch"
+    engine: Annotated[str, typer.Option(help="Runtime for the network: torch, opencv or onnxruntime.")] = "torch"
     mirror: Annotated[
         bool | None,
         typer.Option(
-            "--mirror/--no-mirror", help="Look at the mirror image, too; else only a network with canonical views does."
+            "--mirror/--no-mirror",
+            help="Also use the mirror image; by default only a network with canonical views does.",
         ),
     ] = None
     crf: Refine = None
     anything: Annotated[
-        bool, typer.Option("--anything", help="Whatever stands on the table is a target, of any class.")
+        bool, typer.Option("--anything", help="Every object on the table is a target, whatever its class.")
     ] = False
     gripper: Gripper = ""
     workspace: Annotated[
-        str, typer.Option(help="What the arm can meet: from and to in x, y and z, z from the table; else the Panda's.")
+        str,
+        typer.Option(
+            help="What the arm can reach: from and to in x, y and z, z from the table; the Panda's by default."
+        ),
     ] = ""
     target: Annotated[int, typer.Option(help="The class to grasp.")] = 2
-    table_z: Annotated[float | None, typer.Option(help="Height of the table in the base frame, metres; else 0.")] = None
+    table_z: Annotated[
+        float | None, typer.Option(help="Height of the table in the base frame, metres; 0 by default.")
+    ] = None
     camera_pose: Annotated[
         str | None,
         typer.Option(help='Where the camera stands: "x y z qx qy qz qw", or T_base_cam=FILE; else /tf says.'),
     ] = None
     base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link"
-    slop: Annotated[float, typer.Option(help="How far the stamps of a frame may lie apart, seconds.")] = 0.02
+    slop: Annotated[float, typer.Option(help="How far apart the stamps of a frame may be, seconds.")] = 0.02
     depth_scale: Annotated[float, typer.Option(help="Metres per unit of 16-bit depth.")] = 0.001
     topic: Annotated[
         list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image/compressed, mask=/my/mask ...")
@@ -113,9 +119,11 @@ class Settings:
 class RosSettings(Settings):
     """The options on ROS. On ROS 2 each but --topic is also a parameter of the same name, which wins."""
 
-    qos_inputs: Annotated[str, typer.Option(help="What to ask of cameras: best_effort or reliable.")] = "best_effort"
+    qos_inputs: Annotated[str, typer.Option(help="What to request from cameras: best_effort or reliable.")] = (
+        "best_effort"
+    )
     qos_outputs: Annotated[str, typer.Option(help="What to offer: reliable or best_effort.")] = "reliable"
-    qos_depth: Annotated[int, typer.Option(help="Messages that are kept for a slow reader.")] = 10
+    qos_depth: Annotated[int, typer.Option(help="Messages kept for a slow reader.")] = 10
     max_age: Annotated[float, typer.Option(help="Seconds; an older frame gets a mask and a warning, and no grasp.")] = (
         1.0
     )
@@ -164,7 +172,7 @@ app = typer.Typer(cls=Ways, help="Run the segmentation node: on a scene, a bag, 
 @app.command()
 @with_settings(Settings)
 def sim(settings: Settings, seed: Seed = 0) -> None:
-    """Rehearse in this process: a simulated camera, the node and an arm; one line says what came of it."""
+    """Rehearse in this process: a simulated camera, the node and an arm; one line reports the result."""
     from data_gen import sample_scene
     from labkit.node.rehearsal import camera_to_lift
 
@@ -176,11 +184,11 @@ def sim(settings: Settings, seed: Seed = 0) -> None:
 @with_settings(Settings)
 def bag(
     settings: Settings,
-    source: Annotated[Path, typer.Argument(metavar="IN", help="The bag to read: NAME.bag, or a folder of ROS 2.")],
+    source: Annotated[Path, typer.Argument(metavar="IN", help="The bag to read: NAME.bag, or a ROS 2 folder.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The bag to write, of either kind.")],
-    storage: Annotated[str, typer.Option(help="How ROS 2 shall hold it: mcap or sqlite3.")] = "mcap",
+    storage: Annotated[str, typer.Option(help="Storage for ROS 2: mcap or sqlite3.")] = "mcap",
     probabilities: Annotated[
-        bool, typer.Option("--probabilities", help="Write class probabilities to OUT, too.")
+        bool, typer.Option("--probabilities", help="Also write class probabilities to OUT.")
     ] = False,
 ) -> None:
     """Answer the frames of a bag of ROS 1 or ROS 2, and write another; exit status 1 if no frame was answered."""
@@ -199,11 +207,11 @@ def bag(
 def ros(
     settings: RosSettings,
     arguments: Annotated[
-        list[str] | None, typer.Argument(metavar="[--ros-args ...]", help="ROS's own arguments, behind all others.")
+        list[str] | None, typer.Argument(metavar="[--ros-args ...]", help="ROS's own arguments, after all others.")
     ] = None,
-    ros1: Annotated[bool, typer.Option("--ros1", help="On ROS 1 in place of ROS 2.")] = False,
+    ros1: Annotated[bool, typer.Option("--ros1", help="On ROS 1 instead of ROS 2.")] = False,
     lifecycle: Annotated[
-        bool, typer.Option("--lifecycle", help="Let others configure and activate the node; ROS 2.")
+        bool, typer.Option("--lifecycle", help="Let other programs configure and activate the node; ROS 2.")
     ] = False,
     simulated: Annotated[bool, typer.Option("--sim", help="With a simulated camera.")] = False,
     seed: Seed = 0,

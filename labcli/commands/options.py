@@ -15,15 +15,15 @@ Gripper = Annotated[
     str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON or YAML file.')
 ]
 DepthScale = Annotated[
-    float | None, typer.Option(help="Metres per unit of depth; else what the camera's file says, or what fits.")
+    float | None, typer.Option(help="Metres per unit of depth; by default what the camera's file says, or what fits.")
 ]
 Aligned = Annotated[
-    bool, typer.Option("--aligned", help="Depth of another size is of the same view as colour, as of a phone.")
+    bool, typer.Option("--aligned", help="Depth of another size shows the same view as colour, as on a phone.")
 ]
 CameraName = Annotated[str | None, typer.Option(help="Which camera of a file that has several.")]
 
 MeasuredMm = Annotated[
-    float, typer.Option(help="How long the sheet's line of 150 mm is as printed, millimetres.", min=30.0, max=750.0)
+    float, typer.Option(help="Measured length of the sheet's 150 mm line as printed, millimetres.", min=30.0, max=750.0)
 ]
 
 

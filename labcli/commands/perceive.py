@@ -1,4 +1,4 @@
-"""`labkit perceive`: targets and grasps in a picture of one's own camera."""
+"""`labkit perceive`: targets and grasps in a picture from your own camera."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,10 +18,11 @@ def perceive(
     ],
     camera_pose: Annotated[
         str | None,
-        typer.Option(help='Where the camera stands in the base frame: "x y z qx qy qz qw", a 4x4 matrix, or a file.'),
+        typer.Option(help='Pose of the camera in the base frame: "x y z qx qy qz qw", a 4x4 matrix, or a file.'),
     ] = None,
     plane: Annotated[
-        Literal["auto"] | None, typer.Option(help="Find the table and lay the base frame on it; so without a pose.")
+        Literal["auto"] | None,
+        typer.Option(help="Find the table and put the base frame on it; the default without a pose."),
     ] = None,
     table_z: Annotated[float, typer.Option(help="Height of the table in the base frame, metres.")] = 0.0,
     depth_scale: DepthScale = None,
@@ -29,26 +30,27 @@ def perceive(
     camera_name: CameraName = None,
     model: Model = "unet_rgbd",
     mask: Annotated[
-        Path | None, typer.Option(help="Somebody else's mask in place of a network: 0 and one other value, or labels.")
+        Path | None,
+        typer.Option(help="A mask from elsewhere instead of a network's: 0 and one other value, or labels."),
     ] = None,
     instances: Annotated[
         bool, typer.Option("--instances", help="Each value above 0 of --mask is an object, and each object a target.")
     ] = False,
     anything: Annotated[
-        bool, typer.Option("--anything", help="Whatever stands on the table is a target, of any class.")
+        bool, typer.Option("--anything", help="Every object on the table is a target, whatever its class.")
     ] = False,
     at: Annotated[
         str, typer.Option(help='A pixel "U,V", column and row: the thing there is the target, whatever its class.')
     ] = "",
     target: Annotated[
         int | None,
-        typer.Option(help="The class to grasp, 2 if none is given; with --mask, the value that means target."),
+        typer.Option(help="The class to grasp, 2 by default; with --mask, the value that means target."),
     ] = None,
     gripper: Gripper = "",
     workspace: Annotated[
         str,
         typer.Option(
-            help="What the arm can meet: from and to in x, y and z of the base frame, z from the table; if not given, "
+            help="What the arm can reach: from and to in x, y and z of the base frame, z from the table; by default "
             "what stands on the table."
         ),
     ] = "",
@@ -56,7 +58,7 @@ def perceive(
         Path, typer.Option(help="Folder for overlay.png, targets.png, clouds, grasps.json, report.html.")
     ] = Path("out"),
 ) -> None:
-    """Find targets and grasps in a picture of your own camera; finding none is a valid result."""
+    """Find targets and grasps in a picture from your own camera; finding none is a valid result."""
     from dataclasses import replace
 
     from labcli import perceive as own

@@ -9,14 +9,14 @@ from labcli.commands.options import of_course
 
 
 def release(
-    topics: Annotated[list[str] | None, typer.Argument(help="Topics such as 04_iou; all if none is given.")] = None,
+    topics: Annotated[list[str] | None, typer.Argument(help="Topics such as 04_iou; all by default.")] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Change nothing; exit status 1 if something would change.")
     ] = False,
     bundle: Annotated[
-        Path | None, typer.Option(help="Write a zip of what students get of these topics: no solutions, no tests.")
+        Path | None, typer.Option(help="Write a zip for students of these topics: no solutions, no tests.")
     ] = None,
-    week: Annotated[int | None, typer.Option(help="The topics of a week of the syllabus, in place of names.")] = None,
+    week: Annotated[int | None, typer.Option(help="The topics of a week of the syllabus, instead of names.")] = None,
     course: Annotated[
         Path, typer.Option(help="Folder that holds lessons, solutions and labs.", callback=of_course)
     ] = Path("."),

@@ -1,4 +1,4 @@
-"""`labkit renumber`: lessons run again, and their marked numbers written anew."""
+"""`labkit renumber`: reruns lessons and updates their marked numbers."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,12 +7,13 @@ import typer
 
 
 def renumber(
-    lessons: Annotated[list[Path] | None, typer.Argument(help="Notebooks; all lessons if none is named.")] = None,
+    lessons: Annotated[list[Path] | None, typer.Argument(help="Notebooks; all lessons by default.")] = None,
     family: Annotated[
-        str, typer.Option(help="Run nothing: list the lessons and solutions whose scenes hold a thing of this family.")
+        str,
+        typer.Option(help="Run nothing: list the lessons and solutions whose scenes contain an object of this family."),
     ] = "",
 ) -> None:
-    """Run lessons again, write their marked numbers anew, and list the sentences whose claim may no longer hold.
+    """Rerun lessons, update their marked numbers, and list the sentences whose claim may no longer hold.
 
     For a camera of your own (`camera` in [tool.labcourse], LABKIT_CAMERA), other scenes, or new versions. The notebooks
     are changed in place; git shows how. Exits with 1 if a sentence has to be read.

@@ -13,9 +13,9 @@ def texts(
     course: Annotated[Path, typer.Option(help="Folder that holds nbgrader's gradebook.", callback=of_course)] = Path(
         "."
     ),
-    port: Annotated[int, typer.Option(help="Port of the page; a free one if not given.", min=0, max=65535)] = 0,
+    port: Annotated[int, typer.Option(help="Port of the page; a free one by default.", min=0, max=65535)] = 0,
 ) -> None:
-    """Grade answers in words in a browser, all students' answers to a question on one page, without names."""
+    """Grade written answers in a browser, all students' answers to a question on one page, without names."""
     needs_linux("texts")
     from labgrader.grade_course import private
     from labgrader.handin.reading import read_lab

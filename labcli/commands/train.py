@@ -15,29 +15,28 @@ def train(
     scenes: Annotated[int | None, typer.Option(help="Use only the first N scenes of each.", min=1)] = None,
     val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
     model: Annotated[
-        str | None, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet; that of --init, or else unet.")
+        str | None, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet; that of --init, or unet.")
     ] = None,
-    init: Annotated[
-        str | None, typer.Option(help="Weights to start from, to train on: a name as in --model, or a file.")
-    ] = None,
+    init: Annotated[str | None, typer.Option(help="Weights to continue from: a name as in --model, or a file.")] = None,
     things: Annotated[
-        bool, typer.Option("--things", help="Learn to tell things apart, too, from data sets of data_gen; unet_rgbd.")
+        bool,
+        typer.Option("--things", help="Also learn to tell objects apart, from data sets of data_gen; unet_rgbd only."),
     ] = False,
-    epochs: Annotated[int | None, typer.Option(help="Passes over the data; the model's recipe if not given.")] = None,
-    lr: Annotated[float | None, typer.Option(help="Highest learning rate; the model's recipe if not given.")] = None,
-    batch: Annotated[int | None, typer.Option(help="Images in a batch; the model's recipe if not given.")] = None,
+    epochs: Annotated[int | None, typer.Option(help="Passes over the data; by default the model's recipe.")] = None,
+    lr: Annotated[float | None, typer.Option(help="Highest learning rate; by default the model's recipe.")] = None,
+    batch: Annotated[int | None, typer.Option(help="Images in a batch; by default the model's recipe.")] = None,
     depth_scale: DepthScale = None,
     aligned: Aligned = False,
     camera_name: CameraName = None,
     device: Annotated[Literal["auto", "cpu", "cuda"], typer.Option(help="Where to train.")] = "auto",
     workers: Annotated[
-        int, typer.Option(help="Processes that make batches ahead, for a GPU; the run is the same.", min=0)
+        int, typer.Option(help="Processes that prepare batches ahead, for a GPU; results are the same.", min=0)
     ] = 0,
     seed: Annotated[int, typer.Option(help="Seed of weights, order and augmentation.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder for weights, checkpoint and history.")] = Path("data/runs"),
-    resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in OUT, if there is one.")] = True,
+    resume: Annotated[bool, typer.Option(help="Continue from the checkpoint in OUT, if there is one.")] = True,
 ) -> None:
-    """Train a network; stopped with Ctrl-C, the same command resumes. Under torchrun, on many cores."""
+    """Train a network; stopped with Ctrl-C, the same command resumes. Under torchrun it uses several processes."""
     from dataclasses import replace
 
     import data_gen

@@ -8,7 +8,7 @@ import typer
 
 def trust(
     folder: Annotated[
-        Path, typer.Argument(help="A course's folder, with a pyproject.toml; this one if left out.")
+        Path, typer.Argument(help="A course's folder, with a pyproject.toml; the current one by default.")
     ] = Path("."),
 ) -> None:
     """Trust another course than the installed one: its questions, which are code, run for commands in its folder."""
