@@ -59,7 +59,7 @@ PROMISES = [
 ]
 TESTED = [
     ("runs README's two commands on a bare Debian", "make fresh"),
-    ("the two made the same bytes of fixed seeds", "make everywhere"),
+    ("both produced the same bytes from fixed seeds", "make everywhere"),
     ("Submissions run in a sandbox", "pytest tests/labgrader/sandbox"),
     ("answers a recording of ROS 1 or ROS 2, without ROS", "pytest tests/labros/test_bags.py"),
     ("the same masks and clouds in C++, Java and Octave", "make stacks"),
