@@ -1,7 +1,10 @@
 """06_back_projection.back_project: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array, intrinsics, truth
 from labcourse.questions.t06_back_projection import K_SMALL, K_of, camera
 from labgrader.question import Question, holds, wrong
 
@@ -16,25 +19,39 @@ def back_project(depth, K, along_ray):
     return np.where(depth > 0.0, depth, np.nan)[..., None] * rays
 
 
-def _depth_image(rng):
-    """Draw depths of 0.3 to 2 m, a nearer and a farther one, and some without a reading, 0 or NaN; H != W."""
-    H, W = int(rng.integers(6, 10)), int(rng.integers(11, 16))
+def _depth_image(rng, shape=None):
+    """Draw depths of 0.3 to 2 m, some that are nearer and farther, and some without a reading, 0 or NaN; H != W."""
+    H, W = shape or (int(rng.integers(6, 10)), int(rng.integers(11, 16)))
     depth = rng.uniform(0.3, 2.0, (H, W)).astype(np.float32)
     depth[rng.random((H, W)) < 0.15] = 0.0
     depth[rng.random((H, W)) < 0.1] = np.nan
-    depth[1, 2], depth[3, 1] = rng.uniform(0.002, 0.09), rng.uniform(15.0, 60.0)
-    return depth, camera(rng, H, W), bool(rng.random() < 0.6)
+    depth.flat[[1, 2, -3, -2]] = rng.uniform((1.1e-4, 0.001, 15.0, 70.0), (0.001, 0.09, 60.0, 100.0))
+    return depth.astype(rng.choice([np.float32, np.float64])), camera(rng, H, W), bool(rng.random() < 0.6)
 
 
 QUESTION = Question(
     reference=back_project,
-    inputs=_depth_image,
+    kinds={
+        "depth": array(
+            "H W",
+            1e-4,
+            100.0,
+            also=(0.0, np.nan),
+            dtype="float32 float64",
+            says=("1e-4 to 100", "0 or NaN"),
+            free=("NaN to 0", "0 to NaN"),
+        ),
+        "K": intrinsics(),
+        "along_ray": truth(),
+    },
+    inputs=(_depth_image, partial(_depth_image, shape=(LONG, 1)), partial(_depth_image, shape=(1, LONG))),
     by_hand=(
         (np.array([[0.5, 0.0, 0.5]]), K_SMALL, False),
         (np.array([[2.0, np.nan], [1.0, 4.0], [0.0, 2.0]]), K_of(4.0, 2.0, 0.0, 1.0), False),
-        (np.array([[0.0, 3.0], [np.nan, 2.0], [0.5, 0.0]]), K_of(1.0, 2.0, -1.0, -1.0), True),  # rays (2, 1/2, 1), ...
+        (np.array([[0.0, 3.0], [np.nan, 2.0], [0.5, 0.0]]), K_of(1.0, 2.0, 3.0, 1.0), True),  # rays (-2, -1/2, 1), ...
         (np.array([[1.0, 2.0], [2.0, 4.0]]), K_SMALL, True),  # no holes
         (np.array([[0.05, 0.0], [0.004, 30.0]]), K_SMALL, False),  # near, nothing, nearer, far
+        (np.array([[1e-4, 80.0]]), K_SMALL, False),
     ),
     random_cases=10,
 )

@@ -1,8 +1,10 @@
 """06_back_projection.cropped_intrinsics: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
-from labcourse.questions.t06_back_projection import camera
+from labcourse.kinds import count, intrinsics, number
 from labgrader.question import Question, wrong
 
 
@@ -13,19 +15,29 @@ def cropped_intrinsics(K, left, top, scale):
     return crop_and_resize @ K
 
 
+def _crop(rng, large):
+    """Draw a camera, where a window begins, and a scale that makes it larger, or else smaller."""
+    left, top = rng.choice([rng.integers(5, 40, 2), rng.integers(1000, 4000, 2)])
+    return intrinsics().draw(rng), int(left), int(top), float(10.0 ** (rng.uniform(0.1, 2.0) * (1 if large else -1)))
+
+
 QUESTION = Question(
     reference=cropped_intrinsics,
-    inputs=lambda rng: (
-        camera(rng, 120, 160),
-        int(rng.integers(5, 40)),
-        int(rng.integers(41, 60)),
-        float(rng.choice([0.25, 0.5, 2.0, 3.0])),
-    ),
+    kinds={
+        "K": intrinsics(),
+        "left": count(0, 3999, says="0 to 3999"),
+        "top": count(0, 3999, says="0 to 3999"),
+        "scale": number(0.01, 100.0, says="0.01 to 100"),
+    },
+    inputs=(partial(_crop, large=False), partial(_crop, large=True)),
     by_hand=(
         (np.array([[200.0, 0.0, 160.0], [0.0, 300.0, 119.0], [0.0, 0.0, 1.0]]), 40, 20, 1.0),  # cropped alone
         # 20 x 16: 4.5, 3.5 is the middle
         (np.array([[200.0, 0.0, 9.5], [0.0, 300.0, 7.5], [0.0, 0.0, 1.0]]), 0, 0, 0.5),
         (np.array([[200.0, 0.0, 0.0], [0.0, 300.0, 0.0], [0.0, 0.0, 1.0]]), 0, 0, 2.0),  # the first pixel's centre
+        # 0.01 (3000 - 2500 + 0.5) - 0.5 = 4.505, and 80 (100.5 - 100 + 0.5) - 0.5 = 79.5
+        (np.array([[2000.0, 0.0, 3000.0], [0.0, 2000.0, 2200.5], [0.0, 0.0, 1.0]]), 2500, 2200, 0.01),
+        (np.array([[50.0, 0.0, 100.5], [0.0, 60.0, 2200.5], [0.0, 0.0, 1.0]]), 100, 2200, 80.0),
     ),
     rtol=1e-6,
 )

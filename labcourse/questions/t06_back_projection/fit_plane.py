@@ -1,7 +1,10 @@
 """06_back_projection.fit_plane: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array
 from labcourse.questions.t06_back_projection import pose
 from labgrader.question import Question, holds, wrong
 
@@ -15,17 +18,17 @@ def fit_plane(P, sigma):
     return n, float(n @ centre)
 
 
-def _points_near_a_plane(rng):
-    """Draw points of a slanted plane, longer than wide, half of them three times as noisy as the others.
+def _points_near_a_plane(rng, many=None, least=0.02, most=0.06, size=1.0, reach=0.0):
+    """Draw points of a slanted plane, longer than wide, half of them noisier than the others, by default three times.
 
     The normal as np.linalg.eigh gives it points down in most draws.
     """
-    N, any_sign = int(rng.integers(30, 40)), rng.random() < 0.3
-    sigma = np.where(rng.random(N) < 0.5, 0.02, 0.06) * rng.uniform(0.8, 1.2, N)
-    local = rng.uniform(-0.5, 0.5, (N, 3)) * (1.0, 0.4, 0.0) + sigma[:, None] * rng.normal(size=(N, 3))
+    N, any_sign = many or int(rng.integers(30, 40)), rng.random() < 0.3
+    sigma = np.where(rng.random(N) < 0.5, least, most) * rng.uniform(0.8, 1.2, N)
+    local = size * rng.uniform(-0.5, 0.5, (N, 3)) * (1.0, 0.4, 0.0) + sigma[:, None] * rng.normal(size=(N, 3))
     while True:
         T = pose(rng)
-        P = local @ T[:3, :3].T + T[:3, 3]
+        P = local @ T[:3, :3].T + T[:3, 3] + rng.uniform(-reach, reach, 3)
         points_down = np.linalg.eigh(np.cov(P.T, aweights=sigma**-2.0))[1][2, 0] < 0.0
         if 0.3 < abs(T[2, 2]) < 0.9 and (any_sign or points_down):
             return P, sigma
@@ -33,11 +36,23 @@ def _points_near_a_plane(rng):
 
 QUESTION = Question(
     reference=fit_plane,
-    inputs=_points_near_a_plane,
+    kinds={
+        "P": array("N 3", -10.0, 10.0, lengths={"N": (3, None)}, says=("-10 to 10", "at least three")),
+        "sigma": array("N", 1e-4, 1.0, lengths={"N": (3, None)}, says="1e-4 to 1"),
+    },
+    inputs=(
+        _points_near_a_plane,
+        partial(_points_near_a_plane, many=LONG, least=2e-4, most=0.6, size=4.0, reach=6.0),
+        partial(_points_near_a_plane, many=6, least=0.05, most=0.7, size=7.0, reach=4.0),
+    ),
     by_hand=(
         (np.array([[0.0, 0, 2], [1, 0, 2], [0, 3, 2], [1, 3, 2]]), np.ones(4)),  # level, at height 2
-        (np.array([[0.0, 0, 1], [1, 0, 0], [0, 5, 1], [1, 5, 0]]), np.full(4, 1.5)),  # 45 degrees: x + z = 1
-        (np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0], [4, 3, 0.1]]), np.array([0.01, 0.01, 0.01, 100.0])),
+        (np.array([[0.0, 0, 1], [1, 0, 0], [0, 5, 1], [1, 5, 0]]), np.ones(4)),  # 45 degrees: x + z = 1
+        (np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0], [4, 3, 0.1]]), np.array([0.01, 0.01, 0.01, 1.0])),
+        (np.array([[0.0, 0, 1], [2, 0, 1], [0, 3, 2]]), np.array([0.0001, 0.3, 1.0])),  # z = 1 + y / 3, whatever sigma
+        # twisted
+        (np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 4e-4]]), np.array([1e-4, 2e-4, 2e-4, 2e-4])),
+        (np.array([[-4.0, 5, 0], [0, 5, 0], [-4, 8, 0], [0, 8, -2]]), np.array([0.5003, 0.5, 0.5, 0.5])),
     ),
     random_cases=6,
     atol=1e-5,

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from labcourse.questions.t06_back_projection import K_SMALL, columns, pixel, pose, straight_ahead
+from labcourse.kinds import intrinsics, number, pose, poses
+from labcourse.questions.t06_back_projection import K_SMALL, K_of, columns, pixel, straight_ahead
 from labgrader.question import Question, wrong
 
 
@@ -19,22 +20,49 @@ def _noisy_pixel(rng):
     return *pixel(rng), pose(rng), *(float(sigma) for sigma in noise)
 
 
+def _any_camera(rng):
+    """Draw a pixel of a large picture, its depth, a camera, its pose, and noise of which each kind counts."""
+    u, v, d = map(float, rng.uniform((0.0, 0.0, 0.1), (4000.0, 4000.0, 100.0)))
+    return u, v, d, intrinsics().draw(rng), pose(rng), *map(float, rng.uniform(0.0, (100.0, 10.0, 1.0)))
+
+
 # Looks down from 2 m: its z is the base frame's -z, its x the base frame's -y.
 _LOOKS_DOWN = np.array([[0.0, -1.0, 0.0, 1.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
-
-
 # Looks along the base frame's x axis, level.
 _LOOKS_LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]])
+# Looks along the base frame's y axis, its own x up.
+_ON_ITS_SIDE = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]])
+# No axis is level, and neither is it in the second, which is turned round.
+_SLANTED = np.array([[0.8, 0.36, 0.48, 0.1], [0.0, 0.8, -0.6, 0.2], [-0.6, 0.48, 0.64, 0.3], [0.0, 0.0, 0.0, 1.0]])
+_TURNED_OVER = np.diag([1.0, -1.0, -1.0, 1.0]) @ _SLANTED
 
 
 QUESTION = Question(
     reference=height_noise,
-    inputs=_noisy_pixel,
+    kinds={
+        "u": number(0.0, 4000.0, says="0 to 4000"),
+        "v": number(0.0, 4000.0, says="0 to 4000"),
+        "d": number(0.01, 100.0, says="0.01 to 100"),
+        "K": intrinsics(),
+        "T_base_cam": poses(free=("*at ?0, *", "*at ?1, *", "*at ?3, *", "*at ?2, 3]")),
+        "sigma_pixel": number(0.0, 100.0, says="0 to 100"),
+        "sigma_depth": number(0.0, 10.0, says="0 to 10"),
+        "sigma_tilt": number(0.0, 1.0, says="0 to 1"),
+    },
+    inputs=(_noisy_pixel, _any_camera),
     by_hand=(
         (2.0, 1.0, 0.5, K_SMALL, _LOOKS_DOWN, 0.5, 0.01, 0.0),  # only depth matters: 0.01
         (2.0, 1.0, 0.5, K_SMALL, _LOOKS_DOWN, 0.5, 0.01, 0.1),  # y is 0.125 m: hypot(0.01, 0.0125)
         (2.0, 1.0, 0.5, K_SMALL, _LOOKS_LEVEL, 0.5, 0.01, 0.0),  # a pixel down is 0.125 m: hypot(0.0625, 0.0025)
         (3.0, 2.0, 1.0, K_SMALL, _LOOKS_LEVEL, 0.0, 0.02, 0.05),  # hypot(0.5 * 0.02, 1 * 0.05)
+        (2.0, 2.0, 1.0, K_SMALL, _SLANTED, 0.0, 0.1, 0.0),  # 0.1 (-0.3 + 0.24 + 0.64)
+        (2.0, 2.0, 1.0, K_SMALL, _TURNED_OVER, 0.0, 0.0, 0.1),  # 0.1 (-0.64 * 0.5 + 0.48)
+        # far off the axis, and each noise at its largest: 100 / 20 (0.6, 0.48), 10 * 0.16 and 100 * 0.48
+        (4000.0, 3000.0, 100.0, K_of(2000.0, 2000.0, 0.0, 0.0), _TURNED_OVER, 100.0, 10.0, 1.0),
+        # near the axis: 0.01 * 0.0002, 0.01 * 0.1001; a hundredth of a pixel, near: 0.0126 * 0.0124 / 4
+        (1.0006, 0.0, 0.5, K_of(2.0, 4.0, 1.0002, 0.0), _ON_ITS_SIDE, 0.0, 0.01, 0.0),
+        (0.0, 1000.4004, 0.5, K_of(2.0, 4.0, 1.0, 1000.0), _LOOKS_LEVEL, 0.0, 0.01, 0.0),
+        (2.0, 1.0, 0.0124, K_SMALL, _LOOKS_LEVEL, 0.0126, 0.0, 0.0),
     ),
     atol=1e-9,
     points=3,

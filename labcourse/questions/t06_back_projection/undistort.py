@@ -1,7 +1,10 @@
 """06_back_projection.undistort: the question, and wrong answers with the hints that they earn."""
 
+from functools import partial
+
 import numpy as np
 
+from labcourse.kinds import LONG, array, intrinsics
 from labcourse.questions.t06_back_projection import K_SMALL, K_of, camera
 from labgrader.question import Question, holds, wrong
 
@@ -25,11 +28,12 @@ def distort(pixels, K, k):
     return c + f * x * (1.0 + k[0] * r2 + k[1] * r2**2)
 
 
-def _seen_pixels(rng):
+def _seen_pixels(rng, many=9):
     """Draw a camera of few or many pixels, a lens that bends in or out, and pixels up to 42 degrees off its axis."""
-    K, k = camera(rng, 120, 160), np.array([rng.choice([-0.3, 0.4]), rng.choice([0.0, 0.1])])
-    K[:2] *= rng.choice([1.0, 20.0])
-    angle, r = rng.uniform(0.0, 2.0 * np.pi, 9), rng.uniform(0.2, 0.9, 9)
+    K = camera(rng, 120, 160)
+    k = np.array([rng.choice([-0.3, 0.4, rng.uniform(-0.3, 0.4)]), rng.choice([0.0, 0.1, rng.uniform(0.0, 0.1)])])
+    K[:2] *= rng.choice([1.0, 15.0])
+    angle, r = rng.uniform(0.0, 2.0 * np.pi, many), rng.uniform(0.2, 0.9, many)
     r[:2] = 0.9
     ideal = K[:2, 2] + np.diagonal(K)[:2] * np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
     return distort(ideal, K, k), K, k
@@ -39,7 +43,16 @@ K_LARGE = K_of(200.0, 400.0, 100.0, 0.0)  # the small camera with a hundred time
 
 QUESTION = Question(
     reference=undistort,
-    inputs=_seen_pixels,
+    kinds={
+        "pixels": array("N 2", -6000.0, 10_000.0, says="-6000 to 10000"),
+        "K": intrinsics(free=("*at ?2, *",)),  # the row 0 0 1
+        "k": array(
+            "2",
+            says=("k1 from -0.3 to 0.4", "k2 from 0 to 0.1"),
+            form=lambda rng, _: rng.uniform((-0.3, 0.0), (0.4, 0.1)),
+        ),
+    },
+    inputs=(_seen_pixels, partial(_seen_pixels, many=LONG)),
     by_hand=(
         # 0.5 (1 + 0.4 / 4 + 0.05 / 16) = 0.5515625; another root, a complex one, has a smaller real part
         (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
@@ -48,12 +61,21 @@ QUESTION = Question(
         (np.array([[236.26, 0.0], [100.0, 238.84]]), K_LARGE, np.array([-0.3, 0.0])),
         (np.array([[2.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
         # 0.9 (1 + 0.4 * 0.81 + 0.1 * 0.6561) = 1.250649
-        (np.array([[350.1298, 0.0], [100.0, 500.2596]]), K_LARGE, np.array([0.4, 0.1])),
+        (
+            np.array([[-4002.596, 3000.0], [1000.0, 5501.298]]),
+            K_of(4000.0, 2000.0, 1000.0, 3000.0),
+            np.array([0.4, 0.1]),
+        ),
         # 0.5 (1 - 0.3 / 4 + 0.1 / 16) = 0.465625
         (np.array([[193.125, 0.0], [100.0, 186.25]]), K_LARGE, np.array([-0.3, 0.1])),
         # 0.9 (1 - 0.3 * 0.81) = 0.6813 again and 0.85 (1 - 0.3 * 0.7225) = 0.6657625; with f = 4000 a thousandth of a
-        # pixel is 2.5e-7 of the ray
-        (np.array([[3043.9, 700.0], [1000.0, 3363.05]]), K_of(3000.0, 4000.0, 1000.0, 700.0), np.array([-0.3, 0.0])),
+        # pixel is 2.5e-7 of the ray, and half a thousandth of u becomes two by the lens
+        (
+            np.array([[3043.90046, 700.0], [1000.0, 3363.05]]),
+            K_of(3000.0, 4000.0, 1000.00046, 700.0),
+            np.array([-0.3, 0.0]),
+        ),
+        (np.array([[2.1, 0.0]]), K_SMALL, np.array([0.4, 0.0])),
     ),
     random_cases=12,
     rtol=0.0,
