@@ -113,3 +113,9 @@ def test_a_weeks_minutes_add_up(week, topic):
     stated = re.search(r"(\d+) minutes in all", "".join(cell.source for cell in solution.cells[:3]))
     assert (len(lessons), lab, hour) == (len(TOPICS[topic]), int(stated[1]), 60)
     assert sum(lessons) + lab + hour == int(total)
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_no_two_lessons_of_a_deck_share_a_cells_id(topic):
+    ids = [cell.id for lesson in TOPICS[topic] for cell in nbformat.read(lesson, as_version=4).cells]
+    assert sorted(ids) == sorted(set(ids))
