@@ -239,6 +239,7 @@ def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
         for slide in slides_of(lesson):
             made.setdefault(slide["place"], []).append(slide)
         for place, cell in enumerate(cells):
+            identity = f"{lessons.index(lesson)}-{cell.id}"  # lessons may share a cell, and so its id
             shown = made.get(place, [])
             with_picture = [slide for slide in shown if slide["picture"] is not None]
             for slide in shown:
@@ -247,7 +248,8 @@ def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
                 if slide["picture"] is None:
                     book.cells.append(start := text(heading + slide["text"], "slide"))
                 else:
-                    picture = nbformat.from_dict({**cell, "id": f"{cell.id}-{slide['picture']}", "metadata": {}})
+                    identity += f"-{slide['picture']}"
+                    picture = nbformat.from_dict({**cell, "id": identity, "metadata": {}})
                     images = [out for out in cell.outputs if "image/png" in out.get("data", {})]
                     picture.outputs = [images[slide["picture"]]]
                     picture.metadata.slideshow = {"slide_type": "-"}
@@ -258,8 +260,8 @@ def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
                 if slide["then"]:
                     book.cells.append(text(slide["then"], "fragment"))
             if cell.cell_type == "code" and not with_picture:
-                skipped = nbformat.from_dict({**cell, "metadata": {"slideshow": {"slide_type": "skip"}}, "outputs": []})
-                book.cells.append(skipped)
+                silent = {"id": identity, "metadata": {"slideshow": {"slide_type": "skip"}}, "outputs": []}
+                book.cells.append(nbformat.from_dict({**cell, **silent}))
     return book
 
 
