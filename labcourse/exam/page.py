@@ -18,7 +18,7 @@ body { max-width: 170mm; margin: 8mm auto }
 h1 { font-size: 17pt; margin: 0 } h2 { font-size: 12pt; margin: 9mm 0 1mm; break-after: avoid }
 h2 { display: flex; justify-content: space-between; gap: 6mm }
 h2 span { font-weight: normal; white-space: nowrap } p { margin: 2mm 0 }
-section { break-inside: avoid }
+.question, dl, li { break-inside: avoid } h3, .how { break-after: avoid }
 .head { display: grid; grid-template-columns: 1fr 1fr auto; gap: 5mm; margin: 4mm 0; align-items: end }
 .head div { border-bottom: .3mm solid } .head .total { border: .3mm solid; padding: 9mm 3mm 2mm 16mm; grid-area: 1/3/3 }
 table { border-collapse: collapse; margin: 2mm 6mm 2mm 0; font-size: 11pt; display: inline-table }
@@ -32,11 +32,11 @@ dt, dd { margin: 0 } dt { font-style: italic }
 dd span { float: right; color: #333 } .how { color: #333 } ul { margin: 1mm 0; padding-left: 5mm }
 """
 ROOM_MM = 9  # of paper for each minute that a question takes
-AIDS = "pen and paper; nobody needs a calculator"
+AIDS = "pen and paper; no calculator is needed"
 RULES = (
-    "Not for students. An answer's points stand beside it; each of its values earns an equal part. A mistake that is "
-    "listed costs 1 point, a slip in reckoning ½, and neither more than the answer is worth. What follows rightly from "
-    "a wrong value costs nothing more."
+    "Not for students. Points are shown beside each answer; each of its values earns an equal part. A listed mistake "
+    "costs 1 point, an arithmetic slip ½, and neither costs more than the answer is worth. What follows correctly from "
+    "a wrong value loses nothing more."
 )
 
 
@@ -102,14 +102,14 @@ def exam_page(
         f'<div class="head">{"".join(f"<div>{line}</div>" for line in lines)}',
         f'<div class="total">of {points}</div></div>',
         f"<p>{len(questions)} questions, {points} points, {minutes} minutes: {answering} for the questions, the rest "
-        f"for reading. Allowed: {escape(aids or AIDS)}. Fractions and roots may stay as they are. Write how you got "
-        "there: a right way to a wrong number earns points. Rows and columns, pixels and classes are counted from "
-        "0.</p>",
+        f"for reading. Allowed: {escape(aids or AIDS)}. You may leave fractions and roots as they are. Show your "
+        "working: a correct method earns points even if the number is wrong. Rows and columns, pixels and classes are "
+        "counted from 0.</p>",
     ]
     for number, (question, paper) in enumerate(zip(questions, papers, strict=True), 1):
         worth = f"<span>{count(question.points)}, {question.minutes} min</span>"
         parts.append(
-            f"<section><h2>{number}. {question.about} {worth}</h2>\n"
+            f'<section class="question"><h2>{number}. {question.about} {worth}</h2>\n'
             f'{paper.text}\n<div style="height:{ROOM_MM * question.minutes}mm"></div></section>'
         )
     return page(f"Exam, version {letter}", "\n".join(parts))

@@ -59,8 +59,9 @@ def summed_loss(rng):
     loss = cross_entropy(z, y) / np.log(2)
     return Paper(
         {"powers": powers},
-        "<p>The network gives the true class of four pixels the probabilities "
-        f"{', '.join(f'1/{2**n}' for n in powers)}; pixel {named(hidden)} of them is labelled 255. "
+        "<p>A network gives class 0 at four pixels the probabilities "
+        f"{', '.join(f'1/{2**n}' for n in powers)}. Pixel {named(hidden)} of them is labelled 255, the others are "
+        "labelled 0. "
         "How large is the cross-entropy, summed over the pixels that count, as a multiple of ln 2? And its mean?</p>",
         {"sum": loss, "mean": loss / 3},
         "−ln(1/2ⁿ) = n ln 2; pixels of 255 add nothing, and are not counted in the mean.",
