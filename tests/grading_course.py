@@ -8,20 +8,27 @@ import ast
 import copy
 import functools
 import inspect
+import io
 import json
+import logging
+import os
+import shutil
 import tempfile
 import types
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import chdir, suppress
 from glob import glob
 from pathlib import Path
 
 import numpy as np
+import pytest
 from alternatives import alternatives
 
 from labgrader.course import of_topic
 from labgrader.grade.gradebook import opened
 from labgrader.question import Question
+
+ROOT = Path(__file__).parents[1]
 
 
 def code_cell(source: str, grade_id: str | None = None, **mark) -> dict:
@@ -112,6 +119,24 @@ def submit(course: Path, student: str, topic: str, answers: dict[str, str] | dic
 def write(path: Path, content: dict) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(content))
+
+
+def zip_collect(course: Path, topic: str) -> str:
+    """What `nbgrader zip_collect TOPIC` does in a course, whose zips lie in downloaded/TOPIC/archive; what it says."""
+    from nbgrader.apps import ZipCollectApp  # a second, which other tests need not wait
+
+    shutil.copy(ROOT / "nbgrader_config.py", course)
+    said, app, umask = io.StringIO(), ZipCollectApp(), os.umask(0o022)
+    try:
+        with chdir(course), pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(ROOT)  # nbgrader adds to it, which is undone
+            app.initialize([topic])
+            app.init_logging(logging.StreamHandler, [said], color=False)
+            app.start()
+    finally:
+        os.umask(umask)
+        app.reset()
+    return said.getvalue()
 
 
 def other_answers(topic: str) -> dict[str, list[str]]:

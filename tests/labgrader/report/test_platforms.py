@@ -2,10 +2,6 @@
 
 import csv
 import json
-import os
-import shutil
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -41,7 +37,6 @@ CANVAS = ("lovelaceada_1234_567890_04_iou.ipynb", "obrienzoe_LATE_1235_567891_04
 def collected(course: Path, names: tuple[str, str]) -> list[str]:
     """Collect, grade, and grade one answer in words by hand; the students' names."""
     kit.write_lab(course, TOPIC)
-    shutil.copy(ROOT / "nbgrader_config.py", course)
     archive = course / "downloaded" / TOPIC / "archive" / "all.zip"
     archive.parent.mkdir(parents=True)
     right = kit.right_answers(TOPIC)
@@ -51,9 +46,7 @@ def collected(course: Path, names: tuple[str, str]) -> list[str]:
             info = zipfile.ZipInfo(name, date_time=(2026, 10, 6 if late else 5, 12, 0, 0))
             packed.writestr(info, json.dumps(kit.lab_notebook(TOPIC, answers)))
     (course / "course.toml").write_text(COURSE)
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    collect = [sys.executable, "-m", "nbgrader", "zip_collect", TOPIC]
-    subprocess.run(collect, cwd=course, env=environment, capture_output=True, check=True)
+    kit.zip_collect(course, TOPIC)
     students = [record.student for record in grade_course(TOPIC, course, seed="secret", progress=False).records]
     with opened(course) as book:
         grade = book.find_grade("explain", TOPIC, TOPIC, students[0])
