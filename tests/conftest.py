@@ -7,7 +7,8 @@ Tests marked `nightly` repeat at length what others show at once; `--nightly` ru
 leaves them out (`make nightly`).
 
 Tests marked `debian` need Debian packages beside the environment: where those are missing, the tests skip, and the run
-ends with a table of what was skipped and the command that would enable it.
+ends with a table of what was skipped and the command that would enable it. Those that need Chromium take minutes:
+`make test` leaves them to `.ci/run`.
 """
 
 import os
@@ -100,8 +101,9 @@ def pytest_addoption(parser):
     parser.addoption("--no-skip", action="store_true", help="fail tests whose Debian packages are missing")
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(config, items):
-    """Leave out what is for another hour, and skip what this system cannot do."""
+    """Leave out what is for another hour, mark what needs a browser, and skip what this system cannot do."""
     parts = {True: [], False: []}
     for item in items:
         parts[item.get_closest_marker("nightly") is not None].append(item)
@@ -109,6 +111,8 @@ def pytest_collection_modifyitems(config, items):
     items[:] = parts[wanted]
     config.hook.pytest_deselected(items=parts[not wanted])
     for item in items:
+        if any("chromium" in mark.args for mark in item.iter_markers("debian")):
+            item.add_marker("browser")
         for start, (systems, reason) in NOT_EVERYWHERE.items():
             if item.nodeid.startswith(start) and sys.platform not in systems.split():
                 item.add_marker(pytest.mark.skip(reason=reason))

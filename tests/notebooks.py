@@ -1,4 +1,4 @@
-"""The course's notebooks, for the tests that look into them; as a plugin of pytest, what nbval compares.
+"""The course's notebooks, for the tests that look into them; as a plugin of pytest, nbval and what it compares.
 
 Outputs of lessons and solutions are compared with the committed ones. Labs have none: they run as students get them,
 but on fewer scenes and for fewer steps of training; the others do so where no compared output shows it. Each
@@ -10,12 +10,13 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import nbformat
-from jupyter_client.provisioning import local_provisioner
+import pytest
 
 from labgrader.course import topics
 from tests.warm_kernels import WarmKernels
 
+sys.modules.setdefault("rfc3987_syntax", None)  # as conftest.py says, which is read after nbval
+pytest_plugins = ["nbval.plugin"]  # which pyproject.toml leaves out elsewhere
 ROOT = Path(__file__).parents[1]
 LESSONS = [path for topic in topics() for path in sorted(ROOT.glob(f"lessons/{topic}*.ipynb"))]  # some topics have two
 SOLUTIONS = [ROOT / "solutions" / topic / f"{topic}.ipynb" for topic in topics()]
@@ -25,6 +26,8 @@ LABS = [ROOT / "labs" / topic / f"{topic}.ipynb" for topic in topics()]
 @cache
 def notebook(path: Path):
     """Read a notebook once."""
+    import nbformat
+
     return nbformat.read(path, as_version=4)
 
 
@@ -80,10 +83,32 @@ def imported() -> list[str]:
     return [name for name in dict.fromkeys(named) if not name.startswith("tqdm")]
 
 
-def pytest_configure():
-    """Fork kernels from a process that has imported it all, where a process can be forked and go on."""
-    if sys.platform == "linux":
-        local_provisioner.launch_kernel = WarmKernels(imported())
+@cache
+def warm_kernels() -> WarmKernels:
+    """Kernels of this process: forks of one that has imported what the notebooks import."""
+    return WarmKernels(imported())
+
+
+def is_cell(item) -> bool:
+    """Whether a test is a notebook's cell."""
+    return item.path.suffix == ".ipynb"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item):
+    """Fork a notebook's kernel, where a process can be forked and go on; the tests beside begin theirs from nothing."""
+    from jupyter_client.provisioning import local_provisioner
+
+    with pytest.MonkeyPatch.context() as patch:
+        if is_cell(item) and sys.platform == "linux":
+            patch.setattr(local_provisioner, "launch_kernel", warm_kernels())
+        return (yield)
+
+
+def pytest_ignore_collect(collection_path):
+    """Leave out notebooks that are not the course's, such as the sample class's."""
+    ours = any(collection_path.is_relative_to(ROOT / folder) for folder in ("lessons", "solutions", "labs"))
+    return True if collection_path.suffix == ".ipynb" and not ours else None
 
 
 def pytest_collectstart(collector):
@@ -94,6 +119,8 @@ def pytest_collectstart(collector):
 
 def pytest_itemcollected(item):
     """Let a cell do with fewer scenes; the file that students get says what it says."""
+    if not is_cell(item):
+        return
     changes = FEWER.get(item.path.stem, {})
     if item.path.is_relative_to(ROOT / "labs"):
         changes = changes | FEWER_IN_LABS.get(item.path.stem, {})

@@ -11,7 +11,7 @@ import tokenize
 from pathlib import Path
 
 from nbformat import NotebookNode, reads
-from nbformat.v4 import new_code_cell
+from nbformat.v4 import new_code_cell, new_markdown_cell
 
 from labgrader.course import course as course_here
 from labgrader.release.release import read, tidy, to_bytes
@@ -120,24 +120,68 @@ def notebook_of(text: str) -> NotebookNode:
 
 
 def add_task(notebook: NotebookNode, topic: str, function: str, points: int) -> None:
-    """Add a task of ten minutes before the written question, if that has a cell of its own, else before the end.
+    """Add a task of ten minutes after the last blank's section, so before the written question and the sources.
 
-    The beginning of the lab tells of it: its minutes, and a row if there is a table of tasks.
+    The beginning of the lab tells of it: its minutes, and a row if there is a table of tasks. If the written question
+    is a task with a number, that one becomes the new task's, and hers the next.
     """
-    headings = [cell.source if cell.cell_type == "markdown" else "" for cell in notebook.cells]
-    numbers = re.findall(r"^## Task (\d+)", "\n".join(headings), re.MULTILINE)
-    number = 1 + max(map(int, numbers), default=0)
-    starts = [i for i, text in enumerate(headings) if text.startswith(("## Written question", "## Before you hand in"))]
-    place = min(starts, default=len(headings))
+    place = split_at_end(notebook)
+    texts = [cell.source if cell.cell_type == "markdown" else "" for cell in notebook.cells]
+    before, after = (re.findall(TASK, "\n".join(part), re.MULTILINE) for part in (texts[:place], texts[place:]))
+    number = min(map(int, after)) if after else 1 + max(map(int, before), default=0)
+    for cell in notebook.cells[place:]:
+        if cell.cell_type == "markdown":
+            cell.source = re.sub(TASK, lambda found: f"## Task {int(found[1]) + 1}", cell.source, flags=re.MULTILINE)
     task = notebook_of(filled(template("task.ipynb"), topic, function, number)).cells
     task[2].metadata.nbgrader.points = points
     notebook.cells[place:place] = task
-    row = f"| {number} | `{function}`: TODO in a few words | 10 |\n"
-    start = next((i for i, text in enumerate(headings) if "minutes in all" in text), None)
+    start = next((i for i, text in enumerate(texts) if "minutes in all" in text), None)
     if start is not None:
-        text = re.sub(r"\d+(?= minutes in all)", lambda total: str(int(total[0]) + 10), headings[start])
-        rows = list(re.finditer(r"^\|(?:---\|)+\n|^\| \d+ \|.*\|\n", text, re.MULTILINE))
-        notebook.cells[start].source = text[: rows[-1].end()] + row + text[rows[-1].end() :] if rows else text
+        text = re.sub(r"\d+(?= minutes in all)", lambda total: str(int(total[0]) + 10), texts[start])
+        notebook.cells[start].source = with_row(text, number, f"`{function}`: TODO in a few words | 10")
+
+
+TASK = r"^## Task (\d+)"
+LAST = ("## Sources", "## Before you hand in")
+
+
+def split_at_end(notebook: NotebookNode) -> int:
+    """Where a lab's last part begins: at the written question behind its blanks, else at its sources, else its end.
+
+    If that heading stands within a cell, the cell is cut in two there.
+    """
+    answers = [i for i, cell in enumerate(notebook.cells) if cell.metadata.get("nbgrader", {}).get("solution")]
+    blank = max((i for i in answers if notebook.cells[i].cell_type == "code"), default=-1)
+    written = min((i for i in answers if i > blank), default=len(notebook.cells))
+    found = None
+    for i, cell in enumerate(notebook.cells):
+        for heading in re.finditer(r"^## .*", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else ():
+            if blank < i < written or (found is None and heading[0].startswith(LAST)):
+                found = i, heading.start()
+    if found is None:
+        return len(notebook.cells)
+    i, at = found
+    if not at:
+        return i
+    rest = new_markdown_cell(notebook.cells[i].source[at:])
+    notebook.cells[i].source = notebook.cells[i].source[:at].rstrip()
+    notebook.cells.insert(i + 1, rest)
+    return i + 1
+
+
+def with_row(text: str, number: int, row: str) -> str:
+    """A text whose table of tasks has one more row, behind that of the task before; later ones count one more."""
+    lines = text.splitlines(keepends=True)
+    place = next((i + 1 for i, line in enumerate(lines) if re.fullmatch(r"\|(---\|)+\n", line)), None)
+    for i, line in enumerate(lines):
+        if found := re.match(r"\| (\d+) \|", line):
+            if int(found[1]) < number:
+                place = i + 1
+            else:
+                lines[i] = f"| {int(found[1]) + 1} |{line[found.end() :]}"
+    if place is not None:
+        lines.insert(place, f"| {number} | {row} |\n")
+    return "".join(lines)
 
 
 # --------------------------------------------------------------------------------------------------- files

@@ -1,5 +1,6 @@
 """05_class_weights.weight_for_recall: the question, and wrong answers with the hints that they earn."""
 
+from bisect import bisect_left
 from functools import partial
 
 import numpy as np
@@ -119,8 +120,8 @@ def at_least_one(q1, y, recall):
     "By rounding, (1 - q) / q * q can be just below 1 - q. Give the limit a little room, or sort the pixels instead."
 )
 def tried_without_room(q1, y, recall):
-    odds = np.unique((1.0 - q1) / q1)
-    return next(w for w in odds if np.mean(w * q1[y] >= 1.0 - q1[y]) >= recall)
+    odds = np.unique((1.0 - q1) / q1)  # a larger one finds no fewer
+    return odds[bisect_left(odds, True, key=lambda w: np.mean(w * q1[y] >= 1.0 - q1[y]) >= recall)]
 
 
 @wrong(

@@ -10,15 +10,17 @@ from pathlib import Path
 import alternatives
 import nbformat
 import pytest
+from notebooks import SOLUTIONS
 
 from labcourse import questions
 from labgrader.file_check import check_file
 from labgrader.grade_course import grade_course
 from labgrader.release import release, scaffold
+from tests.labcourse.questions import test_promises
 from tests.labgrader.reply import test_questions
 
 ROOT = Path(__file__).parents[3]
-OF_LAB, OF_QUESTION = 9, 16  # TODOs that a new lab has, and a new question
+OF_LAB, OF_QUESTION = 9, 17  # TODOs that a new lab has, and a new question
 
 
 def left_to_do(course: Path) -> list[str]:
@@ -96,8 +98,13 @@ def test_a_tenth_lab_is_released_checked_and_graded_as_it_is_written(course, ten
 
 
 @pytest.mark.bad_input  # as test_questions is
-def test_a_question_as_it_is_written_fulfils_the_rules_for_questions(tenth):
+def test_a_question_as_it_is_written_fulfils_the_rules_for_questions(course, tenth, monkeypatch):
     name = "10_pieces.rows"
+    monkeypatch.setattr(test_promises, "ROOT", course)
+    test_promises.test_a_statement_says_what_its_kinds_are(name)
+    test_promises.test_each_example_of_a_statement_is_a_case(name)
+    test_promises.test_every_case_is_of_its_kinds_and_every_edge_is_in_a_case(name, 20)
+    test_promises.test_no_simplification_of_an_argument_goes_unnoticed(name, 20)
     test_questions.test_a_topics_questions_have_its_name("10_pieces")
     test_questions.test_a_question_is_complete(name)
     test_questions.test_a_reference_is_short_and_complete_in_itself(name)
@@ -115,29 +122,35 @@ def test_what_is_written_is_free_of_lint(course, tenth):
         assert done.returncode == 0, done.stdout
 
 
-def test_a_question_for_a_lab_that_there_is_comes_last_and_counts(course):
-    before = nbformat.read(ROOT / "solutions/04_iou/04_iou.ipynb", as_version=4)
+def test_a_question_for_a_lab_that_there_is_counts_and_says_what_is_left_to_do(course):
     scaffold.new_question(course, "04_iou.not_yet")
-    after = nbformat.read(course / "solutions/04_iou/04_iou.ipynb", as_version=4)
-    sources = [cell.source for cell in before.cells]
-    new = [cell for cell in after.cells[1:] if cell.source not in sources]
-    assert [cell.metadata.get("nbgrader", {}).get("grade_id") for cell in new] == [
-        None,
-        "not_yet",
-        "check_not_yet",
-        None,
-    ]
-    number = max(int(n) for text in sources for n in re.findall(r"^## Task (\d+)", text, re.MULTILINE)) + 1
-    assert new[0].source.startswith(f"## Task {number}: ")
-    assert [cell.source for cell in after.cells[1:] if cell not in new] == sources[1:]
-    rows = [line for line in after.cells[0].source.splitlines() if line not in sources[0]]
-    minutes = [int(re.search(r"(\d+) minutes in all", cells[0].source)[1]) for cells in (before.cells, after.cells)]
-    assert minutes[1] == minutes[0] + 10 and rows[0].startswith(f"| {number} | `not_yet`: ")
+    notebook = nbformat.read(course / "solutions/04_iou/04_iou.ipynb", as_version=4)
+    ids = [cell.metadata.get("nbgrader", {}).get("grade_id") for cell in notebook.cells]
+    assert [name for name in ids if name][-3:] == ["not_yet", "check_not_yet", "accuracy_and_iou"]
     assert len(left_to_do(course)) == OF_QUESTION
     places = [todo.partition(": TODO")[0] for todo in left_to_do(course)]
-    assert (
-        "labcourse/questions/t04_iou/not_yet.py:9" in places and "solutions/04_iou/04_iou.ipynb, cell not_yet" in places
+    assert "labcourse/questions/t04_iou/not_yet.py:10" in places
+    assert "solutions/04_iou/04_iou.ipynb, cell not_yet" in places
+
+
+@pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
+def test_a_new_task_comes_before_the_written_question_and_the_sources_and_tasks_are_numbered_anew(path):
+    before, after = (nbformat.read(path, as_version=4) for _ in range(2))
+    scaffold.add_task(after, path.stem, "not_yet", 2)
+    was, text = ("\n\n".join(cell.source for cell in notebook.cells) for notebook in (before, after))
+    added = re.search(r"## Task \d+: TODO.*?Hint 3</summary>TODO [^\n]*\n\n", text, re.DOTALL)
+    above, below = text[: added.start()], text[added.end() :]
+    assert "### BEGIN SOLUTION" not in below and not re.search("^## (Sources|Written|.* written)", above, re.MULTILINE)
+    headings, rows = (
+        [[int(n) for n in re.findall(rf"^{begin} (\d+)", t, re.MULTILINE)] for t in (was, text)]
+        for begin in ("## Task", r"\|")
     )
+    assert headings[1] == [*range(1, len(headings[0]) + 2)]
+    minutes = [[int(n) for n in re.findall(r"(\d+) minutes in all", t)] for t in (was, text)]
+    assert minutes[1] == [n + 10 for n in minutes[0]]
+    assert rows[1] == ([*range(1, len(rows[0]) + 2)] if minutes[0] and rows[0] else rows[0])
+    rest = re.sub(r"^\| \d+ \| `not_yet`: TODO.*\n", "", above, flags=re.MULTILINE) + below
+    assert re.sub(r"\d+", "", rest) == re.sub(r"\d+", "", was)
 
 
 @pytest.mark.parametrize(

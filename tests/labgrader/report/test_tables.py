@@ -31,7 +31,7 @@ def test_who_has_the_public_cases_in_a_table_needs_the_right_answer_as_well(ques
         for mistake in question.misconceptions:
             if mistake.name in RIGHT_WITH_A_TABLE:
                 continue
-            outputs, _ = outputs_of(mistake.answer, [case.args for case in new])
+            outputs = (outputs_of(mistake.answer, [case.args])[0][0] for case in new)  # up to one that differs
             if not any(compare(question, case.expected, got) for case, got in zip(new, outputs, strict=True)):
                 passed.append((mistake.name, student))
     assert not passed
