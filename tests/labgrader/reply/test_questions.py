@@ -13,7 +13,7 @@ import textwrap
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import chain
 
 import numpy as np
@@ -24,7 +24,7 @@ from labgrader.comparison import Case, Problem, compare, expected_cases, trusted
 from labgrader.course import find, of_topic, topics
 from labgrader.question import Question
 from labgrader.reply.alarm import TimeIsUp, limited
-from labgrader.reply.judge import judge, outputs_of
+from labgrader.reply.judge import Verdict, outputs_of, verdict
 from labgrader.reply.mutation import mutations
 from labgrader.reply.sentences import Sentence
 
@@ -98,7 +98,7 @@ def grade(
 ) -> Trial:
     """Grade the right and the wrong answers to a question under some seeds; extra: right ones beside its own."""
     count, seconds = search
-    cases = [expected_cases(question, seed) for seed in seeds]
+    cases = [cases_of(question, seed) for seed in seeds]
     rng = np.random.default_rng(7)
     right = (question.reference, *extra)
     rejected = [said for answer in right for said in objections(question, answer, seeds)]
@@ -106,7 +106,7 @@ def grade(
         m.name
         for m in question.misconceptions
         if any(passes(question, m.answer, of_seed) for of_seed in cases)  # or it writes into its arguments
-        and any(judge(question, m.answer, seed).passed for seed in seeds)
+        and any(judged(question, m.answer, seed).passed for seed in seeds)
     ]
     all_mutants = mutants(question.reference)
     survivors = [m for m in all_mutants if any(passes(question, m.function, of_seed, seconds) for of_seed in cases)]
@@ -118,10 +118,22 @@ def grade(
     return Trial(len(right), wrong, tuple(rejected), tuple(accepted), tuple(equivalent))
 
 
+@lru_cache(maxsize=4)
+def cases_of(question: Question, seed: int) -> list[Case]:
+    """The cases of a seed, which the reference answers once for all that are judged on them."""
+    return expected_cases(question, seed)
+
+
+def judged(question: Question, answer: Callable, seed: int) -> Verdict:
+    """What `judge` says."""
+    cases = cases_of(question, seed)
+    return verdict(question, cases, *outputs_of(answer, [case.args for case in cases]))
+
+
 def objections(question: Question, answer: Callable, seeds: tuple[int, ...]) -> list[str]:
     """What the judge has against an answer, under each seed."""
     title = getattr(answer, "source", answer.__name__)
-    verdicts = {seed: judge(question, answer, seed) for seed in seeds}
+    verdicts = {seed: judged(question, answer, seed) for seed in seeds}
     return [f"{title}, seed {seed}: {v.problem} in {v.where}" for seed, v in verdicts.items() if not v.passed]
 
 
@@ -222,9 +234,9 @@ def earn_their_own_hints(question: Question, seeds: tuple[int, ...]) -> None:
     lenient = replace(question, rtol=100 * question.rtol, atol=100 * question.atol)
     for misconception in question.misconceptions:
         for seed in seeds:
-            found = judge(question, misconception.answer, seed)
+            found = judged(question, misconception.answer, seed)
             assert found.sentence == Sentence("misconception", misconception.hint), (misconception.name, seed, found)
-        assert not passes(lenient, misconception.answer, expected_cases(question, seeds[0])), misconception.name
+        assert not passes(lenient, misconception.answer, cases_of(question, seeds[0])), misconception.name
 
 
 def shares(n):
