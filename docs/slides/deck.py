@@ -9,7 +9,9 @@ A cell of a lesson that shows on slides says so in its metadata, and says no sen
 kind: question, picture, formula or answer. begin: the first words of each sentence that is shown, of this cell or of
 the texts next to it. then: likewise, shown at a second step, so that a picture does not answer its own question.
 formula: which displayed formula of the cell, from 0; it stands where the lesson has it. picture: which drawing or
-image. The title is the heading that the cell stands under. ask, wrong, minutes: the speaker's notes. core: true if
+image. about, of a question: where its object is seen, as the first words of a sentence (or of a drawing's alternative
+text) of one of the three slides before it, or "this" for the slide itself; the core of a deck keeps to this as well.
+The title is the heading that the cell stands under. ask, wrong, minutes: the speaker's notes. core: true if
 the slide is of the part of a deck that fits an hour, which TOPIC.html?core shows alone. nbconvert writes reveal.js
 pages; the same slides are a notebook with all code of the lessons, in which explorers move.
 """
@@ -25,6 +27,7 @@ import nbformat
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 KINDS = {"question": "Question", "picture": "Look", "formula": "Formula", "answer": "Answer"}
+BEFORE = 3  # slides before a question among which its object is seen
 REACH = 2  # texts below a cell in which its sentences may stand; the one above comes after them
 # What begins with a small letter: a variable of one letter (an "a" only before a sign), or a function of a number.
 SYMBOL = r"(?:[b-z]|a(?= *[=<>+/]))(?!\w)|(?:sin|cos|tan|atan|log|exp)(?= *[\d(])"
@@ -191,6 +194,8 @@ def one_slide(cells: list, place: int, slide: dict) -> dict:
     """Put one slide together."""
     if slide["kind"] not in KINDS:
         raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {slide['kind']!r}")
+    if slide["kind"] == "question" and not slide.get("about"):
+        raise ValueError('about: expected the slides that show what a question asks about (or ["this"]), got none')
     words, then, parts = chosen(cells, place, slide.get("begin", [])), chosen(cells, place, slide.get("then", [])), []
     first = len(words)  # how many sentences come before the formula
     if "formula" in slide:
@@ -212,16 +217,42 @@ def one_slide(cells: list, place: int, slide: dict) -> dict:
         "words": [*words, *then],
         "place": place,
         "picture": slide.get("picture") if cells[place]["cell_type"] == "code" else None,
+        "drawn": cells[place]["source"] if cells[place]["cell_type"] == "code" else "",
         "minutes": slide["minutes"],
         "ask": slide.get("ask", ""),
         "wrong": slide.get("wrong", ""),
         "core": slide.get("core", False),
+        "about": slide.get("about", []),
     }
 
 
 def slides_of_topic(topic: str) -> list[dict]:
     """All slides of a topic's deck, in order."""
     return [slide for lesson in topics()[topic] for slide in slides_of(lesson)]
+
+
+def objects(slides: list[dict], number: int) -> list[dict]:
+    """The slides that show what slide `number` of a deck, or of its core, asks about: itself, or up to three before it.
+
+    Raises ValueError where an entry of `about` begins no such slide, or several.
+    """
+    found = []
+    for begin in slides[number]["about"]:
+        near = slides[number : number + 1] if begin == "this" else slides[max(0, number - BEFORE) : number]
+        fits = [slide for slide in near if begin == "this" or begins(slide, begin)]
+        if len(fits) != 1:
+            raise ValueError(
+                f"about: expected the first words of one of the {BEFORE} slides before {slides[number]['words'][0]!r} "
+                f"(in its core, too), {len(fits)} begin with {begin!r}"
+            )
+        found += fits
+    return found
+
+
+def begins(slide: dict, begin: str) -> bool:
+    """Whether a sentence of a slide, or its drawing's alternative text, begins so."""
+    texts = [*slide["words"], *re.findall(r"!\[([^]]*)\]", slide["text"])]
+    return any(plain(text).startswith(plain(begin)) for text in texts)
 
 
 def minutes(slides: list[dict]) -> int:
@@ -232,7 +263,8 @@ def minutes(slides: list[dict]) -> int:
 def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
     """The slides of a topic as a notebook: what shows is a slide, and the lessons' other code is there but skipped."""
     book = nbformat.v4.new_notebook(metadata=nbformat.read(lessons[0], as_version=4).metadata | {"title": topic})
-    so_far = 0
+    slides = [slide for lesson in lessons for slide in slides_of(lesson)]
+    so_far = number = 0
     for lesson in lessons:
         cells = nbformat.read(lesson, as_version=4).cells
         made: dict[int, list[dict]] = {}
@@ -256,7 +288,8 @@ def deck(topic: str, lessons: list[Path]) -> nbformat.NotebookNode:
                     book.cells += [start := text(heading, "slide"), picture, text(slide["text"], "-")]
                 if not slide["core"]:
                     start.metadata.slideshow.data = {"more": "yes"}  # an attribute of the slide's section
-                book.cells.append(notes(slide, so_far))
+                number += 1
+                book.cells.append(notes(slide, so_far, objects(slides, number - 1)))
                 if slide["then"]:
                     book.cells.append(text(slide["then"], "fragment"))
             if cell.cell_type == "code" and not with_picture:
@@ -270,9 +303,14 @@ def text(source: str, kind: str) -> nbformat.NotebookNode:
     return nbformat.v4.new_markdown_cell(source, metadata={"slideshow": {"slide_type": kind}})
 
 
-def notes(slide: dict, so_far: int) -> nbformat.NotebookNode:
-    """What only the speaker sees; `so_far` are the minutes of the core up to the end of this slide."""
+def notes(slide: dict, so_far: int, about: list[dict]) -> nbformat.NotebookNode:
+    """What only the speaker sees; `so_far` are the minutes of the core up to the end of this slide.
+
+    `about` are the slides that show what it asks about, to go back to.
+    """
     lines = [f"**{slide['minutes']} min.** " + (f"Core: {so_far} min so far." if slide["core"] else "Not core.")]
+    back = [f'"{other["title"]}" ({other["words"][0]})' for other in about if other is not slide and other["words"]]
+    lines.append(" and ".join(back) and f"It asks about: {' and '.join(back)}")
     lines.append(slide["ask"] and f"Ask: {slide['ask']}")
     lines.append(slide["wrong"] and f"What goes wrong: {slide['wrong']}")
     return text("\n\n".join(line for line in lines if line), "notes")

@@ -64,13 +64,72 @@ def test_the_core_of_a_deck_leaves_time_for_a_quiz_an_explorer_and_the_lab(topic
             assert not any(slide.get("core") for slide in cell.metadata.get("slides", ()))
 
 
+STATEMENT = r"[.!]\W*$"
+TYPESET = r"\\(?:mathbf|boldsymbol|text|mathrm|frac|cdot|dots|log|begin|end|star)|pmatrix"  # no symbols of their own
+
+
+def symbols(text: str) -> set[str]:
+    """Letters of the formulas, and names of variables in code, that a text has."""
+    formulas = " ".join(a or b for a, b in re.findall(r"\$\$(.*?)\$\$|\$([^$]+)\$", text, re.DOTALL))
+    code = {name for part in re.findall(r"`([^`]+)`", text) for name in re.findall(r"\b[A-Za-z_]\w*", part)}
+    return set(re.findall(r"\\?[A-Za-z]+", re.sub(TYPESET, " ", formulas))) | code
+
+
+def shown_on(slide: dict) -> str:
+    """All that a slide shows: title, sentences, formulas, a drawing's alternative text, and the code of a picture."""
+    return f"{slide['title']} {slide['text']} {slide['drawn'] and '`' + slide['drawn'] + '`'}"
+
+
+@pytest.mark.parametrize("core", [False, True])
+@pytest.mark.parametrize("topic", TOPICS)
+def test_what_a_question_asks_about_is_on_its_slide_or_just_before(topic, core):
+    """In the core alone as well: its symbols, and the things that it speaks of as known."""
+    slides = [slide for slide in deck.slides_of_topic(topic) if slide["core"] or not core]
+    asked = [number for number, slide in enumerate(slides) if slide["kind"] == "question"]
+    assert len(asked) >= 3
+    for number in asked:
+        slide, seen = slides[number], deck.objects(slides, number)
+        said = [sentence for sentence in slide["words"] if slide in seen and re.search(STATEMENT, sentence)]
+        shown = " ".join([*(shown_on(other) for other in seen if other is not slide), *said])
+        if slide["picture"] is not None:
+            shown += f" `{slide['drawn']}`"
+        for sentence in slide["words"]:
+            own = set(re.findall(r"\ban? [a-z]+ \$\\?(\w+)\$", sentence))  # "a rotation $R$"
+            assert symbols(sentence) - own <= symbols(shown), (sentence, symbols(sentence) - own - symbols(shown))
+            for known in re.findall(r"\b(?:the two|both) (\w{3,}?)e?s?\b", sentence):
+                assert known in shown.lower(), (sentence, known)
+            if re.search(r"\bin the picture\b", sentence):
+                assert any(other["picture"] is not None or "![" in other["text"] for other in seen), sentence
+        assert not re.match(r"(?:\w+ ){0,2}(?:it|they|she|he)\b", slide["words"][0], re.IGNORECASE), slide["words"][0]
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_no_slide_begins_with_a_pronoun_or_names_a_toy_that_the_question_did_not_show(topic):
+    slides = deck.slides_of_topic(topic)
+    for before, slide in zip([None, *slides], slides, strict=False):
+        first = (slide["words"] or [""])[0]
+        assert not re.match(r"(?:It|They|She|He)\b", first), first
+        if "the toy" in slide["text"]:
+            assert "toy" in before["text"].lower(), first
+
+
+def test_a_question_that_is_about_no_slide_near_it_is_refused():
+    slides = [{"words": [f"Slide {n} is here."], "text": "", "about": []} for n in range(5)]
+    slides[4]["about"] = ["Slide 1", "this"]
+    assert deck.objects(slides, 4) == [slides[1], slides[4]]
+    for begin in ("Slide 0", "Slide 4", "Slide"):  # too far back, not before it, several
+        slides[4]["about"] = [begin]
+        with pytest.raises(ValueError, match=rf"begin with '{begin}'"):
+            deck.objects(slides, 4)
+
+
 def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
     book = nbformat.v4.new_notebook(
         cells=[nbformat.v4.new_markdown_cell("# Masks\n\nA mask is an image. A mask is not.")]
     )
     path = tmp_path / "04_iou.ipynb"
     for begin, many in (("A cup", 0), ("A mask is", 2)):
-        book.cells[0].metadata.slides = [{"kind": "question", "begin": [begin], "minutes": 1}]
+        book.cells[0].metadata.slides = [{"kind": "question", "begin": [begin], "minutes": 1, "about": ["this"]}]
         nbformat.write(book, path)
         with pytest.raises(ValueError, match=rf"cell 0: begin: .*{many} are '{begin}'"):
             deck.slides_of(path)
@@ -82,6 +141,10 @@ def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
     book.cells[0].metadata.slides[0]["then"] = ["It holds"]
     nbformat.write(book, path)
     with pytest.raises(ValueError, match="promises what the slide does not show"):
+        deck.slides_of(path)
+    del book.cells[0].metadata.slides[0]["about"]
+    nbformat.write(book, path)
+    with pytest.raises(ValueError, match="about: expected the slides"):
         deck.slides_of(path)
 
 
