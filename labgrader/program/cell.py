@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 UNREADABLE = (SyntaxError, ValueError, RecursionError, MemoryError)  # what a parser raises for a stranger's text
+CONFLICT = re.compile(r"^(<{7}|>{7})(?: .*)?$", re.MULTILINE)  # what git writes round two versions of some lines
 # Cell magics around Python; others hold another language.
 KEEPS_ITS_BODY = ("%%time", "%%timeit", "%%capture", "%%prun")
 
@@ -43,7 +44,8 @@ class Statement:
     """A statement at the top of a cell; of `import a, b` each name is one of its own.
 
     text: its own, from line `first` to line `last`. binds: names that it gives a value. touches: names whose value it
-    may change. needs: names that it or a function in it reads. modules: what it imports where the import must succeed.
+    may change. needs: names that it or a function in it reads; reads: those that it reads as it runs. modules: what it
+    imports where the import must succeed.
     star: whether it imports all names of a module. future: whether it is an import from __future__. imports: whether
     all that it does is to import.
     """
@@ -51,11 +53,11 @@ class Statement:
     def __init__(self, node: ast.stmt, text: str):
         self.node, self.text = node, text
         self.first, self.last = first_line(node), node.end_lineno
-        binds, needs = names_of(text)
+        binds, needs, reads = names_of(text)
         checked = node.targets if is_check(node) else []
         self.binds = binds - {target.id for target in checked if isinstance(target, ast.Name)}
         self.touches = touched(node) & (needs | self.binds)  # others are names inside functions
-        self.needs = needs | self.touches
+        self.needs, self.reads = needs | self.touches, reads | self.touches
         self.modules = set(imported(node))
         is_from = isinstance(node, ast.ImportFrom)
         self.star = is_from and node.names[0].name == "*"
@@ -76,8 +78,11 @@ class Parsed:
             self.dump = ast.dump(tree)
             self.statements = list(statements(tree, self.text.split("\n")))
         except UNREADABLE as error:
-            line = getattr(error, "lineno", None)
+            line, mark = getattr(error, "lineno", None), CONFLICT.search(self.source)
             self.problem = f"its cell is not Python{f': look at line {line}' if line else ''}"
+            if mark and "\n=======" in self.source:
+                line = self.source.count("\n", 0, mark.start()) + 1
+                self.problem = f"its cell has git's conflict marks, the first in line {line}: keep one of the versions"
 
     def parse(self) -> ast.Module:
         """Parse the cell; what only IPython understands is taken out, each time that it stops the parser."""
@@ -96,6 +101,16 @@ class Parsed:
                     raise
                 lines[number] = plain
                 self.text = "\n".join(lines)
+
+    def is_earlier(self, name: str, position: int) -> bool:
+        """Whether a statement that runs needs the value that a name had before the cell changes it: k = k + 1."""
+        above = any(name in statement.binds for statement in self.statements[:position])
+        return not above and name in self.binds and name in self.statements[position].reads
+
+    def changes(self, name: str) -> bool:
+        """Whether the cell makes the value of a name out of the one that it had before."""
+        positions = (i for i, statement in enumerate(self.statements) if name in statement.binds)
+        return any(self.is_earlier(name, i) for i in positions)
 
     @cached_property
     def binds(self) -> set[str]:
@@ -187,20 +202,29 @@ def first_line(node: ast.stmt) -> int:
 # CPython's DEF_COMP_ITER, which symtable has no method for: from 3.12 on a comprehension's variables stand in the table
 # of what is around it, too.
 OF_A_COMPREHENSION = 512
+COMPREHENSIONS = ("listcomp", "setcomp", "dictcomp", "genexpr")
 
 
-def names_of(text: str) -> tuple[set[str], set[str]]:
-    """The names that a text binds at its top, and those that it, or a function in it, reads from there."""
+def names_of(text: str) -> tuple[set[str], set[str], set[str]]:
+    """The names that a text binds at its top, those that it, or a function in it, reads, and those read as it runs.
+
+    >>> names_of("k = max(n for n in k)")[2] == {"k", "max"}, names_of("def k(n):\\n    return k(n - 1)")[2]
+    (True, set())
+    """
     top = symtable.symtable(text, "cell", "exec")
     own = [s for s in top.get_symbols() if not s._Symbol__flags & OF_A_COMPREHENSION]
     binds = {s.get_name() for s in own if s.is_assigned() or s.is_imported() or s.is_namespace()}
     needs = {s.get_name() for s in own if s.is_referenced()}
-    inner = list(top.get_children())
+    reads = set(needs)
+    inner = [(table, True) for table in top.get_children()]
     while inner:
-        table = inner.pop()
-        needs |= {s.get_name() for s in table.get_symbols() if s.is_global()}
-        inner += table.get_children()
-    return binds, needs
+        table, now = inner.pop()
+        now = now and (table.get_type() == "class" or table.get_name() in COMPREHENSIONS)
+        found = {s.get_name() for s in table.get_symbols() if s.is_global()}
+        needs |= found
+        reads |= found if now else set()
+        inner += [(child, now) for child in table.get_children()]
+    return binds, needs, reads
 
 
 def touched(node: ast.stmt) -> set[str]:

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Sequence
 
-from labgrader.program.cell import Cell, cells_of
+from labgrader.program.cell import CONFLICT, Cell, cells_of
 
 LARGEST_FILE = 100 << 20  # bytes
 LARGEST_NOTEBOOK = 20 << 20  # bytes: a larger one is read without its outputs
@@ -14,7 +14,6 @@ MOST_CELLS = 5_000
 MOST_SOURCE = 1_000_000  # characters of code
 TOKEN = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)|[\[\]{}]', re.DOTALL)  # a text, or a bracket
 OUTPUTS = re.compile(rb'"outputs"\s*:\s*')
-CONFLICT = re.compile(rb"^(<{7}|>{7})(?: .*)?$", re.MULTILINE)  # what git writes round two versions of some lines
 # What a file is that is none of a notebook, by how it begins.
 OTHERS = {
     b"%PDF": "a PDF",
@@ -112,8 +111,9 @@ def parse(data: bytes) -> dict:
 
 def fault_of_text(data: bytes, error: Exception) -> str:
     """Why a text is no JSON, as far as somebody can mend it."""
-    if (mark := CONFLICT.search(data)) and b"\n=======" in data:
-        line = data.count(b"\n", 0, mark.start()) + 1
+    text = data.decode("utf-8", "replace")
+    if (mark := CONFLICT.search(text)) and "\n=======" in text:
+        line = text.count("\n", 0, mark.start()) + 1
         return f"it has git's conflict marks, the first in line {line}: keep one of the two versions, then save it"
     is_at_end = isinstance(error, json.JSONDecodeError) and not error.doc[error.pos :].strip()
     if is_at_end or str(error).startswith("Unterminated string"):

@@ -162,24 +162,30 @@ class Slice:
 
     def follow(self) -> None:
         """Follow names from the answer to the statements that give them values, and to what these need, and so on."""
-        seen = {(self.name, self.home)}
-        waiting = deque([(self.name, self.home, (self.name,))])  # a name, the cell that needs it, and how it came there
+        # A name, the cell that needs it, whether as it was before that cell, and how it came there.
+        waiting = deque([(self.name, self.home, False, (self.name,))])
+        seen = {(self.name, self.home, False)}
         while waiting:
-            wanted, asking, way = waiting.popleft()
-            for where, statement in self.choose(wanted, asking):
+            wanted, asking, before, way = waiting.popleft()
+            for where, position in self.choose(wanted, asking, before):
+                statement = self.cells[where].statements[position]
                 self.allow(statement, way)
                 for other in sorted(statement.needs):
-                    if (other, where) not in seen:
-                        seen.add((other, where))
-                        waiting.append((other, where, (*way, other)))
+                    for key in ((other, where, False), (other, where, True)):
+                        if key not in seen and (not key[2] or self.cells[where].is_earlier(other, position)):
+                            seen.add(key)
+                            waiting.append((*key, (*way, other)))
 
-    def choose(self, wanted: str, asking: int) -> Iterator[tuple[int, Statement]]:
-        """Take in the statements that a name needs which a cell reads: those that are new in the slice, by cell."""
+    def choose(self, wanted: str, asking: int, before: bool) -> Iterator[tuple[int, int]]:
+        """Take in the statements that a name needs which a cell reads: those that are new in the slice, by cell.
+
+        before: whether the value is the one that the name has before that cell, which gives it another.
+        """
         if wanted in self.blanks and wanted != self.name:
             self.calls[wanted] = None
             if wanted in self.given:
                 return
-        at = self.home if wanted == self.name else self.place(wanted, asking)
+        at = self.home if wanted == self.name and not before else self.place(wanted, asking, before)
         if at is None:
             if wanted in QUIET:
                 self.quiet[wanted] = None
@@ -193,7 +199,7 @@ class Slice:
                 changes = is_value and wanted in statement.touches
                 if (binds or changes) and i not in self.chosen.setdefault(where, set()):
                     self.chosen[where].add(i)
-                    yield where, statement
+                    yield where, i
 
     def home_of_answer(self) -> int:
         """The cell that holds the answer: of several with its grade id the last; raises Refused if there is none."""
@@ -201,8 +207,11 @@ class Slice:
         marked = [i for i, cell in enumerate(cells) if cell.grade_id == name]
         binding = [i for i in marked if name in cells[i].binds]
         answered = [i for i in binding if not cells[i].is_blank(name)]
-        if len({cells[i].dump for i in answered}) > 1:
-            self.copies = tuple(i + 1 for i in answered)
+        copies = list(answered)
+        while copies and cells[copies[-1]].changes(name):  # the half of a split cell that wraps the other one
+            copies.pop()
+        if len({cells[i].dump for i in copies}) > 1:
+            self.copies = tuple(i + 1 for i in copies)
         elsewhere = [i for i, cell in enumerate(cells) if i not in marked and cell.defines(name)]
         if self.latest and elsewhere:
             if not answered or answered[-1] > elsewhere[-1]:
@@ -214,12 +223,14 @@ class Slice:
             return found[-1]
         raise Refused(next((cells[i].problem for i in marked if cells[i].problem), f"{NO_CELL} {name}"))
 
-    def place(self, wanted: str, asking: int) -> int | None:
+    def place(self, wanted: str, asking: int, before: bool) -> int | None:
         """The cell that gives a name its value for a cell that needs it; None if that is Python's own, or nobody's."""
         binding = [i for i, cell in enumerate(self.cells) if wanted in cell.binds]
         if wanted in self.blanks:
             marked = [i for i in binding if self.cells[i].grade_id == wanted]
             binding = marked or [i for i in binding if self.cells[i].defines(wanted)]
+        if before and (earlier := [i for i in binding if i < asking]):
+            return earlier[-1]
         if asking in binding:
             return asking
         if self.latest and binding:

@@ -53,18 +53,15 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> Bundle:
     course, target, here = Path(course), Path(target), course_here()
     if drift := release(course, topics, check=True):
         raise ValueError(f"course: run `{here.command} release` first, {drift[0]} is not what it makes")
-    found = [path for name in here.bundle for path in (course / name, *(course / name).rglob("*"))]
-    names = {path.relative_to(course).as_posix(): path for path in found if path.is_symlink() or path.is_file()}
-    wanted = sorted(name for name in names if not (is_withheld(name) or is_left_over(name)) and of(topics, name))
-    tracked = tracked_files(course)
-    why = {name: reason_against(course, name, tracked) for name in wanted}
-    kept = [name for name in wanted if not why[name]]
-    contents = {name: names[name].read_bytes() for name in kept}
+    why, is_tracked = looked_through(course, here.bundle)
+    why = {name: said for name, said in why.items() if of(topics, name)}
+    kept = [name for name, said in why.items() if not said]
+    contents = {name: (course / name).read_bytes() for name in kept}
     for name in kept:
         if name.endswith(".md"):
             contents[name] = taught_rows(contents[name].decode("utf-8")).encode()
         if name.endswith(".ipynb"):  # its links lead to the files of the bundle, wherever the course is published
-            contents[name] = to_bytes(unpublished(read(names[name]), name, course))
+            contents[name] = to_bytes(unpublished(read(course / name), name, course))
     if here.start:
         contents |= dict.fromkeys((START, "README.md"), start_page(course, topics).encode())
     archived = io.BytesIO()
@@ -72,19 +69,40 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> Bundle:
         for name in sorted(contents):
             entry = zipfile.ZipInfo(f"{target.stem}/{name}", date_time=(1980, 1, 1, 0, 0, 0))
             entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = (0o755 if name in names and os.access(names[name], os.X_OK) else 0o644) << 16
+            entry.external_attr = (0o755 if name in why and os.access(course / name, os.X_OK) else 0o644) << 16
             archive.writestr(entry, contents[name])
     write_atomically(target, archived.getvalue())
-    return Bundle(sorted(contents), {name: said for name, said in why.items() if said}, tracked is not None)
+    return Bundle(sorted(contents), {name: said for name, said in why.items() if said}, is_tracked)
+
+
+def looked_through(course: Path, places: Sequence[str]) -> tuple[dict[str, str], bool]:
+    """By the name of each file in some folders why students do not get it, "" if they do; and as `Bundle.tracked`.
+
+    What the course withholds, and what running leaves behind, is not named.
+    """
+    found = [path for name in places for path in (course / name, *(course / name).rglob("*"))]
+    names = {path.relative_to(course).as_posix() for path in found if path.is_symlink() or path.is_file()}
+    tracked = tracked_files(course)
+    wanted = sorted(name for name in names if not (is_withheld(name) or is_left_over(name)))
+    return {name: reason_against(course, name, tracked) for name in wanted}, tracked is not None
 
 
 def tracked_files(course: Path) -> set[str] | None:
-    """The files of a course's folder that git tracks, None where there is no repository."""
+    """The files of a course's folder that git tracks, None where there is no repository.
+
+    Raises ValueError where there is one that git does not read, such as another account's: nothing is known of it then.
+    """
     try:
         done = git(course, "ls-files", "-z")
-    except OSError:
-        return None
-    return None if done.returncode else set(os.fsdecode(done.stdout).split("\0")) - {""}
+        status, said = done.returncode, done.stderr.decode(errors="replace").strip()
+    except OSError as error:
+        status, said = 1, f"git: {error.strerror}"
+    if not status:
+        return set(os.fsdecode(done.stdout).split("\0")) - {""}
+    place = course.resolve()
+    if any(os.path.lexists(folder / ".git") for folder in (place, *place.parents)):
+        raise ValueError(f"course: expected what git tracks of {place}, got {said}")
+    return None
 
 
 def reason_against(course: Path, name: str, tracked: set[str] | None) -> str:

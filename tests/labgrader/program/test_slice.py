@@ -111,6 +111,44 @@ def test_a_split_cell_is_one_answer():
     assert function(*parts)(3) == 1.5 and not program(cells(*parts), "f").note
 
 
+@pytest.mark.parametrize(
+    "sources, value",
+    [
+        (("k = 2", "k += 1", "def f():\n    return k"), 3),
+        (("k = [1]", "k.append(2)", "k = [2 * n for n in k]; k.append(6)", "def f():\n    return k"), [2, 4, 6]),
+        (("k = 5", "k = k + 1", "j = k; k = 0", "def f():\n    return j"), 6),
+        (("def g():\n    return 1", "def g(of=g):\n    return of() + 1", "def f():\n    return g()"), 2),
+        (("k = 1", "class A:\n    j = k + 1\nk = A.j", "def f():\n    return k"), 2),
+        (("k = 1", "def k():\n    return k", "def f():\n    return k() is k"), True),  # which calls itself
+        (("max = max", "def f():\n    return max([1, 2])"), 2),
+    ],
+)
+def test_a_value_that_is_made_of_the_one_before_has_that_one_with_it(sources, value):
+    """As a run from top to bottom does, which is the judge."""
+    names = {}
+    for source in sources:
+        exec(source, names)
+    assert names["f"]() == value
+    assert function(*sources)() == value
+
+
+def test_the_split_off_half_of_an_answer_may_wrap_the_other():
+    half, wrap = ("def f(x):\n    return x / 2", "f"), ("def wrap(g):\n    return lambda x: g(x) + 1\nf = wrap(f)", "f")
+    first, other = ("def f(x):\n    return 0", "f"), ("def h():\n    return 1", "h")
+    for parts, copies in ((half, wrap), ()), ((half, other, wrap), ()), ((first, half, wrap), (1, 2)):
+        assert function(*parts)(3) == 2.5
+        assert program(cells(*parts), "f").copies == copies
+    assert function(half, wrap, half)(3) == 1.5
+
+
+@pytest.mark.parametrize("label", [" HEAD", ""])
+def test_gits_marks_in_a_cell_are_named(label):
+    source = f"import math\n<<<<<<<{label}\nk = 1\n=======\nk = 2\n>>>>>>> theirs\ndef f():\n    return k"
+    refused = program(cells((source, "f")), "f").refused
+    assert refused == "its cell has git's conflict marks, the first in line 2: keep one of the versions"
+    assert "look at line 2" in program(cells(("def f():\n    return '\n=======\n'", "f")), "f").refused
+
+
 def test_in_a_kernel_what_was_run_last_counts():
     assert function("k = 1", "def f():\n    return k", *RIGHT_AND_LATER[2:], latest=True)() == 5
     refused = program(cells(*RIGHT_AND_LATER), "f", latest=True).refused

@@ -2,10 +2,12 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import nbformat
@@ -403,6 +405,47 @@ def test_a_bundle_takes_what_git_tracks_and_no_link_solution_or_key_and_says_so(
         texts = [archive.read(name) for name in archive.namelist()]
     assert {"docs/guide.md", "lessons/93_four.ipynb", "labs/90_one/90_one.ipynb"} <= names and not names & said.keys()
     assert not [text for text in texts if b"2 * x" in text or b"localhost" in text]
+
+
+def test_a_repository_that_git_does_not_read_is_no_folder_without_one(course, tmp_path, monkeypatch):
+    """As where the clone is another account's: what is a draft is not known then."""
+    release(course)
+    subprocess.run(["git", "init", "-q"], cwd=course, check=True)
+    monkeypatch.setenv("GIT_TEST_ASSUME_DIFFERENT_OWNER", "1")
+    with pytest.raises(ValueError, match=r"course: expected what git tracks of .*dubious ownership"):
+        bundle(course, tmp_path / "x.zip")
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(ValueError, match=r"course: expected what git tracks of .*: No such file"):
+        bundle(course, tmp_path / "x.zip")
+    shutil.rmtree(course / ".git")
+    assert not bundle(course, tmp_path / "x.zip").tracked
+
+
+@pytest.mark.parametrize("labs", [["90_one"], pytest.param([], marks=pytest.mark.nightly)])
+def test_what_is_published_on_a_hub_is_what_git_tracks(course, tmp_path, labs):
+    release(course)
+    shutil.copytree(ROOT / "deploy", course / "deploy")
+    nbformat.write(solution_notebook(), course / "lessons/91_two.ipynb")
+    (course / "lessons/92_three.md").symlink_to("../solutions/90_one/90_one.ipynb")
+    publish = partial(
+        subprocess.run,
+        env=os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"},
+        capture_output=True,
+        text=True,
+    )
+    subprocess.run("git init -q && git add -A", cwd=course, shell=True, check=True)
+    nbformat.write(new_notebook(cells=[new_markdown_cell("# A draft")]), course / "lessons/94_draft.ipynb")
+    (course / "labs/90_one/notes.md").write_text("double returns 2 * x")
+    done = publish([course / "deploy/publish", tmp_path / "class", *labs])
+    assert done.returncode == 0, done.stderr
+    listed = publish(["git", "-C", tmp_path / "class", "ls-files"]).stdout.split()
+    one = ["labs/90_one/90_one.ipynb", "labs/90_one/table.csv"]
+    assert listed == [*one, *["labs/91_two/91_two.ipynb"] * (not labs), "lessons/90_one.ipynb"]
+    left_out = sorted(line.split()[2].rstrip(":") for line in done.stderr.splitlines() if line.startswith("left out"))
+    drafts = ["lessons/91_two.ipynb", "lessons/92_three.md", "lessons/94_draft.ipynb"]
+    assert left_out == ["labs/90_one/notes.md", *drafts]
+    refused = publish([course / "deploy/publish", tmp_path / "other", "90_noe"])
+    assert refused.returncode and "got labs/90_noe" in refused.stderr and not (tmp_path / "other/.git").exists()
 
 
 def test_a_published_course_releases_badges_which_its_bundle_does_not_have(course, tmp_path, monkeypatch):

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import grading_course as kit
 import pytest
+from nbgrader.api import Gradebook
+from nbgrader.coursedir import CourseDirectory
+from traitlets.config import PyFileConfigLoader
 from typer.testing import CliRunner
 
 from labcli.cli import app
@@ -137,14 +140,21 @@ def test_canvas_finds_the_assignment_by_its_number_or_it_is_asked_for(tmp_path, 
 
 
 @pytest.mark.parametrize("odd", ["a ?b", "50% c", "x%3Fy#z"])
-def test_a_course_is_graded_whatever_its_path_holds(tmp_path, odd):
+def test_a_course_is_graded_whatever_its_path_holds(tmp_path, odd, monkeypatch):
+    """And nbgrader, by its configuration here, has the same gradebook."""
     course = tmp_path / odd
     kit.write_lab(course, TOPIC)
     kit.submit(course, "ada", TOPIC, {})
     assert not grade_course(TOPIC, course, seed="secret", progress=False).failures
-    assert {path.name for path in tmp_path.iterdir()} == {odd}
     with opened(course) as book:
         assert [submission.student.id for submission in book.assignment_submissions(TOPIC)] == ["ada"]
+    shutil.copy(ROOT / "nbgrader_config.py", course)
+    monkeypatch.chdir(course)
+    config = PyFileConfigLoader("nbgrader_config.py", path=str(course)).load_config()
+    with Gradebook(CourseDirectory(config=config).db_url) as book:
+        assert [submission.student.id for submission in book.assignment_submissions(TOPIC)] == ["ada"]
+    assert {path.name for path in tmp_path.iterdir()} == {odd}
+    assert [path.name for path in course.glob("*.db")] == ["gradebook.db"]
 
 
 @pytest.mark.bad_input
