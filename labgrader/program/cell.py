@@ -79,10 +79,11 @@ class Parsed:
             self.statements = list(statements(tree, self.text.split("\n")))
         except UNREADABLE as error:
             line, mark = getattr(error, "lineno", None), CONFLICT.search(self.source)
-            self.problem = f"its cell is not Python{f': look at line {line}' if line else ''}"
+            where = f"look at line {line}" if line else ""
             if mark and "\n=======" in self.source:
                 line = self.source.count("\n", 0, mark.start()) + 1
-                self.problem = f"its cell has git's conflict marks, the first in line {line}: keep one of the versions"
+                where = f"it has git's conflict marks, the first in line {line}: keep one of the versions"
+            self.problem = f"its cell is not Python{': ' if where else ''}{where}"
 
     def parse(self) -> ast.Module:
         """Parse the cell; what only IPython understands is taken out, each time that it stops the parser."""

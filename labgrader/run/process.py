@@ -52,7 +52,7 @@ REFUSED += ("os.symlink", "os.truncate", "os.chmod", "os.chown", "os.utime", "we
 # Modules whose locks and memory need a file system for them, and functions of os that ask for a filtered system call.
 SHARED = ("multiprocessing.synchronize", "multiprocessing.shared_memory")
 CALLS = "memfd_create pidfd_open posix_fadvise sched_setaffinity sched_setparam sched_setscheduler setns setpriority"
-CALLS += " sync fsync fdatasync unshare nice mkfifo mknod"
+CALLS += " sync fsync fdatasync unshare nice mkfifo mknod pipe pipe2"
 
 
 def encode(value: object) -> bytes:

@@ -4,8 +4,8 @@ Namespaces and limits leave some ways to use up a machine: more processes, memor
 memory segments, file systems of a new user namespace), slots that all processes share (asynchronous input and output),
 and the kernel's less trodden corners. Others would let one answer leave something for the next in the same sandbox:
 signals and limits of other processes, sockets, whose ports stay in use for a minute, locks, watches, times and hints on
-files that all can read, and which pages of these are in memory. Answers need none of these, so they fail here with
-EPERM. Threads stay allowed.
+files that all can read, which pages of these are in memory, and what the kernel counts for all: it numbers pipes and
+sockets, and says its load. Answers need none of these, so they fail here with EPERM. Threads stay allowed.
 """
 
 import errno
@@ -33,6 +33,7 @@ files:       flock 73 32, inotify_init 253 -, inotify_init1 294 26, inotify_add_
              futimesat 261 -, utimensat 280 88
 the kernel:  keyctl 250 219, add_key 248 217, request_key 249 218, bpf 321 280, perf_event_open 298 241,
              io_uring_setup 425 425, io_setup 206 0, userfaultfd 323 282, socket 41 198, syslog 103 116
+counters:    pipe 22 -, pipe2 293 59, socketpair 53 199, sysinfo 99 179
 """
 PRLIMIT = (302, 261)  # refused for any process but the own one, which has the number 0 here
 # Calls that are refused for some values of an argument: numbers of the call, the argument, the values; and those that

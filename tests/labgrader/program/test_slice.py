@@ -145,7 +145,8 @@ def test_the_split_off_half_of_an_answer_may_wrap_the_other():
 def test_gits_marks_in_a_cell_are_named(label):
     source = f"import math\n<<<<<<<{label}\nk = 1\n=======\nk = 2\n>>>>>>> theirs\ndef f():\n    return k"
     refused = program(cells((source, "f")), "f").refused
-    assert refused == "its cell has git's conflict marks, the first in line 2: keep one of the versions"
+    said = "it has git's conflict marks, the first in line 2: keep one of the versions"
+    assert refused == f"its cell is not Python: {said}"
     assert "look at line 2" in program(cells(("def f():\n    return '\n=======\n'", "f")), "f").refused
 
 

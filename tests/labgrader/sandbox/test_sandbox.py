@@ -132,6 +132,10 @@ def test_memory_a_file_and_the_time_of_a_processor_have_an_end(worker):
         "import socket; socket.socket(40, socket.SOCK_STREAM)",  # AF_VSOCK, which reaches a virtual machine's host
         "import socket; socket.socket()",
         "import socket; socket.if_nameindex()",
+        "import _socket; _socket.socketpair()",  # numbered by a counter of all, which stands still in between
+        "os.pipe()",
+        "0 if libc.pipe(numbers) == 0 else 1 / 0",
+        "0 if libc.sysinfo(numbers) == 0 else 1 / 0",  # the load of the last quarter of an hour
         "os.posix_fadvise(file, 0, 0, os.POSIX_FADV_DONTNEED)",
         "os.preadv(file, [bytearray(9)], 0, os.RWF_NOWAIT)",
         "0 if libc.mincore(mapped, 4096, ctypes.create_string_buffer(9)) == 0 else 1 / 0",
@@ -162,7 +166,7 @@ def test_memory_a_file_and_the_time_of_a_processor_have_an_end(worker):
 def test_system_calls_that_answers_do_not_need_are_refused(worker, call):
     known = """
         import ctypes, fcntl
-        libc, numbers = ctypes.CDLL(None), (ctypes.c_uint64 * 7)()
+        libc, numbers = ctypes.CDLL(None), (ctypes.c_uint64 * 14)()
         file = os.open("/kit/labgrader/run/process.py", os.O_RDONLY)
         libc.mmap.restype = ctypes.c_void_p
         mapped = ctypes.c_void_p(libc.mmap(None, 4096, 1, 2, file, 0))
@@ -441,7 +445,8 @@ TRIES = {
     "os.chmod('/tmp', 0o777)": False,
     "os.utime('/tmp')": False,
     "import locale; locale.setlocale(locale.LC_ALL, ''), 'ä'.encode(locale.getpreferredencoding())": True,
-    "import asyncio; asyncio.run(asyncio.sleep(0))": True,
+    "import asyncio; [asyncio.run(asyncio.sleep(0)) for _ in range(3)]": True,  # which asks for pairs of sockets
+    "os.pipe()": False,
     "import sys; sys.setrecursionlimit(9000)": True,
     "import sys; sys.stdout.flush(); sys.stderr.write('x' * len(sys.stdout.encoding))": True,
     "import io; np.save(io.BytesIO(), np.ones(3))": True,
