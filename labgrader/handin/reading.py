@@ -17,6 +17,7 @@ from pathlib import Path
 
 from labgrader.course import asked, of_topic
 from labgrader.course import course as course_here
+from labgrader.handin.astray import with_texts_astray
 from labgrader.handin.pictures import Pictures, pictures_of
 from labgrader.handin.roster import keys_of
 from labgrader.handin.several import OTHERS, SEVERAL
@@ -60,7 +61,8 @@ class Submission:
     with the version of the kit that released it. timestamp and secret: what nbgrader's timestamp.txt and
     submission_secret.txt beside the notebook say; nbgrader gives feedback back by them. file: the notebook's name, if
     it is another one than the lab's. others: names of notebooks that were handed in beside it, and differ. no_code:
-    what to say of answers whose cells are no code any more. pictures: those attached to answers in words, by grade id.
+    what to say of answers whose cells are no code any more. lacks: answers in words without any cell. pictures: those
+    attached to answers in words, by grade id.
     """
 
     student: str
@@ -74,13 +76,16 @@ class Submission:
     file: str = ""
     others: tuple[str, ...] = ()
     no_code: dict[str, str] = field(default_factory=dict)
+    lacks: tuple[str, ...] = ()
     pictures: dict[str, Pictures] = field(default_factory=dict)
 
     @property
     def note(self) -> str:
-        """Which of several notebooks was graded, "" if there is one alone."""
+        """Which of several notebooks was graded, and which answers in words have no cell; "" for neither."""
         said = f"{', '.join(self.others[:MOST_NAMED])}{', ...' if len(self.others) > MOST_NAMED else ''}"
-        return f"of its notebooks {self.file} was graded, not {said}" if self.others else ""
+        notes = [f"of its notebooks {self.file} was graded, not {said}"] if self.others else []
+        notes += [f"it has no cell {', '.join(self.lacks)} any more, for an answer in words"] if self.lacks else []
+        return "; ".join(notes)
 
 
 def read_lab(course: Path, topic: str) -> Lab:
@@ -159,6 +164,8 @@ def read_submission(place: Path, lab: Lab, pick: str = "") -> Submission | None:
         data = read_bytes(notebook, LARGEST_FILE)
         digest = hashlib.sha256(data).hexdigest()
         content = parse(data)
+        if released_by(content)[0] in ("", released_by(lab.notebook)[0]):
+            content["cells"] = with_texts_astray(content["cells"], lab.notebook["cells"], lab.written)
         other = "" if notebook.stem == lab.topic else printable(notebook.name)
         if other and not is_copy_of(content, lab):
             raise Unreadable(f"the folder {lab.topic} holds no {lab.topic}.ipynb, and {other} is no copy of that lab")
@@ -173,7 +180,8 @@ def read_submission(place: Path, lab: Lab, pick: str = "") -> Submission | None:
     others = () if pick else others_of(folder, notebook, data)
     file = printable(notebook.name) if others else other
     pictures = pictures_of(content["cells"], lab.written)
-    told = outdated(content, lab), *beside, file, others, no_code(content["cells"]), pictures
+    lacks = tuple(name for name in lab.written if name not in cells)
+    told = outdated(content, lab), *beside, file, others, no_code(content["cells"]), lacks, pictures
     return Submission(student, code, cells, "", digest, *told)
 
 
@@ -350,6 +358,9 @@ def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]
             texts[name][text if is_kept else ""] = None
     if not any(texts.values()) and not any(f"def {name}" in cell.source for name in lab.answers for cell in code):
         raise Unreadable(f"it is not this lab: no cell has a grade id of {lab.topic}")
+    for cell in lab.notebook["cells"]:  # what nobody changed is no part of an answer in words
+        if (name := grade_id(cell)) in lab.written and len(texts[name]) > 1:
+            texts[name].pop(source_of(cell), None)
     whole = {name: "\n\n".join(filter(None, found)) for name, found in texts.items() if found}
     return code, {name: text if name in lab.answers else text[:MOST_WRITTEN] for name, text in whole.items()}
 
