@@ -112,9 +112,9 @@ def reason_against(course: Path, name: str, tracked: set[str] | None) -> str:
         return "a link"
     if tracked is not None and name not in tracked:
         return "git does not track it"
-    if name.endswith(".py") and name.partition("/")[0] in course_here().kit:  # which writes those marks
-        return ""
     data = path.read_bytes()
+    if name.endswith(".py") and name.partition("/")[0] in course_here().kit:  # which writes those marks, in its texts
+        data = b"\n".join(line.strip() for line in data.splitlines() if line.strip().startswith(tuple(MARKS)))
     if found := next((what for mark, what in MARKS.items() if mark in data), ""):
         return f"{found}, by its marks"
     if name.endswith(".ipynb") and not name.startswith("labs/"):

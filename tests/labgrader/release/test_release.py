@@ -381,6 +381,9 @@ def test_a_bundle_takes_what_git_tracks_and_no_link_solution_or_key_and_says_so(
     (course / "data").mkdir()
     (course / "data/table.md").write_text("1")
     (course / "labkit").symlink_to("data", target_is_directory=True)
+    (course / "labcli").mkdir()
+    (course / "labcli/answers.py").write_text(SOLUTION)
+    (course / "labcli/marks.py").write_text('BEGIN = "### BEGIN SOLUTION"')
     nbformat.write(solution_notebook(), course / "lessons/91_two.ipynb")
     shown = solution_notebook(SOLUTION.replace("### BEGIN SOLUTION", "").replace("### END SOLUTION", ""))
     nbformat.write(shown, course / "lessons/92_three.ipynb")
@@ -396,6 +399,7 @@ def test_a_bundle_takes_what_git_tracks_and_no_link_solution_or_key_and_says_so(
     said = dict(line.removeprefix("left out ").split(": ") for line in lines if line.startswith("left out "))
     links = dict.fromkeys(("docs/again.md", "docs/hosts.md", "docs/solved", "labkit", "labkit/table.md"), "a link")
     assert {name: why for name, why in said.items() if why == "a link"} == links
+    assert said["labcli/answers.py"] == "a solution, by its marks" and "labcli/marks.py" not in said
     assert said["docs/key.html"] == "a key, by its marks" and said["docs/notes.md"] == "a rubric, by its marks"
     assert said["lessons/91_two.ipynb"] == "a solution, by its marks"
     assert said["lessons/92_three.ipynb"] == "a notebook with solution cells"
