@@ -10,6 +10,7 @@ import pytest
 
 from labgrader.course import course, course_around, of_topic
 from labgrader.file_check import check_file
+from labgrader.support import git
 
 ROOT = Path(__file__).parents[2]
 LABKIT = Path(sys.executable).with_name("labkit")
@@ -58,8 +59,32 @@ def folder(tmp_path_factory):
     program.chmod(0o755)
     subprocess.run(["git", "init", "-q"], cwd=folder, check=True)
     subprocess.run(["git", "add", "labs"], cwd=folder, check=True)
-    subprocess.run(["git", "config", "core.fsmonitor", str(program)], cwd=folder, check=True)
+    absent = f"100644,{'1' * 40},.gitignore"  # which git would fetch, by a program that the folder names
+    settings = {
+        "core.fsmonitor": program,
+        "core.repositoryFormatVersion": 1,
+        "extensions.partialClone": "origin",
+        "remote.origin.promisor": "true",
+        "remote.origin.url": folder,
+        "remote.origin.uploadpack": program,
+    }
+    commands = [("update-index", "--add", "--cacheinfo", absent), ("update-index", "--skip-worktree", ".gitignore")]
+    commands += [("config", name, str(value)) for name, value in settings.items()]
+    for command in commands:
+        subprocess.run(["git", *command], cwd=folder, check=True)
     return folder
+
+
+def test_git_runs_no_program_of_the_folders(folder):
+    """It would: it starts both without what keeps it from that."""
+    marker = folder.with_name("ran")
+    for words in (("check-ignore", "-q", "grades"), ("ls-files", "-z")):
+        git(folder, *words)
+        assert not marker.exists(), words
+    subprocess.run(["git", "check-ignore", "-q", "grades"], cwd=folder, check=False, capture_output=True)
+    subprocess.run(["git", "status"], cwd=folder, check=False, capture_output=True)
+    assert len(marker.read_text().splitlines()) >= 2
+    marker.unlink()
 
 
 def run(folder: Path, *words: str, **variables: str) -> subprocess.CompletedProcess:
