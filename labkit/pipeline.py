@@ -13,8 +13,8 @@ from jaxtyping import Float, Integer, UInt8
 from labkit.frame import RGBDFrame
 from labkit.geometry import Table, back_project_to_base
 from labkit.grasp import GraspPlan, Gripper, plan_grasps, weighed
-from labkit.labels import IGNORE, TARGET
-from labkit.learning.engines import open_engine
+from labkit.labels import IGNORE
+from labkit.learning.engines import class_number, open_engine
 from labkit.learning.inference import Engine, FunctionEngine, check_probabilities
 from labkit.learning.things import predicts_instances, segment_instances
 from labkit.notices import notices
@@ -64,10 +64,13 @@ class Perception:
 class Pipeline:
     """The chain as one object: `Pipeline(model).run(frame)`, which is `perceive` and then `locate`.
 
-    model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes), or any function from an
-        RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1; None if only `locate` is used.
+    model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes, and which outputs are
+        understood), or any function from an RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1;
+        None if only `locate` is used.
     table_z: height of the table in the base frame, metres; None takes the frame's own, or else 0.
-    target_class: the class to grasp.
+    target_class: the class to grasp, its number or its name in the id2label of a Hugging Face model; None is the kit's
+        target, 2, or 1 where there are two classes, as of one channel with a sigmoid.
+    processor: the image processor of a Hugging Face model, which then sees the picture as that prepares it.
     find_objects: in place of a model, any function from a frame to the numbers of objects, integers (H, W), 0 for none,
         or to `labkit.learning.things.Instances`, such as its `instance_finder` makes of a network; each is a target.
     flip_tta: test-time flip: a network sees the image and its mirror image, and the mean of both counts: a little
@@ -98,8 +101,9 @@ class Pipeline:
         self,
         model=None,
         table_z: float | None = None,
-        target_class: int = TARGET,
+        target_class: int | str | None = None,
         *,
+        processor=None,
         find_objects: Callable[[RGBDFrame], object] | None = None,
         flip_tta: bool | None = None,
         engine: str = "torch",
@@ -112,16 +116,17 @@ class Pipeline:
     ):
         require("find_objects", model is None or find_objects is None, "none beside a model", "both")
         require("gripper", grasp is None or gripper is None, "none beside `grasp`, which plans for its own", "both")
-        self.model = None if model is None else open_engine(model, engine)
+        require("processor", processor is None or model is not None, "a model beside it", "none")
+        self.model = None if model is None else open_engine(model, engine, processor)
         self.find_objects = find_objects
-        check_whole("target_class", target_class, 0, (getattr(self.model, "num_classes", None) or IGNORE) - 1)
+        self.target_given, self.target_class = target_class is not None, class_number(target_class, self.model)
+        check_whole("target_class", self.target_class, 0, (getattr(self.model, "num_classes", None) or IGNORE) - 1)
         self.table_z = None if table_z is None else check_height("table_z", table_z)
-        self.target_class = target_class
         sees_view = isinstance(self.model, Engine) and self.model.takes.pixel is not None
         self.flip_tta = sees_view if flip_tta is None else flip_tta
         crf = not isinstance(self.model, FunctionEngine) if crf is None else crf
         self.crf = refine_labels if crf is True else crf
-        self.targets = TargetFinder(target_class, workspace, split)
+        self.targets = TargetFinder(workspace, split)
         self.back_project = back_project
         self.gripper = gripper or Gripper()
         self.grasp = grasp
@@ -163,24 +168,25 @@ class Pipeline:
         pixels labelled target, those of one number are one target. at: as in `run`. Raises ValueError naming the
         argument that does not fit.
         """
-        labels = labels_in(frame, labels)
+        labels, target = labels_in(frame, labels), self.target_class
         if probabilities is not None:
-            probabilities = self._with_target(check_probabilities(probabilities, labels.shape))
+            target = self._target_in(check_probabilities(probabilities, labels.shape))
         if instances is not None:
             instances = instances_in(frame, instances)
         at = None if at is None else check_pixel("at", at, frame.size)
-        return self._locate(self._with_table_z(frame), Segmentation(labels, probabilities, instances), {}, at)
+        return self._locate(self._with_table_z(frame), Segmentation(labels, target, probabilities, instances), {}, at)
 
     def _with_table_z(self, frame: RGBDFrame) -> RGBDFrame:
         """The frame with the height of the table that counts: this pipeline's, or else its own, or else 0."""
         known = frame.table_z if self.table_z is None else self.table_z
         return replace(frame, table_z=known or 0.0)
 
-    def _with_target(self, probabilities: Float[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
+    def _target_in(self, probabilities: Float[np.ndarray, "H W C"]) -> int:
+        """The class to grasp among those of probabilities."""
         C = probabilities.shape[-1]
-        wanted = f"one of the {C} classes of probabilities"
-        require("target_class", self.target_class < C, wanted, self.target_class)
-        return probabilities
+        target = self.target_class if self.target_given or C != 2 else 1
+        require("target_class", target < C, f"one of the {C} classes of probabilities", target)
+        return target
 
     def _perceive(self, frame: RGBDFrame, seconds: dict[str, float], things: bool = False) -> Segmentation:
         """things: tell things apart beside their classes, if the network can."""
@@ -189,7 +195,8 @@ class Pipeline:
                 found = self.find_objects(frame)
                 instances = instances_in(frame, getattr(found, "instances", found))
             labels = np.where(instances > 0, self.target_class, 0).astype(np.uint8)
-            return Segmentation(labels, instances=instances, certainty=getattr(found, "certainty", None))
+            certainty = getattr(found, "certainty", None)
+            return Segmentation(labels, self.target_class, instances=instances, certainty=certainty)
         require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
         instances = certainty = None
         with timed(seconds, "network"):
@@ -198,10 +205,10 @@ class Pipeline:
                 instances, certainty, probabilities = found.instances, found.certainty, found.probabilities
             else:
                 probabilities = self.model(frame, self.flip_tta)
-        probabilities = self._with_target(probabilities)
+        target = self._target_in(probabilities)
         with timed(seconds, "crf" if self.crf else "labels"):
             labels = self.crf(probabilities, frame) if self.crf else most_probable(probabilities)
-        return Segmentation(labels_in(frame, labels), probabilities, instances, certainty)
+        return Segmentation(labels_in(frame, labels), target, probabilities, instances, certainty)
 
     def _locate(self, frame: RGBDFrame, seen: Segmentation, seconds: dict[str, float], at=None) -> Perception:
         with timed(seconds, "back_projection"):
@@ -212,7 +219,7 @@ class Pipeline:
             plan = self.plan(found.clouds, found.scene, frame, found.certainty, found.why_none)
         return Perception(
             frame=frame,
-            target_class=self.target_class,
+            target_class=seen.target_class,
             labels=found.labels,
             probabilities=seen.probabilities,
             points=points,

@@ -29,12 +29,13 @@ ON_TABLE = 0.01  # metres over or under the table's height: what is there is the
 class Segmentation:
     """What is seen in a frame pixel by pixel: labels, and what they were chosen by, if anything.
 
-    probabilities: (H, W, C), of a network; instances: numbers of objects, (H, W), 0 for none; certainty: of each of
-    these, number 1 first. why_no_target: why no target stands where one was asked for. outliers_removed: whether the
-    objects' pixels are without outliers already.
+    target_class: the class to grasp. probabilities: (H, W, C), of a network; instances: numbers of objects, (H, W), 0
+    for none; certainty: of each of these, number 1 first. why_no_target: why no target stands where one was asked for.
+    outliers_removed: whether the objects' pixels are without outliers already.
     """
 
     labels: UInt8[np.ndarray, "H W"]
+    target_class: int
     probabilities: Float[np.ndarray, "H W C"] | None = None
     instances: Integer[np.ndarray, "H W"] | None = None
     certainty: tuple[float, ...] | None = None
@@ -57,10 +58,10 @@ class Targets:
 
 
 class TargetFinder:
-    """Finds targets as a `Pipeline` of the same arguments does: target_class, workspace and split."""
+    """Finds targets as a `Pipeline` of the same arguments does: workspace and split."""
 
-    def __init__(self, target_class: int, workspace: Sequence[Sequence[float]] | str, split: Callable):
-        self.target_class, self.split = target_class, split
+    def __init__(self, workspace: Sequence[Sequence[float]] | str, split: Callable):
+        self.split = split
         self.only_on_table = isinstance(workspace, str)
         if self.only_on_table:
             require("workspace", workspace == "table", '((x, x), (y, y), (z, z)) or "table"', repr(workspace))
@@ -91,7 +92,7 @@ class TargetFinder:
         low, high = (self.workspace.T + np.outer([1.0, 1.0], [0.0, 0.0, table_z])).astype(points.dtype)
         inside = [(x > a) & (x < b) for x, a, b in zip(points.T, low, high, strict=True)]
         inside = np.logical_and.reduce(inside)  # NaN lies nowhere
-        pixels = np.flatnonzero(inside & (seen.labels.ravel() == self.target_class))
+        pixels = np.flatnonzero(inside & (seen.labels.ravel() == seen.target_class))
         if seen.instances is None:
             groups = self.split(points[pixels])
         else:
@@ -106,7 +107,7 @@ class TargetFinder:
             return tuple(float(seen.certainty[numbers[chosen[0]] - 1]) for chosen in pixels)
         if seen.probabilities is None:
             return tuple(1.0 for _ in pixels)
-        of_target = seen.probabilities[..., self.target_class].reshape(-1)
+        of_target = seen.probabilities[..., seen.target_class].reshape(-1)
         return tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
 
     def _only_at(self, at: tuple[int, int], seen: Segmentation, points, table_z: float) -> Segmentation:
@@ -119,21 +120,21 @@ class TargetFinder:
         if numbers is None:
             removed = True  # as `split` does
             numbers = np.zeros(seen.labels.shape, np.int32)
-            pixels = np.flatnonzero(np.isin(seen.labels, (self.target_class, OBSTACLE)) & np.isfinite(points[..., 2]))
+            pixels = np.flatnonzero(np.isin(seen.labels, (seen.target_class, OBSTACLE)) & np.isfinite(points[..., 2]))
             for number, group in enumerate(self.split(points.reshape(-1, 3)[pixels]), start=1):
                 numbers.ravel()[pixels[group]] = number
-        labels = np.where(seen.labels == self.target_class, OBSTACLE, seen.labels).astype(np.uint8)
+        labels = np.where(seen.labels == seen.target_class, OBSTACLE, seen.labels).astype(np.uint8)
         number, height = int(numbers[v, u]), float(points[v, u, 2]) - table_z
         if number == 0:
             said = f"no thing was found at ({u}, {v}): the pixel shows {_shown_at(height)}"
             return replace(seen, labels=labels, instances=np.zeros_like(numbers), why_no_target=said)
         chosen = numbers == number
-        labels[chosen] = self.target_class
+        labels[chosen] = seen.target_class
         if seen.certainty is not None:
             certainty = seen.certainty[number - 1]
         elif seen.probabilities is not None:
             of_classes = seen.probabilities[chosen].mean(axis=0, dtype=np.float64)
-            certainty = float(sum(of_classes[c] for c in {self.target_class, OBSTACLE} if c < len(of_classes)))
+            certainty = float(sum(of_classes[c] for c in {seen.target_class, OBSTACLE} if c < len(of_classes)))
         else:
             certainty = 1.0
         seen = replace(seen, labels=labels, outliers_removed=removed)
@@ -141,7 +142,7 @@ class TargetFinder:
 
     def _why_none(self, seen: Segmentation, points: Float[np.ndarray, "N 3"], frame: RGBDFrame) -> str:
         """Say why no pixel that is labelled target became part of one."""
-        P = points[seen.labels.ravel() == self.target_class]
+        P = points[seen.labels.ravel() == seen.target_class]
         if not len(P):
             return NO_TARGET
         known = P[np.isfinite(P[:, 2])] - (0.0, 0.0, frame.table_z)

@@ -26,7 +26,8 @@ from torch.utils.data import DataLoader
 from tqdm.auto import tqdm
 
 from labkit.labels import CLASSES, IGNORE
-from labkit.learning.network import ARCHITECTURES, TorchEngine, logits_of, read_checkpoint, save_model, write_checkpoint
+from labkit.learning.foreign import logits_of
+from labkit.learning.network import ARCHITECTURES, TorchEngine, read_checkpoint, save_model, write_checkpoint
 from labkit.learning.things import things_loss
 from labkit.losses import SCHEMES, class_weights, segmentation_loss
 from labkit.metrics import confusion_matrix, iou, mean_iou
@@ -284,7 +285,9 @@ class Trainer:
             result = self.call(*(array.to(self.device) for array in arrays), **classes)
         counted = (y != IGNORE).sum()
         share = counted / ranks.sum_over_ranks(counted).clamp(min=1)  # of the batch's pixels
-        loss = self.loss(logits_of(result), y.to(self.device), self.weights) if self.learns_classes else 0.0
+        loss = 0.0
+        if self.learns_classes:
+            loss = self.loss(logits_of(result, tuple(y.shape[-2:])), y.to(self.device), self.weights)
         if self.things:
             loss = loss + things_loss(result["things"], instances.to(self.device))
         loss = loss * share

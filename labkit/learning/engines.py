@@ -5,6 +5,7 @@
 A network runs in PyTorch, or as an ONNX file in OpenCV's DNN module or onnxruntime, with equal results.
 """
 
+import difflib
 import importlib.util
 import io
 import json
@@ -18,6 +19,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 import labkit
+from labkit.labels import TARGET
 from labkit.learning.channels import CHANNELS
 from labkit.learning.inference import THINGS, Engine, FunctionEngine, NetworkInput
 from labkit.learning.onnx_file import check_onnx, parsed
@@ -93,19 +95,26 @@ class OnnxRuntimeEngine(Engine):
         return np.concatenate(outputs, axis=1)
 
 
-def open_engine(model, engine: str = "torch") -> Engine:
+def open_engine(model, engine: str = "torch", processor=None) -> Engine:
     """Make an engine of a model: `engine(picture)` gives class probabilities, `engine.logits(picture)` logits.
 
     model: a PyTorch network (`TorchEngine` says which), a function from an RGB image to class probabilities (H, W, C),
     or an engine, which comes back as it is. engine: "torch", "opencv" or "onnxruntime"; the last two take a network, or
-    the path of a file that `export` wrote. Raises ValueError for an unknown engine, another kind of model or a file
-    that is no such export, FileNotFoundError for none. Topic 09.
+    the path of a file that `export` wrote. processor: a Hugging Face image processor that prepares what a PyTorch
+    network sees. Raises ValueError for an unknown engine, another kind of model or processor or a file that is no such
+    export, FileNotFoundError for none. Topic 09.
 
     >>> from labkit.learning.network import SmallSegNet
     >>> open_engine(SmallSegNet())(np.zeros((5, 7, 3), np.uint8)).shape
     (5, 7, 4)
     """
     require("engine", engine in ENGINES, f"one of {', '.join(ENGINES)}", repr(engine))
+    if processor is not None:
+        beside = f"{type(model).__name__} in the engine {engine}"
+        require("processor", engine == "torch" and is_network(model), "a PyTorch network in its own engine", beside)
+        from labkit.learning.network import ProcessedEngine
+
+        return ProcessedEngine(model, processor)
     if engine != "torch":
         onnx = Path(model).read_bytes() if isinstance(model, str | Path) else to_onnx(model)
         return OpenCVEngine(onnx) if engine == "opencv" else OnnxRuntimeEngine(onnx)
@@ -136,6 +145,24 @@ def open_shipped(name: str) -> Engine:
     return open_engine(Path(labkit.__file__).with_name("weights") / f"{name}.onnx", "opencv")
 
 
+def class_number(name: int | str | None, engine: Engine | None) -> int:
+    """The number of the class to grasp: as given, or that of a name; None is TARGET, or 1 of two classes.
+
+    Raises ValueError for a name that the engine's network does not have.
+    """
+    if name is None:
+        return 1 if getattr(engine, "num_classes", None) == 2 else TARGET
+    if not isinstance(name, str):
+        return name
+    names = {each: number for number, each in getattr(engine, "class_names", {}).items()}
+    if name not in names:
+        like = difflib.get_close_matches(name, names, 5, 0.4) or list(names)[:5]
+        known = f"a name of the model's id2label, such as {', '.join(map(repr, like))}" if like else "a number"
+        why = repr(name) if like else f"{name!r}, and the model has no config.id2label"
+        raise ValueError(f"target_class: expected {known}, got {why}")
+    return names[name]
+
+
 def is_network(model) -> bool:
     """Whether a model is a PyTorch network."""
     torch = sys.modules.get("torch")  # heavy; where nobody imported it, nobody has a network
@@ -158,7 +185,8 @@ def to_onnx(model) -> bytes:
     import onnx
     import torch
 
-    from labkit.learning.network import TorchEngine, evaluating, logits_of
+    from labkit.learning.foreign import logits_of
+    from labkit.learning.network import TorchEngine, evaluating
 
     class Outputs(torch.nn.Module):
         """The network without what it may return beside its logits and `THINGS`."""
@@ -169,7 +197,7 @@ def to_onnx(model) -> bytes:
 
         def forward(self, *arrays):
             result = self.network(*arrays)
-            return (result["out"], result["things"]) if engine.things else logits_of(result)
+            return (result["out"], result["things"]) if engine.things else logits_of(result, tuple(arrays[0].shape[-2:]))
 
     require("model", is_network(model), "a PyTorch network", type(model).__name__)
     engine = TorchEngine(model)
@@ -178,7 +206,7 @@ def to_onnx(model) -> bytes:
     example = {"image": np.zeros((1, 3, height, 2 * height), np.float32)}
     if "geometry" in takes.arrays:
         example["geometry"] = np.zeros((1, len(CHANNELS), height, 2 * height), np.float32)
-    num_classes = engine.forward(*example.values()).shape[1] - len(THINGS) * engine.things
+    num_classes = max(2, engine.forward(*example.values()).shape[1] - len(THINGS) * engine.things)
     device = next((weight.device for weight in model.parameters()), "cpu")
     axes = {2: "height", 3: "width"}
     buffer = io.BytesIO()

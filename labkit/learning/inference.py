@@ -191,8 +191,8 @@ class Engine(ABC):
             arrays = [np.pad(array, ((0, 0), (0, down), (0, right), (0, 0)), mode="edge") for array in arrays]
         # Channels stay last in memory: PyTorch's convolutions are fastest there, and other engines make their own copy.
         run = run or self.classes
-        z = run(*(np.ascontiguousarray(array).transpose(0, 3, 1, 2) for array in arrays))
-        return z[..., :height, :width]
+        z = run(*(np.ascontiguousarray(array).transpose(0, 3, 1, 2) for array in arrays))[..., :height, :width]
+        return z if self.things else as_logits(z)
 
     def padded_side(self, side: int) -> int:
         """The height or width that a picture's is padded to."""
@@ -246,6 +246,26 @@ def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
     expected = "numbers in 0..1 that sum to 1 at each pixel"
     require("probabilities", fits, expected, lambda: f"{low:.4g} to {high:.4g}; are they scores?")
     return p if p.dtype.kind == "f" else p.astype(np.float32)
+
+
+def as_logits(z: Float32[np.ndarray, "N _ H W"]) -> Float32[np.ndarray, "N C H W"]:
+    """Logits of what a network gives: of one channel those of two classes, of probabilities their logarithms.
+
+    Softmax of (0, z) is (1 - s, s) with the sigmoid s = 1 / (1 + exp(-z)): so one channel is the logit of class 1, or,
+    if all is in 0..1, the sigmoid of it already. Several channels in 0..1 that sum to 1 are probabilities.
+
+    >>> as_logits(np.array([0.5, 0.75], np.float32).reshape(1, 1, 1, 2))[0, 1].round(3).tolist()
+    [[0.0, 1.099]]
+    """
+    within = z.size > 0 and z.min() >= 0.0 and z.max() <= 1.0
+    if z.shape[1] == 1:
+        if within:
+            p = np.clip(z, 1e-7, 1.0 - 1e-7)
+            z = np.log(p / (1.0 - p))
+        return np.concatenate([np.zeros_like(z), z], axis=1)
+    if within and np.abs(z.sum(axis=1) - 1.0).max() < 1e-3:
+        return np.log(np.maximum(z, 1e-12))
+    return z
 
 
 def _softmax(z: Float32[np.ndarray, "C H W"]) -> Float32[np.ndarray, "C H W"]:

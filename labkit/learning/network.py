@@ -19,6 +19,7 @@ from torch.nn import functional as F
 
 from labkit.labels import CLASSES
 from labkit.learning.channels import CHANNELS
+from labkit.learning.foreign import Processor, class_names, divisor_of, logits_of, raw_logits
 from labkit.learning.inference import THINGS, Engine, NetworkInput
 from labkit.learning.view import PIXEL
 from labkit.support.files import write_atomically
@@ -343,9 +344,10 @@ def weights_path(model: str) -> Path:
 class TorchEngine(Engine):
     """Any PyTorch network, run here: `TorchEngine(model)(rgb)` gives class probabilities.
 
-    model: a module that maps its arrays, (N, channels, H, W), to logits (N, C, H, W), or to a dict with them as "out".
-    takes: what it takes; None asks the model's own attribute `takes`, else it gets RGB in 0..1. It runs in eval mode,
-    and is left in the mode that it was in. Raises ValueError for logits of another shape.
+    model: a module that maps its arrays, (N, channels, H, W), to logits (N, C, H, W), or to what `logits_of` finds them
+    in, of a half to an eighth of the size as well. takes: what it takes; None asks the model's own attribute `takes`,
+    else it gets RGB in 0..1. It runs in eval mode, and is left in the mode that it was in. class_names: by number,
+    where the model's config has an id2label. Raises ValueError for logits of another shape.
 
     >>> mine = nn.Sequential(nn.Conv2d(3, 8, 3, padding=1), nn.ReLU(), nn.Conv2d(8, 2, 1))
     >>> TorchEngine(mine, NetworkInput(mean=127.5, std=127.5))(np.zeros((5, 7, 3), np.uint8)).shape
@@ -353,9 +355,10 @@ class TorchEngine(Engine):
     """
 
     def __init__(self, model: nn.Module, takes: NetworkInput | None = None):
-        takes = takes or getattr(model, "takes", NetworkInput())
-        super().__init__(takes, getattr(model, "num_classes", None), getattr(model, "things", False))
-        self.model = model
+        takes = takes or getattr(model, "takes", None) or NetworkInput(divisor=divisor_of(model))
+        self.model, self.class_names = model, class_names(model)
+        num_classes = getattr(model, "num_classes", None) or len(self.class_names) or None
+        super().__init__(takes, num_classes and max(num_classes, 2), getattr(model, "things", False))
 
     def weight(self) -> torch.Tensor:
         """One of the network's weights: where it runs, and in which precision. A zero on the CPU if it has none."""
@@ -370,28 +373,49 @@ class TorchEngine(Engine):
         return self._run(arrays, things=False)
 
     def _run(self, arrays, things: bool) -> Float[np.ndarray, "N C H W"]:
-        weight = self.weight()
+        network = self.model.classes if self.things and not things else self.model
         with torch.inference_mode(), evaluating(self.model):
-            x = [torch.from_numpy(array).to(weight.device, weight.dtype) for array in arrays]
-            network = self.model.classes if self.things and not things else self.model
-            try:
-                result = network(*(each.contiguous(memory_format=torch.channels_last) for each in x))
-            except (RuntimeError, TypeError) as error:  # as of a first layer that takes other channels
-                given = " and ".join(f"{a} of {x.shape[1]} channels" for a, x in zip(self.takes.arrays, x, strict=True))
-                why = str(error).splitlines()[0]
-                told = f"one that takes {given} (its attribute `takes` says)"
-                raise ValueError(f"model: expected {told}, got {why}") from error
-            z = torch.cat([result["out"], result["things"]], dim=1) if self.things and things else logits_of(result)
-        size = tuple(arrays[0].shape[-2:])
-        if not isinstance(z, torch.Tensor) or z.ndim != 4 or tuple(z.shape[-2:]) != size:
-            got = tuple(z.shape) if isinstance(z, torch.Tensor) else type(z).__name__
-            raise ValueError(f"model: expected logits (N, C, H, W) with H, W = {size}, got {got}")
+            result = self.run(network, *map(torch.from_numpy, arrays))
+            if self.things and things:
+                z = torch.cat([result["out"], result["things"]], dim=1)
+            else:
+                z = logits_of(result, tuple(arrays[0].shape[-2:]))
         return z.float().cpu().numpy()
 
+    def run(self, network, *arrays: Float[torch.Tensor, "N _ H W"]):
+        """What the network returns for its arrays, where its weights are and in their precision."""
+        weight = self.weight()
+        x = [array.to(weight.device, weight.dtype) for array in arrays]
+        try:
+            return network(*(each.contiguous(memory_format=torch.channels_last) for each in x))
+        except (RuntimeError, TypeError) as error:  # as of a first layer that takes other channels
+            given = " and ".join(f"{a} of {x.shape[1]} channels" for a, x in zip(self.takes.arrays, x, strict=True))
+            why = str(error).splitlines()[0]
+            told = f"one that takes {given} (its attribute `takes` says)"
+            raise ValueError(f"model: expected {told}, got {why}") from error
 
-def logits_of(result) -> torch.Tensor:
-    """Take the logits out of what a network returns: torchvision's networks give a dict, with the logits as "out"."""
-    return result.get("out") if isinstance(result, Mapping) else result
+
+class ProcessedEngine(TorchEngine):
+    """A network that sees pictures as its Hugging Face processor prepares them: scaled, resized, padded.
+
+    processor: as for `labkit.learning.foreign.Processor`. The logits are brought to the picture's own pixels as the
+    processor's own post_process_semantic_segmentation does it, but without what was padded.
+    """
+
+    def __init__(self, model: nn.Module, processor):
+        super().__init__(model, NetworkInput(std=1.0))
+        self.processor = Processor(processor)
+
+    def forward(self, image: Float[np.ndarray, "N 3 H W"]) -> Float[np.ndarray, "N C H W"]:
+        return np.concatenate([self._of(rgb) for rgb in image.transpose(0, 2, 3, 1).astype(np.uint8)])
+
+    classes = forward
+
+    def _of(self, rgb) -> Float[np.ndarray, "1 C H W"]:
+        with torch.inference_mode(), evaluating(self.model):
+            pixels = self.processor.pixels(rgb)
+            z = raw_logits(self.run(self.model, pixels)).float()
+            return self.processor.back(z, rgb, pixels).cpu().numpy()
 
 
 @contextmanager

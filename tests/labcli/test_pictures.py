@@ -402,7 +402,7 @@ def test_with_depth_of_a_phones_size_as_many_things_are_found_in_photographs(tmp
     from bench.bench_photographs import with_outlines
     from labkit.geometry.depth_units import resize_depth
     from labkit.instance_metrics import pool
-    from labkit.pipeline import anything
+    from labkit.learning.things import instance_finder
 
     things, found = with_outlines(PHOTOGRAPHS, tmp_path), {}
     rows, columns = (np.rint((np.arange(n) + 0.5) * N / n - 0.5).astype(int) for n, N in ((192, 480), (256, 640)))
@@ -413,7 +413,7 @@ def test_with_depth_of_a_phones_size_as_many_things_are_found_in_photographs(tmp
             return replace(frame, depth=resize_depth(frame.depth[np.ix_(rows, columns)], (640, 480)))
 
     for name, of in (("as it is", things), ("a phone's", Smaller(tmp_path))):
-        scores = pool([one.scores for one in evaluate_folder.judge(of, anything())])
+        scores = pool([one.scores for one in evaluate_folder.judge(of, instance_finder())])
         found[name] = scores.over_half
     print(found)
     assert found["a phone's"] >= found["as it is"]
