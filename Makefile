@@ -15,6 +15,7 @@
 #   make slides  set up .venv-site, then a deck of slides per topic in out/slides, with notes, for a room without a network
 #   make hub     set up .venv-hub, then a JupyterHub for trying on this machine alone (docs/hub.md)
 #   make test-hub  three users through lab 04 on it, in Chromium
+#   make test-models  set up .venv-models with transformers and others, and tests of their networks as they come
 #   make bench   set up .venv-bench with the peers, measure against them, write BENCHMARKS.md
 #   make evidence write docs/evidence.md, README's promises and what shows them, from results that are there
 #   make fresh   `make demo` and `make test` on a bare Debian, which has nothing but Python, make and git
@@ -27,7 +28,7 @@ SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := demo
-.PHONY: colab demo test nightly prose lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site slides pictures test-site hub test-hub
+.PHONY: colab demo test nightly prose lab release train stacks ros2 test-ros2 bench evidence fresh everywhere clean site slides pictures test-site hub test-hub test-models
 
 BIN := .venv/bin
 ARGS ?=
@@ -113,6 +114,9 @@ hub: .venv-hub/installed
 test-hub: .venv-hub/installed
 	.venv-hub/bin/python -m pytest tests/labcourse/test_hub.py $(ARGS)
 
+test-models: .venv-models/installed
+	.venv-models/bin/python -m pytest --nightly tests/labkit/learning/test_libraries.py $(ARGS)
+
 everywhere: .venv/installed
 	$(BIN)/python tests/fresh/run --suite bookworm trixie $(ARGS)
 
@@ -160,7 +164,8 @@ train: .venv/installed
 	for model in smallsegnet unet; do $(BIN)/labkit export --model $$model --onnx labkit/weights/$$model.onnx; done
 
 # pip's arguments for the build of PyTorch that TORCH_INDEX asks for; what it requires comes from the usual index.
-TORCH_BUILD = --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constraints.txt)"
+TORCHES := torch
+TORCH_BUILD = --no-deps --index-url "$(TORCH_INDEX)" $$(grep -E '^($(TORCHES))==' constraints.txt)
 
 # Environments, and the extras of pyproject.toml that each holds.
 .venv/installed: EXTRAS := course,instructor,stacks,cluster,test
@@ -170,6 +175,8 @@ TORCH_BUILD = --no-deps --index-url "$(TORCH_INDEX)" "$$(grep '^torch==' constra
 .venv-bench/installed: EXTRAS := course,instructor,stacks,cluster,test,bench
 .venv-site/installed: EXTRAS := course,instructor,stacks,cluster,test,site
 .venv-hub/installed: EXTRAS := course,instructor,stacks,test,hub
+.venv-models/installed: EXTRAS := stacks,test,models
+.venv-models/installed: TORCHES := torch|torchvision
 .venv-ros2/installed: EXTRAS := stacks,test
 .venv-ros2/installed: MORE := -r constraints-ros2.txt
 .venv-ros2/installed: constraints-ros2.txt
@@ -186,7 +193,7 @@ COMMA := ,
 # A file `installing` is there while an installation runs and becomes `installed` when it ends. One that was killed leaves
 # `installing` behind, and so does a failed one: nobody knows what is missing then, so the next make starts over.
 # A changed pyproject.toml or constraints.txt only installs the difference.
-.venv/installed .venv/installed-lab .venv-bench/installed .venv-site/installed .venv-ros2/installed .venv-hub/installed: pyproject.toml constraints.txt
+.venv/installed .venv/installed-lab .venv-bench/installed .venv-site/installed .venv-ros2/installed .venv-hub/installed .venv-models/installed: pyproject.toml constraints.txt
 	@is_right='import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))'
 	for python in $(or $(PYTHON),python3.13 python3.12 python3.11 python3 python) ""; do
 	    if "$$python" -c "$$is_right" 2>/dev/null; then break; fi

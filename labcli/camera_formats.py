@@ -26,7 +26,8 @@ class Intrinsics:
 
     depth_scale: as the file says it (`labkit.geometry.depth_units`). size: width and height of the pictures that it is
     the camera of. same_view: depth of another size is of the same view, as an app on a phone writes it. said: what is
-    to be said of the file.
+    to be said of the file. orientation: EXIF's number that pictures were turned by before they had this K, as `labkit
+    calibrate` writes it.
     """
 
     K: Float[np.ndarray, "3 3"]
@@ -35,6 +36,7 @@ class Intrinsics:
     lens: Lens | None = None
     same_view: bool = False
     said: tuple[str, ...] = ()
+    orientation: int = 1
 
     @property
     def distortion(self) -> tuple[float, ...]:
@@ -204,7 +206,9 @@ def _camera(facts: dict, offset: float = 0.0, same_view: bool = False, said: tup
     scales = [facts[name] for name in DEPTH_SCALES if facts.get(name) is not None]
     scale = number_of(scales[0]) if scales else None
     require("intrinsics", not scales or scale, "depth_scale as a number", lambda: repr(scales[0])[:60])
-    return Intrinsics(K, scale, size_of(facts), lens_of(facts), same_view, said)
+    turned = facts.get("exif_orientation", 1)
+    require("intrinsics", turned in range(1, 9), "exif_orientation from 1 to 8", lambda: repr(turned)[:60])
+    return Intrinsics(K, scale, size_of(facts), lens_of(facts), same_view, said, int(turned))
 
 
 DEPTH_SCALES = ("depth_scale", "depthScale", "png_depth_scale", "depth_factor", "DepthMapFactor")

@@ -1,7 +1,6 @@
 """`labkit evaluate FOLDER`: how well are the things in somebody's own pictures told apart, and which went worst?"""
 
 import html
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from tqdm.auto import tqdm
 
 from labcli.cameras import read_intrinsics
 from labcli.perceive import on_table
-from labcli.pictures import NOTHING_SAID, Reading, camera_file, depth_beside, pictures_in, read_numbers, read_shot
+from labcli.pictures import NOTHING_SAID, Reading, Shot, camera_file, depth_beside, pictures_in, read_numbers, read_shot
 from labcli.report import PAGE, figures
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project_to_base
@@ -104,16 +103,20 @@ class TrueThings(Sequence):
         return len(self.colors)
 
     def __getitem__(self, index: int) -> RGBDFrame:
-        color, mask = self.colors[index], self.masks[index]
-        camera = read_intrinsics(str(self.camera), color, self.reading.camera_name)
-        shot, true = read_shot(color, depth_beside(color), camera, self.reading), read_numbers(mask)
-        if true.shape[::-1] != shot.file_size:
-            (h, w), (width, height) = true.shape, shot.file_size
-            raise ValueError(f"mask: expected the colour picture's size, {width} x {height}, in {mask}, got {w} x {h}")
+        shot = self.shot(index)
         self.said += [sentence for sentence in shot.said if sentence not in self.said]
-        if self.alone:
-            true = (true > 0).astype(np.uint8)
-        return replace(shot.frame, instances=shot.labels_like(true, self.ignore(index)))
+        return replace(shot.frame, instances=self.numbers(self.masks[index], shot, self.ignore(index)))
+
+    def shot(self, index: int) -> Shot:
+        """A picture as it is in its files, without its true things."""
+        color = self.colors[index]
+        camera = read_intrinsics(str(self.camera), color, self.reading.camera_name)
+        return read_shot(color, depth_beside(color), camera, self.reading)
+
+    def numbers(self, mask: Path, shot: Shot, outside: int = 0) -> Integer[np.ndarray, "h w"]:
+        """The numbers of things in a mask of a picture's size, at the frame's pixels; 0 and 1 if truth is `alone`."""
+        numbers = read_numbers(mask)
+        return shot.labels_like((numbers > 0).astype(np.uint8) if self.alone else numbers, outside, mask)
 
     def ignore(self, index: int) -> int:
         """The number of the mask's pixels that nobody knows, the greatest of its kind."""
@@ -127,20 +130,47 @@ def judge(things: TrueThings, find: Finder) -> list[Judged]:
     """
     judged = []
     for index, frame in enumerate(tqdm(things, desc="pictures", unit="picture")):
-        ignore, true, said = things.ignore(index), frame.instances, ""
+        found, said = np.zeros(frame.depth.shape, np.int32), ""
         try:
             seen, _ = on_table(replace(frame, instances=None))
         except ValueError as error:
-            seen, said = None, f"nothing was looked for: {error}"
-        found = np.zeros(true.shape, np.int32) if seen is None else find(seen)
-        found = getattr(found, "instances", found)
-        counted = true[true != ignore]
-        largest = np.bincount(counted[counted > 0]).max(initial=0) / max(1, counted.size)
-        if not said and not things.alone and largest > HALF:
-            said = f"one true thing covers {largest:.0%} of the picture: are these numbers of classes, not of things?"
-        scores = score_instances(true, np.where(found > 0, 1, 0) if things.alone else found, ignore)
-        judged.append(Judged(things.colors[index].stem, frame.rgb, true, found, ignore, scores, said))
+            said = f"nothing was looked for: {error}"
+        else:
+            found = find(seen)
+        judged.append(_judged(things, index, frame, getattr(found, "instances", found), said))
     return judged
+
+
+def judge_masks(things: TrueThings, folder: Path) -> list[Judged]:
+    """Score somebody's masks, FOLDER/NAME.png of 8 or 16 bits, of the pictures' names and sizes.
+
+    Each number above 0 is a thing. Raises FileNotFoundError naming those that are missing, before one is scored, and
+    ValueError for one of another size.
+    """
+    masks = [folder / f"{path.stem}.png" for path in things.colors]
+    missing = [path.name for path in masks if not path.is_file()]
+    if missing:
+        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+        raise FileNotFoundError(
+            f"masks: expected a mask for each picture in {folder}, got no {', '.join(missing[:8])}{more}"
+        )
+    return [
+        _judged(things, index, things[index], things.numbers(mask, things.shot(index)))
+        for index, mask in enumerate(masks)
+    ]
+
+
+def _judged(
+    things: TrueThings, index: int, frame: RGBDFrame, found: Integer[np.ndarray, "H W"], said: str = ""
+) -> Judged:
+    """Score what was found in one picture; said: why nothing could be."""
+    ignore, true = things.ignore(index), frame.instances
+    counted = true[true != ignore]
+    largest = np.bincount(counted[counted > 0]).max(initial=0) / max(1, counted.size)
+    if not said and not things.alone and largest > HALF:
+        said = f"one true thing covers {largest:.0%} of the picture: are these numbers of classes, not of things?"
+    scores = score_instances(true, np.where(found > 0, 1, 0) if things.alone else found, ignore)
+    return Judged(things.colors[index].stem, frame.rgb, true, found, ignore, scores, said)
 
 
 def table(judged: Sequence[Judged], alone: bool) -> str:
@@ -168,8 +198,8 @@ def table(judged: Sequence[Judged], alone: bool) -> str:
     return "\n".join([*lines, "", foreground])
 
 
-def as_json(judged: Sequence[Judged], alone: bool) -> str:
-    """The pooled scores and, as `rows`, each picture's; null where there is none, as for things if truth has none."""
+def as_dict(judged: Sequence[Judged], alone: bool) -> dict:
+    """The pooled scores and, as `rows`, each picture's; None where there is none, as for things if truth has none."""
     whole = asdict(pool([picture.scores for picture in judged]))
     rows = [
         {"name": one.name, "said": one.said, "foreground_iou": one.scores.foreground_iou, **asdict(one.scores)}
@@ -178,8 +208,7 @@ def as_json(judged: Sequence[Judged], alone: bool) -> str:
     if alone:
         kept = {"pictures", "name", "said", "foreground", "foreground_iou"}
         whole, *rows = ({key: facts[key] for key in facts if key in kept} for facts in (whole, *rows))
-    facts = whole | {"rows": rows}
-    return json.dumps(_without_nan(facts), indent=1, allow_nan=False) + "\n"
+    return _without_nan(whole | {"rows": rows})
 
 
 def _without_nan(facts):
@@ -199,15 +228,20 @@ def worst(judged: Sequence[Judged], count: int, alone: bool) -> list[Judged]:
     return sorted(judged, key=goodness)[:count]
 
 
-def page(judged: Sequence[Judged], count: int, alone: bool) -> str:
-    """HTML of the worst pictures: each with its true things, with those that were found, and how they score."""
-    body = []
+def page(judged: Sequence[Judged], count: int, alone: bool, beside: Sequence[Judged] = ()) -> str:
+    """HTML of the worst pictures: each with its true things, with those that were found, and how they score.
+
+    beside: what else was found in the same pictures, shown beside it.
+    """
+    body, others = [], {one.name: one for one in beside}
     for picture in worst(judged, count, alone):
         scores, true = picture.scores, np.where(picture.true == picture.ignore, 0, picture.true)
         said = [] if alone else [f"{scores.over(0.5)} of {scores.true} things found as one piece, {scores.found} found"]
         said += [] if alone else [f"overlap F {scores.overlap[2]:.3f}, boundary F {scores.boundary[2]:.3f}"]
         said += [f"foreground IoU {scores.foreground_iou:.3f}", picture.said]
         pictures = {"true things": painted(picture.rgb, true), "found": painted(picture.rgb, picture.found)}
+        if picture.name in others:
+            pictures["found by the kit"] = painted(picture.rgb, others[picture.name].found)
         body += [f"<h2>{html.escape(picture.name)}</h2>", figures(pictures)]
         body += [f"<pre>{html.escape(chr(10).join(filter(None, said)))}</pre>"]
     title = f"The worst {min(count, len(judged))} of {len(judged)} pictures"

@@ -98,13 +98,9 @@ class PictureFolder(Sequence):
         except FileNotFoundError as error:
             missing = Path(error.filename)
             raise FileNotFoundError(f"{missing.parent.name}: expected {missing}, named as its picture is") from None
-        frame, (w, h) = shot.frame, shot.file_size
+        frame = shot.frame
         if self.size not in (None, frame.size):
             raise ValueError(f"color: expected pictures of one size, {self.size} as before, got {frame.size}")
-        if labels.shape != (h, w):
-            raise ValueError(
-                f"mask: expected the colour picture's size, {w} x {h}, in {mask}, got {labels.shape[::-1]}"
-            )
         for sentence in {*shot.said} - self._told:
             _say(f"{color}: {sentence}")
         self._told |= {*shot.said}
@@ -117,7 +113,7 @@ class PictureFolder(Sequence):
             raise ValueError(
                 f"mask: expected classes 0 to {len(CLASSES) - 1}, or {IGNORE}, in {mask}, got {values[:6]}"
             )
-        return replace(frame, labels=shot.labels_like(labels.astype(np.uint8), IGNORE))
+        return replace(frame, labels=shot.labels_like(labels.astype(np.uint8), IGNORE, mask))
 
     def _values(self, found: list[Path]) -> set[int]:
         """All values above 0 of all masks that can be read; what cannot is said when the picture is."""

@@ -73,9 +73,8 @@ def read_mask(path, shot: Shot, target: int | None = None, instances: bool = Fal
     value that means "target", whatever the others mean. instances: each value above 0 is an object, and a target.
     Raises ValueError for an image of another kind or size, and for values that no class has.
     """
-    mask, size = read_numbers(path) if instances else read_image("mask", path, (np.uint8, np.uint16)), shot.file_size
-    require("mask", mask.shape[::-1] == size, f"the colour picture's size, {size[0]} x {size[1]}", mask.shape[::-1])
-    mask = shot.labels_like(mask)
+    mask = read_numbers(path) if instances else read_image("mask", path, (np.uint8, np.uint16))
+    mask = shot.labels_like(mask, path=path)
     if instances or target is not None:
         chosen = mask > 0 if target is None else mask == target
         return np.where(chosen, TARGET, 0).astype(np.uint8), mask if instances else None, ""

@@ -13,22 +13,12 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, UnidentifiedImageError
 
+from labkit.support.images import turned, turned_size
 from labkit.support.validation import require
 
 ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp", ".heic", ".heif")
 MOST_PIXELS = 120_000_000  # of one photograph: phones end at a hundred million
 ORIENTATION = 0x0112  # EXIF's number for how the camera was held
-Flip = Image.Transpose
-UPRIGHT = {  # by EXIF's number, what brings the sensor's picture upright
-    1: (),
-    2: (Flip.FLIP_LEFT_RIGHT,),
-    3: (Flip.ROTATE_180,),
-    4: (Flip.FLIP_TOP_BOTTOM,),
-    5: (Flip.TRANSPOSE,),
-    6: (Flip.ROTATE_270,),
-    7: (Flip.TRANSVERSE,),
-    8: (Flip.ROTATE_90,),
-}
 HEIC = (
     "HEIC is read where pillow-heif is installed (pip install pillow-heif); or let the phone write JPEG: on an iPhone "
     "Settings > Camera > Formats > Most Compatible"
@@ -45,7 +35,7 @@ class Photograph:
 
     def size(self, orientation: int) -> tuple[int, int]:
         """Width and height once it is turned as `orientation` says."""
-        return self.sensor_size[:: -1 if orientation >= 5 else 1]
+        return turned_size(self.sensor_size, orientation)
 
     def read(self, orientation: int, size: tuple[int, int] | None = None) -> UInt8[np.ndarray, "H W 3"]:
         """The picture, RGB, turned as `orientation` says; no larger than `size`, if given, with the same proportions.
@@ -56,10 +46,8 @@ class Photograph:
             with Image.open(self.path) as image:
                 picture = image.convert("RGB")
                 if size is not None and size != self.size(orientation):
-                    picture = picture.resize(size[:: -1 if orientation >= 5 else 1], Image.Resampling.BOX)
-                for turn in UPRIGHT[orientation]:
-                    picture = picture.transpose(turn)
-                return np.array(picture)
+                    picture = picture.resize(turned_size(size, orientation), Image.Resampling.BOX)
+                return turned(np.array(picture), orientation)
         except (OSError, SyntaxError, ValueError) as error:
             raise ValueError(f"{self.path.name}: expected a photograph, got a damaged file ({error})") from None
 
@@ -113,7 +101,7 @@ def _opened(path: Path) -> Photograph:
             orientation = image.getexif().get(ORIENTATION, 1)
     except (UnidentifiedImageError, Image.DecompressionBombError, SyntaxError, OSError) as error:
         raise ValueError(f"{path.name}: not a picture that can be read ({type(error).__name__})") from None
-    return Photograph(path, (width, height), orientation if orientation in UPRIGHT else 1)
+    return Photograph(path, (width, height), orientation if orientation in range(1, 9) else 1)
 
 
 def _most(values: Iterator):

@@ -14,7 +14,7 @@ from labcli.arrays import open_array
 from labcli.cameras import Intrinsics, rectify
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry.depth_units import metres_per_unit, resize_depth, resized_K
-from labkit.support.images import image_size
+from labkit.support.images import image_size, turned, turned_size
 from labkit.support.validation import require
 
 WIDEST = 640  # pixels of a phone's colours: its depth has 256
@@ -38,7 +38,8 @@ NOTHING_SAID = Reading()
 class Shot:
     """A frame in the camera's own frame (T_base_cam is the identity), its lens undone, and what is to be said of it.
 
-    camera: of the frame, which may be smaller than the file's picture; file_size: width and height of that.
+    camera: of the frame, which may be smaller than the file's picture; file_size: width and height of that, as it is
+    shown: turned if its camera is that of turned pictures (`labkit calibrate`).
     """
 
     frame: RGBDFrame
@@ -46,11 +47,20 @@ class Shot:
     file_size: tuple[int, int]
     said: tuple[str, ...] = ()
 
-    def labels_like(self, image: Integer[np.ndarray, "H W"], outside: int = 0) -> Integer[np.ndarray, "h w"]:
+    def labels_like(
+        self, image: Integer[np.ndarray, "H W"], outside: int = 0, path="the mask"
+    ) -> Integer[np.ndarray, "h w"]:
         """Labels or numbers of things that were made for the colour file, at the frame's pixels.
 
-        outside: what stands where the lens saw nothing.
+        They may be of the picture as it is shown, or on its side as the file holds it. outside: what stands where the
+        lens saw nothing. path: the file that they are of. Raises ValueError for another size.
         """
+        (w, h), orientation = self.file_size, self.camera.orientation
+        if image.shape != (h, w) and turned_size(image.shape, orientation) == (h, w):
+            image = turned(image, orientation)
+        if image.shape != (h, w):
+            got = f"{image.shape[1]} x {image.shape[0]}"
+            raise ValueError(f"mask: expected the colour picture's size, {w} x {h}, in {path}, got {got}")
         if image.shape[::-1] != self.frame.size:
             image = cv2.resize(image, self.frame.size, interpolation=cv2.INTER_NEAREST_EXACT)
         return rectify(image, self.camera, outside=outside)
@@ -77,11 +87,12 @@ def read_shot(color, depth, camera: Intrinsics, reading: Reading = NOTHING_SAID)
     which readings an app trusts least. Raises ValueError with the likely cause if the files are swapped, their sizes
     differ, or depth cannot be metres.
     """
-    file_size = image_size("color", Path(color).read_bytes(), str(color))
+    camera, file_size, said_of_turn = _as_shown(image_size("color", Path(color).read_bytes(), str(color)), camera)
     raw = open_array("depth", depth)
-    size = _common_size(file_size, raw.size, camera, reading)
+    turns = _depth_turns(raw.size, file_size, camera.orientation)
+    size = _common_size(file_size, turned_size(raw.size, turns), camera, reading)
     camera = _camera_of_size(camera, file_size, size, reading)
-    rgb = read_image("color", color, np.uint8, colour=True)
+    rgb = turned(read_image("color", color, np.uint8, colour=True), camera.orientation)
     if rgb.shape[1::-1] != size:
         rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
     numbers = _one_channel(raw.read(), depth)
@@ -90,9 +101,9 @@ def read_shot(color, depth, camera: Intrinsics, reading: Reading = NOTHING_SAID)
         metres = numbers.astype(np.float32) * np.float32(unit)
     metres[~np.isfinite(metres)] = 0.0
     trusted, untrusted = _confidence(Path(depth), metres)
-    metres = resize_depth(trusted, size) if trusted.shape[::-1] != size else trusted
+    metres = resize_depth(turned(trusted, turns), size)
     pictures = rectify(rgb, camera, smooth=True), rectify(metres, camera)
-    told = [*camera.said, said, untrusted]
+    told = [*camera.said, said_of_turn, said, untrusted]
     if size != file_size:
         told.append(f"color: {file_size[0]} x {file_size[1]} is made {size[0]} x {size[1]}, depth and K with it")
     if camera.lens is not None:
@@ -103,6 +114,24 @@ def read_shot(color, depth, camera: Intrinsics, reading: Reading = NOTHING_SAID)
 def read_frame(color, depth, camera: Intrinsics, depth_scale: float | None = None) -> RGBDFrame:
     """The frame of `read_shot`, for whoever needs nothing else; depth_scale: metres per unit of the depth file."""
     return read_shot(color, depth, camera, Reading(depth_scale)).frame
+
+
+def _as_shown(sensor: tuple[int, int], camera: Intrinsics) -> tuple[Intrinsics, tuple[int, int], str]:
+    """The camera, the size of a colour file as its pictures are turned, and what is said of it.
+
+    `labkit calibrate` turns what the sensor saw as a phone was held; a file that was turned already stays.
+    """
+    size = turned_size(sensor, camera.orientation)
+    if camera.size and one_ratio(camera.size, sensor) and not one_ratio(camera.size, size):
+        camera, size = replace(camera, orientation=1), sensor
+    turns = "color: turned upright as the camera's file says, exif_orientation"
+    return camera, size, f"{turns} {camera.orientation}" if camera.orientation != 1 else ""
+
+
+def _depth_turns(size: tuple[int, int], shown: tuple[int, int], orientation: int) -> int:
+    """How depth is to be turned: as its colours, unless its sides are those of the turned colours already."""
+    on_its_side = one_ratio(turned_size(size, orientation), shown)
+    return orientation if on_its_side or not one_ratio(size, shown) else 1
 
 
 def _common_size(color: tuple[int, int], depth: tuple[int, int], camera: Intrinsics, reading: Reading):

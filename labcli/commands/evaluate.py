@@ -16,9 +16,13 @@ def evaluate(
     scenes: Annotated[int, typer.Option(help="How many scenes; each is one trial.", min=1)] = 100,
     first_seed: Annotated[int, typer.Option(help="Seed of the first scene; the others follow.", min=0)] = 900_000,
     config: Annotated[Literal["test", "hard", "other", "train"], typer.Option(help="Which kind of scenes.")] = "test",
-    masks: Annotated[Literal["predicted", "truth"], typer.Option(help="The network's masks, or the true ones.")] = (
-        "predicted"
-    ),
+    masks: Annotated[
+        str,
+        typer.Option(
+            help="The network's masks (predicted) or the true ones (truth); with FOLDER another folder of somebody's "
+            "masks, scored beside the kit's."
+        ),
+    ] = "predicted",
     model: Model = "unet_rgbd",
     crf: Refine = None,
     perturb: Annotated[
@@ -42,15 +46,17 @@ def evaluate(
     """
     options = inspect.signature(evaluate).parameters
     given = {name for name, value in locals().items() if name in options and value != options[name].default}
-    of_scenes = {"scenes", "first_seed", "config", "masks", "crf", "perturb", "workers", "dask"}
+    of_scenes = {"scenes", "first_seed", "config", "crf", "perturb", "workers", "dask"}
     of_pictures = {"anything", "depth_scale", "aligned", "camera_name"}
     wrong = sorted(given & (of_pictures if folder is None else of_scenes))
     if wrong:
         raise ValueError(f"{wrong[0]}: expected {'FOLDER beside it' if folder is None else 'no FOLDER beside it'}")
     if folder is not None:
         reading = depth_scale, aligned, camera_name
-        _of_a_folder(folder, model, anything, reading, json, worst, out)
+        _of_a_folder(folder, Path(masks) if "masks" in given else None, model, anything, reading, json, worst, out)
         return
+    if masks not in ("predicted", "truth"):
+        raise ValueError(f"masks: expected predicted or truth, or FOLDER beside a folder of masks, got {masks!r}")
     from data_gen import sample_scene
     from labcli.evaluation import as_json, run_trials, summarise, table
     from labcli.worst import page
@@ -71,7 +77,11 @@ def evaluate(
         typer.echo(f"wrote {out / 'worst.html'}")
 
 
-def _of_a_folder(folder: Path, model: str, things: bool, reading, json: Path | None, worst: int, out: Path) -> None:
+def _of_a_folder(
+    folder: Path, masks: Path | None, model: str, things: bool, reading, json: Path | None, worst: int, out: Path
+) -> None:
+    from json import dumps
+
     from labcli import evaluate_folder as own
     from labcli.pictures import Reading
     from labkit.learning.network import load_model, weights_path
@@ -79,12 +89,19 @@ def _of_a_folder(folder: Path, model: str, things: bool, reading, json: Path | N
     from labkit.support.files import write_atomically
 
     true, network = own.TrueThings(folder, Reading(*reading)), load_model(weights_path(model))
+    given = [] if masks is None else own.judge_masks(true, masks)  # what is missing is said before a network runs
     judged = own.judge(true, instance_finder(network) if things else own.things_by_class(network))
     for sentence in true.said:
         typer.echo(sentence, err=True)
-    typer.echo(own.table(judged, true.alone))
+    parts = {"": judged} if masks is None else {"masks": given, "kit": judged}
+    for name, part in parts.items():
+        if name:
+            typer.echo({"masks": f"the masks of {masks}:", "kit": f"\nthe kit's, {model}:"}[name])
+        typer.echo(own.table(part, true.alone))
     if json is not None:
-        write_atomically(json, own.as_json(judged, true.alone).encode())
+        facts = {name: own.as_dict(part, true.alone) for name, part in parts.items()}
+        write_atomically(json, f"{dumps(facts.get('', facts), indent=1, allow_nan=False)}\n".encode())
     if worst:
-        write_atomically(out / "worst.html", own.page(judged, worst, true.alone).encode())
+        pages = own.page(given, worst, true.alone, judged) if given else own.page(judged, worst, true.alone)
+        write_atomically(out / "worst.html", pages.encode())
         typer.echo(f"wrote {out / 'worst.html'}")

@@ -3,6 +3,7 @@
 Topic 06.
 """
 
+import cv2
 import numpy as np
 from jaxtyping import Float, Float32, Real
 
@@ -126,7 +127,8 @@ def resize_depth(depth: Float[np.ndarray, "H W"], size: tuple[int, int]) -> Floa
     """Bring a depth image of the same view to another size (width, height), without mixing two surfaces.
 
     A pixel of the new image gets the weighted mean of those of the four readings around its place that lie within 1 %
-    of the nearest one's depth; where the nearest is no reading, it has none. Metres. Topic 06.
+    of the nearest one's depth; where the nearest is no reading, it has none. Of an enlarged image each pixel is then
+    the median of 3 x 3: what was one pixel's noise is a speckle otherwise, and edges are stairs. Metres. Topic 06.
 
     >>> resize_depth(np.array([[1.0, 1.0, 2.0, 2.0]]), (8, 1)).tolist()
     [[1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0]]
@@ -147,4 +149,5 @@ def resize_depth(depth: Float[np.ndarray, "H W"], size: tuple[int, int]) -> Floa
             weight *= np.abs(near - nearest) <= SAME_SURFACE * nearest
             total += weight * near
             weights += weight
-    return np.where(nearest > 0.0, total / np.where(weights > 0.0, weights, 1.0), 0.0).astype(np.float32)
+    resized = np.where(nearest > 0.0, total / np.where(weights > 0.0, weights, 1.0), 0.0).astype(np.float32)
+    return np.where(nearest > 0.0, cv2.medianBlur(resized, 3), np.float32(0.0)) if w < W else resized

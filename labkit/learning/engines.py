@@ -197,7 +197,9 @@ def to_onnx(model) -> bytes:
 
         def forward(self, *arrays):
             result = self.network(*arrays)
-            return (result["out"], result["things"]) if engine.things else logits_of(result, tuple(arrays[0].shape[-2:]))
+            return (
+                (result["out"], result["things"]) if engine.things else logits_of(result, tuple(arrays[0].shape[-2:]))
+            )
 
     require("model", is_network(model), "a PyTorch network", type(model).__name__)
     engine = TorchEngine(model)

@@ -4,6 +4,9 @@ import io
 import re
 import struct
 
+import numpy as np
+from jaxtyping import Shaped
+
 from labkit.support.validation import require
 
 MOST_PIXELS = 64_000_000  # a phone's largest photographs have 50 million
@@ -26,6 +29,22 @@ def image_size(name: str, data: bytes, what: str = "the image") -> tuple[int, in
         raise ValueError(f"{name}: {what} is not an image that can be read (damaged or truncated?)") from error
     check_pixels(name, width * height, what)
     return width, height
+
+
+def turned(image: Shaped[np.ndarray, "H W *C"], orientation: int) -> Shaped[np.ndarray, "h w *C"]:
+    """A sensor's picture as EXIF's number for how the camera was held says it is upright; 1 leaves it.
+
+    >>> turned(np.array([[1, 2, 3]]), 6).tolist()  # a quarter turn clockwise
+    [[1], [2], [3]]
+    """
+    image = image.swapaxes(0, 1) if orientation >= 5 else image
+    image = image[::-1] if orientation in (3, 4, 7, 8) else image
+    return np.ascontiguousarray(image[:, ::-1] if orientation in (2, 3, 6, 7) else image)
+
+
+def turned_size(size: tuple[int, int], orientation: int) -> tuple[int, int]:
+    """Width and height of a picture that was `turned`."""
+    return size[::-1] if orientation >= 5 else size
 
 
 def check_pixels(name: str, count: int, what: str) -> None:

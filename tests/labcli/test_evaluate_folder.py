@@ -81,7 +81,7 @@ def test_true_things_score_as_perfect_and_what_nobody_knows_does_not_count(folde
 
 
 def test_a_truth_that_does_not_tell_things_apart_gives_foreground_alone_and_says_so(folder, alone, tmp_path):
-    apart = json.loads(own.as_json(own.judge(own.TrueThings(folder), instance_finder()), False))
+    apart = own.as_dict(own.judge(own.TrueThings(folder), instance_finder()), False)
     said = run(alone, "--anything", "--json", tmp_path / "scores.json", "--worst", "2", "--out", tmp_path)
     assert "2 pictures whose truth does not tell things apart" in said and "as one piece" not in said
     facts = json.loads((tmp_path / "scores.json").read_text())
@@ -109,6 +109,47 @@ def test_a_network_gives_things_by_its_classes(folder):
     assert own.score_instances(true, found).over(0.75) == 3
     nothing = own.things_by_class(lambda rgb: np.eye(4)[np.full(rgb.shape[:2], SURFACE)])(frame)
     assert not nothing.any()
+
+
+def test_anybodys_masks_are_scored_beside_the_kits(folder, tmp_path):
+    """The true things under other numbers, 8 and 16 bits, one of them cut: the scores are known by counting."""
+    (tmp_path / "theirs").mkdir()
+    things, cut = own.TrueThings(folder), 0.0
+    for name, frame in zip(("one", "three"), things, strict=True):
+        numbers = np.where(frame.instances == 65535, 0, frame.instances // 300)
+        numbers = numbers.astype(np.uint8) if name == "one" else 999 * numbers.astype(np.uint16)
+        if name == "one":
+            rows = np.flatnonzero((numbers > 0).any(axis=1))
+            numbers[: rows[len(rows) // 2]] = 0
+            true = (frame.instances > 0) & (frame.instances != 65535)
+            cut = np.count_nonzero(numbers) / np.count_nonzero(true)
+        cv2.imwrite(str(tmp_path / "theirs" / f"{name}.png"), numbers)
+    options = "--masks", tmp_path / "theirs", "--anything", "--json", tmp_path / "scores.json", "--worst", "1"
+    said = run(folder, *options, "--out", tmp_path)
+    theirs, kit = said.split("the kit's, unet_rgbd:")
+    over = 3 + (cut > 0.5)
+    assert f"the masks of {tmp_path / 'theirs'}:\n2 pictures, 4 things, 4 found" in theirs
+    assert f"IoU over 0.5: {over} of 4" in theirs and "IoU over 0.75: 3 of 4" in theirs
+    assert "2 pictures, 4 things, 4 found" in kit
+    facts = json.loads((tmp_path / "scores.json").read_text())
+    assert set(facts) == {"masks", "kit"} and facts["masks"]["over_three_quarters"] == 3
+    (one, three) = facts["masks"]["rows"]
+    assert one["foreground_iou"] == pytest.approx(cut) and three["foreground_iou"] == 1.0
+    assert facts["kit"]["over_half"] == 4 and [row["name"] for row in facts["kit"]["rows"]] == ["one", "three"]
+    page = (tmp_path / "worst.html").read_text()
+    assert "<h2>one</h2>" in page and page.count("<img") == 3 and "found by the kit" in page
+
+
+@pytest.mark.bad_input
+def test_masks_that_are_missing_or_of_another_size_are_named(folder, tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"masks: expected a mask for each picture in .*, got no one\.png, th"):
+        run(folder, "--masks", tmp_path)
+    for name in ("one", "three"):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.zeros((60, 80), np.uint8))
+    with pytest.raises(ValueError, match=r"mask: expected the colour picture's size, 320 x 240, in .*one\.png, got 80"):
+        run(folder, "--masks", tmp_path)
+    with pytest.raises(ValueError, match="masks: expected predicted or truth, or FOLDER beside a folder of masks, got"):
+        run("--masks", tmp_path)
 
 
 def test_without_a_table_nothing_is_found_which_counts_and_is_said(folder, tmp_path):

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from camera_files import FILES
+from PIL import Image, ImageOps
 from scenes import png_that_claims
 from typer.testing import CliRunner
 
@@ -228,6 +229,59 @@ def test_depth_of_another_view_stays_refused(size, says, files):
     if size == (256, 144):
         with pytest.raises(ValueError, match=r"align depth to colour first$"):
             perceived(files, "--aligned")
+
+
+# -------------------------------------------------------------------------------- a phone that was held on its side
+
+
+def held(files, orientation: int, depth_is_shown: bool, already: bool = False):
+    """The scene as a phone held so writes it, and what `labkit calibrate` says of its camera."""
+
+    def shown(image):  # Pillow is the judge of what EXIF's numbers say
+        picture = Image.fromarray(image)
+        picture.getexif()[0x0112] = orientation
+        return np.array(ImageOps.exif_transpose(picture))
+
+    note = Image.Exif()
+    note[0x0112] = orientation
+    rgb, units = shown(RGB), shown(UNITS.astype(np.int32))
+    Image.fromarray(rgb if already else RGB).save(files / "color.png", **({} if already else {"exif": note}))
+    cv2.imwrite(str(files / "depth.png"), units.astype(np.uint16) if depth_is_shown else UNITS)
+    cv2.imwrite(str(files / "mask.png"), shown(MASK))
+    h, w = units.shape
+    camera = {"fx": 300.0, "fy": 300.0, "cx": (w - 1) / 2, "cy": (h - 1) / 2, "width": w, "height": h}
+    (files / "camera.json").write_text(json.dumps(camera | {"exif_orientation": orientation}))
+    return rgb, units
+
+
+MASK = np.where(THING, 255, 0).astype(np.uint8)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_picture_is_turned_as_its_calibration_was(orientation, files):
+    """Colour and depth as the sensor has them, however the phone was held."""
+    rgb, units = held(files, orientation, depth_is_shown=False)
+    shot = read_shot(files / "color.png", files / "depth.png", read_intrinsics(str(files / "camera.json")))
+    assert np.array_equal(shot.frame.rgb, rgb) and np.allclose(shot.frame.depth, 0.001 * units)
+    assert shot.file_size == rgb.shape[1::-1] and shot.pixel(3.0, 5.0) == (3.0, 5.0)
+    assert any("exif_orientation" in sentence for sentence in shot.said) == (orientation != 1)
+    mask = cv2.imread(str(files / "mask.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(shot.labels_like(mask), mask)
+    if orientation >= 5:  # on its side it has another size
+        assert np.array_equal(shot.labels_like(MASK), mask)
+
+
+@pytest.mark.parametrize("depth_is_shown", [False, True])
+@pytest.mark.parametrize("already", [False, True])
+def test_a_portrait_picture_and_its_calibration_lead_to_the_grasp_of_the_sensors(depth_is_shown, already, files):
+    _, usual = perceived(files)
+    held(files, 6, depth_is_shown or already, already)
+    out, ours = perceived(files)
+    assert ("exif_orientation 6" in out) != already
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # clockwise in the picture
+    places = [np.array(said["grasps"][0]["T_cam_grasp"])[:3, 3] for said in (usual, ours)]
+    assert np.allclose(quarter @ places[0], places[1], atol=5e-3)
+    assert ours["targets"][0]["points"] == pytest.approx(usual["targets"][0]["points"], abs=20)
 
 
 # ---------------------------------------------------------------------------------------------------- depth's unit
