@@ -48,6 +48,10 @@ NIGHTLY = pytest.mark.nightly  # they train, as test_training does
             "Things of your own",
             r"Perception\(.* grasps\)\n(\d+) objects in truth, \d+ found\n(Perception\(.* grasps\)\n){2}",
         ),
+        (
+            "Masks of a foundation model",
+            r"Perception\(.*, clouds of \d+, \d+.* grasps\)\nPerception\(.*clouds of \d+ points, ",
+        ),
         ("A gripper of your own", r"GraspPlan\(no grasp: too wide .*\nGraspPlan\(10 grasps, the best Grasp\("),
         pytest.param(
             "A loss of your own", r"\{'epoch': 2, 'steps': 4, 'loss': 0\.\d+, 'mean_iou': 0\.\d+, .*\}", marks=NIGHTLY

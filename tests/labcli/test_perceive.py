@@ -210,7 +210,7 @@ def test_a_hostile_file_of_a_gripper_is_refused_in_words(content, tmp_path):
         ({"options": ["--anything", "--model", "unet"]}, "model: expected a network that tells things apart"),
         ({"options": ["--depth-scale", "1e-6"]}, "0.001 makes it 0."),
         ({"color": "small.png"}, "align depth to colour"),
-        ({"options": ["--mask", "small_mask.png"]}, "mask: expected the colour picture's size, 424 x 240, got"),
+        ({"options": ["--mask", "small_mask.png"]}, "mask: expected the colour picture's size, 424 x 240, in "),
         ({"options": ["--mask", "grey_mask.png"]}, "--instances takes each for an object"),
         ({"K": "600 600 320"}, "intrinsics: expected"),
         (

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from test_library_page import BLOCKS
 from torch.nn import functional as F
 
 from data_gen import render, sample_scene
@@ -130,3 +131,77 @@ def test_networks_of_segmentation_models_pytorch(kind, classes, activation, fram
     seen = Pipeline(model, crf=False).run(frame)
     np.testing.assert_allclose(seen.probabilities, p[0].permute(1, 2, 0), atol=1e-5)
     assert seen.target_class == (1 if classes == 1 else 2)
+
+
+# ------------------------------------------------------------------------------------- masks of a foundation model
+
+
+@pytest.fixture(scope="module")
+def page():
+    """What docs/library.md defines in its section on such masks."""
+    names: dict = {}
+    exec(compile(BLOCKS["Masks of a foundation model"], "library.md", "exec"), names)
+    return names
+
+
+@pytest.fixture(scope="module")
+def sam():
+    """A tiny SAM of random weights that takes pictures of 64 pixels, and its processor."""
+    torch.manual_seed(1)
+    vision = {"hidden_size": 16, "num_hidden_layers": 2, "num_attention_heads": 2, "intermediate_size": 32}
+    vision |= {
+        "image_size": 64,
+        "patch_size": 8,
+        "output_channels": 16,
+        "window_size": 0,
+        "global_attn_indexes": [0, 1],
+    }
+    vision |= {"mlp_dim": 32, "num_pos_feats": 8}
+    prompt = {"hidden_size": 16, "image_size": 64, "patch_size": 8, "mask_input_channels": 4}
+    decoder = {
+        "hidden_size": 16,
+        "mlp_dim": 32,
+        "num_hidden_layers": 2,
+        "num_attention_heads": 2,
+        "iou_head_hidden_dim": 16,
+    }
+    config = transformers.SamConfig(vision_config=vision, prompt_encoder_config=prompt, mask_decoder_config=decoder)
+    images = transformers.SamImageProcessor(size={"longest_edge": 64}, pad_size={"height": 64, "width": 64})
+    return transformers.SamModel(config).eval(), transformers.SamProcessor(images)
+
+
+def test_sams_mask_at_a_point_is_the_thing_there(page, sam, frame):
+    """Against its low-resolution logits, brought to the picture by hand: 160 x 120 is 64 x 48 in a square of 64."""
+    model, processor = sam
+    (mask,) = page["pointed"](model, processor, 80, 60)(frame.rgb)
+    given = processor(frame.rgb, input_points=[[[[80, 60]]]], return_tensors="pt")
+    with torch.no_grad():
+        said = model(**given)
+    z = said.pred_masks[0, :, said.iou_scores[0, 0].argmax()][None]
+    z = F.interpolate(z, (64, 64), mode="bilinear")[..., :48, :]
+    expected = F.interpolate(z, (120, 160), mode="bilinear")[0, 0].numpy() > 0.0
+    assert mask.shape == (120, 160) and 0 < mask.sum() < mask.size and np.array_equal(mask, expected)
+    find = page["finder"](page["pointed"](model, processor, 80, 60), over=-1.0)
+    assert np.array_equal(find(frame) > 0, mask)
+    v, u = (int(x[len(x) // 2]) for x in np.nonzero(mask & (frame.depth > 0)))
+    seen = Pipeline(find_objects=find).run(frame, at=(u, v))
+    assert len(seen.clouds) <= 1 and np.array_equal(seen.labels == 2, mask)
+
+
+def test_any_mask_generator_gives_objects(page, sam, frame):
+    """The generator of transformers with every mask let through: numbers cover what the masks do, wholes over parts."""
+    from PIL import Image
+
+    model, processor = sam
+    every = {"pred_iou_thresh": -1e9, "stability_score_thresh": -1.0, "points_per_crop": 4, "crops_nms_thresh": 0.9}
+    generate = transformers.pipeline("mask-generation", model=model, image_processor=processor.image_processor)
+
+    def masks(rgb):
+        return generate(Image.fromarray(rgb), **every)["masks"]
+
+    given = [np.asarray(mask, bool) for mask in masks(frame.rgb)]
+    numbers = page["finder"](masks, over=-1.0, least=1)(frame)
+    assert len(given) > 1 and np.array_equal(numbers > 0, np.any(given, axis=0))
+    largest = max(given, key=np.sum)
+    assert len(np.unique(numbers[largest])) == 1, "the largest lies on the others"
+    assert Pipeline(find_objects=page["finder"](masks, over=-1.0)).run(frame).probabilities is None
