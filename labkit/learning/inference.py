@@ -254,8 +254,8 @@ def as_logits(z: Float32[np.ndarray, "N _ H W"]) -> Float32[np.ndarray, "N C H W
     Softmax of (0, z) is (1 - s, s) with the sigmoid s = 1 / (1 + exp(-z)): so one channel is the logit of class 1, or,
     if all is in 0..1, the sigmoid of it already. Several channels in 0..1 that sum to 1 are probabilities.
 
-    >>> as_logits(np.array([0.5, 0.75], np.float32).reshape(1, 1, 1, 2))[0, 1].round(3).tolist()
-    [[0.0, 1.099]]
+    >>> print(as_logits(np.array([0.5, 0.75], np.float32).reshape(1, 1, 1, 2))[0, 1].round(3))
+    [[0.    1.099]]
     """
     within = z.size > 0 and z.min() >= 0.0 and z.max() <= 1.0
     if z.shape[1] == 1:
