@@ -106,7 +106,7 @@ def course_named(folder: str) -> Course:
     """The course of a folder that somebody named."""
     if not settings_in(Path(folder)):
         raise ValueError(f"{NAMED}: expected a folder that has a {FILE} with [tool.labgrader], got {folder}")
-    return read(Path(folder).resolve() / FILE)
+    return read_course(Path(folder).resolve() / FILE)
 
 
 @functools.cache
@@ -116,13 +116,13 @@ def course_around(folder: str) -> Course:
     if path is None or path == own or (own is not None and questions_of(path) == questions_of(own)):
         if own is None:
             raise ValueError(f"course: expected a {FILE} with [tool.labgrader] in {folder} or above it, found none")
-        return read(own)
+        return read_course(own)
     if is_trusted(path.parent) or is_imported(str(questions_of(path)), path.parent):
-        return read(path)
-    raise ValueError(refusal(path, questions_of(path), read(own).command if own else "COMMAND"))
+        return read_course(path)
+    raise ValueError(refusal(path, questions_of(path), read_course(own).command if own else "COMMAND"))
 
 
-def read(path: Path) -> Course:
+def read_course(path: Path) -> Course:
     """The course of a file, whose packages can be imported from now on."""
     settings = tomllib.loads(path.read_text(encoding="utf-8"))
     said = {name: tuple(v) if isinstance(v, list) else v for name, v in settings["tool"]["labgrader"].items()}

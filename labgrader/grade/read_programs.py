@@ -30,7 +30,7 @@ class Read:
     attempts: list[str]
 
 
-def read(source: str) -> Read:
+def read_program(source: str) -> Read:
     """Read a program here; raises what a parser raises for what is no Python."""
     tree = ast.parse(source)
     tried = attempts(tree)
@@ -66,7 +66,7 @@ def main() -> None:
         reply = None
         try:
             if len(source) <= LONGEST:
-                found = read(source)
+                found = read_program(source)
                 reply = found.shapes, found.attempts
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             pass

@@ -28,7 +28,7 @@ def running_file(shell: object | None, is_lab: Callable[[dict], bool]) -> Path:
     for named in (os.environ.get("JPY_SESSION_NAME"), getattr(shell, "user_ns", {}).get("__vsc_ipynb_file__")):
         if named and named.endswith(".ipynb") and Path(named).is_file():
             return Path(named)
-    found = [path for path in sorted(Path.cwd().glob("*.ipynb")) if is_lab(read(path))]
+    found = [path for path in sorted(Path.cwd().glob("*.ipynb")) if is_lab(read_saved(path))]
     if len(found) == 1:
         return found[0]
     there = f"{len(found)} labs, {', '.join(path.name for path in found)}" if found else "no lab"
@@ -36,7 +36,7 @@ def running_file(shell: object | None, is_lab: Callable[[dict], bool]) -> Path:
     raise ValueError(f"path: this folder holds {there}; say which, such as check_file({example!r})")
 
 
-def read(path: Path) -> dict:
+def read_saved(path: Path) -> dict:
     """A notebook's JSON; {} if a file is none."""
     try:
         notebook = json.loads(path.read_text(encoding="utf-8-sig"))

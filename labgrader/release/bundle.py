@@ -21,7 +21,7 @@ from labgrader.course import course as course_here
 from labgrader.course import is_taught, taught_rows
 from labgrader.course import topics as all_topics
 from labgrader.release.publishing import unpublished
-from labgrader.release.release import START, read, release, start_page, to_bytes
+from labgrader.release.release import START, read_notebook, release, start_page, to_bytes
 from labgrader.support import PRIVATE, git, write_atomically
 
 # What a file that students get does not hold, and what it would be.
@@ -61,7 +61,7 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> Bundle:
         if name.endswith(".md"):
             contents[name] = taught_rows(contents[name].decode("utf-8")).encode()
         if name.endswith(".ipynb"):  # its links lead to the files of the bundle, wherever the course is published
-            contents[name] = to_bytes(unpublished(read(course / name), name, course))
+            contents[name] = to_bytes(unpublished(read_notebook(course / name), name, course))
     if here.start:
         contents |= dict.fromkeys((START, "README.md"), start_page(course, topics).encode())
     archived = io.BytesIO()
@@ -118,7 +118,7 @@ def reason_against(course: Path, name: str, tracked: set[str] | None) -> str:
     if found := next((what for mark, what in MARKS.items() if mark in data), ""):
         return f"{found}, by its marks"
     if name.endswith(".ipynb") and not name.startswith("labs/"):
-        marks = (cell.metadata.get("nbgrader", {}) for cell in read(path).cells)
+        marks = (cell.metadata.get("nbgrader", {}) for cell in read_notebook(path).cells)
         return "a notebook with solution cells" if any(mark.get("solution") for mark in marks) else ""
     return ""
 

@@ -48,8 +48,8 @@ def release(course: Path, topics: Sequence[str] = (), check: bool = False) -> li
         raise ValueError(f"topics: expected some of {', '.join(solutions)}, got {', '.join(unknown)}")
     chosen = {topic: path for topic, path in solutions.items() if not topics or topic in topics}
     lessons = [path for path in sorted(course.glob("lessons/*.ipynb")) if path.stem.startswith(tuple(topics) or "")]
-    tidied = {path: to_bytes(as_published(course, path, read(path))) for path in lessons}
-    tidied |= {path: to_bytes(tidy(unpublished(read(path), *place(course, path)))) for path in chosen.values()}
+    tidied = {path: to_bytes(as_published(course, path, read_notebook(path))) for path in lessons}
+    tidied |= {path: to_bytes(tidy(unpublished(read_notebook(path), *place(course, path)))) for path in chosen.values()}
     made = {course / "labs" / topic: generate(path, tidied[path]) for topic, path in chosen.items()}
     left_over = [] if topics else [f for f in course.glob("labs/*") if f.is_dir() and f.name not in solutions]
     made |= {folder: {} for folder in left_over}
@@ -78,7 +78,7 @@ def as_published(course: Path, path: Path, notebook: NotebookNode) -> NotebookNo
     return nbformat.from_dict(published(tidy(unpublished(notebook, name, root)), name, root, course_here()))
 
 
-def read(path: Path) -> NotebookNode:
+def read_notebook(path: Path) -> NotebookNode:
     """Read a notebook; raises ValueError with its name if it is none."""
     try:
         return nbformat.from_dict(nbformat.read(path, as_version=4))
@@ -239,7 +239,7 @@ def start_page(course: Path, topics: Sequence[str] = ()) -> str:
 
 def link(course: Path, path: Path) -> str:
     """A notebook's title that leads to it; a title's number, which the row has already, is left out."""
-    title = read(path).cells[0].source.splitlines()[0].removeprefix("# ").removeprefix("Lab ")
+    title = read_notebook(path).cells[0].source.splitlines()[0].removeprefix("# ").removeprefix("Lab ")
     title = re.sub(r"^\d\d(, \w+)?\W+", "", title)
     return f"[{title[:1].upper()}{title[1:]}]({path.relative_to(course).as_posix()})"
 

@@ -14,7 +14,7 @@ from nbformat import NotebookNode, reads
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
 from labgrader.course import course as course_here
-from labgrader.release.release import read, tidy, to_bytes
+from labgrader.release.release import read_notebook, tidy, to_bytes
 from labgrader.support import require, write_atomically
 
 NO_ALTERNATIVES = '''"""Right answers to the questions of TOPIC, written in other ways than the references."""
@@ -56,7 +56,7 @@ def new_question(course: Path, name: str, points: int = 2) -> list[Path]:
     require("name", known, expected, repr(name))
     fits = re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", function) and not keyword.iskeyword(function)
     require("name", fits, "lower-case letters, digits and single underscores behind the dot", repr(name))
-    notebook, module = read(solution), folder / f"{function}.py"
+    notebook, module = read_notebook(solution), folder / f"{function}.py"
     graded = [cell.metadata.nbgrader.grade_id for cell in notebook.cells if "nbgrader" in cell.metadata]
     cells = "\n".join([cell.source for cell in notebook.cells if cell.cell_type == "code"] + graded)
     shared = (folder / "__init__.py").read_text(encoding="utf-8")

@@ -109,10 +109,10 @@ def write(findings: Sequence[Finding]) -> str:
     return json.dumps([asdict(finding) for finding in findings[:MOST_FINDINGS]])
 
 
-def read(text: str, pieces: Sequence[tuple[str, str]]) -> list[Finding]:
+def read_findings(text: str, pieces: Sequence[tuple[str, str]]) -> list[Finding]:
     """Findings of JSON that anybody may have written; none if anything in it is not as `write` makes it.
 
-    >>> read('[{"kind": "axis", "piece": 0, "spans": [[1, 0, 1, 3]], "exponent": 1}]', [("f", "def f(): 0")])
+    >>> read_findings('[{"kind": "axis", "piece": 0, "spans": [[1, 0, 1, 3]], "exponent": 1}]', [("f", "def f(): 0")])
     []
     """
     try:

@@ -47,13 +47,13 @@ def call(question: Question, args: tuple) -> str:
         return f"{question.function}({', '.join(whole)})"
     names = question.parameters
     short = [
-        text if len(text) <= 30 and "..." not in text else f"{n} = {size(v)}"
+        text if len(text) <= 30 and "..." not in text else f"{n} = {size_in_words(v)}"
         for n, v, text in zip(names, args, whole, strict=True)
     ]
     return f"{question.function}({', '.join(short)})"
 
 
-def size(value: object) -> str:
+def size_in_words(value: object) -> str:
     """Shape, type and range of an array; how many, of anything else."""
     if not isinstance(value, np.ndarray):
         return f"{type(value).__name__} of {len(value)}" if isinstance(value, tuple | list) else type(value).__name__

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from labgrader.reply.finding import Span
 from labgrader.reply.recipes import OPERATORS, Recipe, Scope, recipes_for
-from labgrader.reply.syntax import SHORT, Place, changed, exchanged, expressions, size, span_of, template, the
+from labgrader.reply.syntax import SHORT, Place, changed, exchanged, expressions, node_count, span_of, template, the
 
 LONGEST_GROUP = 6  # places that one recipe is applied to together
 
@@ -62,7 +62,7 @@ def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
             recipes[place] = {key: recipe for key, recipe in made if getattr(recipe.make(), "id", "") != name}
     for place in places:
         for recipe in recipes[place].values():
-            yield at([place], [recipe])
+            yield mutation_at([place], [recipe])
     seen = set()
     lines = [list(expressions(line)) for line in simple_statements(function)]
     equal = (group for inside in (places, *lines) for group in equal_places(inside))
@@ -73,7 +73,7 @@ def of_expressions(function: ast.stmt, scope: Scope) -> Iterator[Mutation]:
         seen.add(identity)
         for key in recipes[group[0]]:
             if all(key in recipes[place] for place in group):
-                yield at(group, [recipes[place][key] for place in group])
+                yield mutation_at(group, [recipes[place][key] for place in group])
     yield from exchanged_names(function, scope, places)
     for inside in lines:
         yield from exchanged_parts(inside)
@@ -90,7 +90,7 @@ def kept_in(function: ast.stmt) -> Iterator[tuple[ast.expr, str]]:
                 yield part, ast.unparse(node.func.value)
 
 
-def at(places: Sequence[Place], recipes: Sequence[Recipe]) -> Mutation:
+def mutation_at(places: Sequence[Place], recipes: Sequence[Recipe]) -> Mutation:
     """A mutation of some recipes at their places."""
     marks = [mark for p, recipe in zip(places, recipes, strict=True) for mark in recipe.mark or (p.node,)]
     cost = recipes[0].cost + (0.5 if len(places) > 1 else 0.0)
@@ -151,7 +151,8 @@ def exchanged_names(function: ast.stmt, scope: Scope, places: Sequence[Place]) -
 
 def exchanged_parts(places: Sequence[Place]) -> Iterator[Mutation]:
     """Two short parts of a statement exchanged, such as k // 2 and k % 2."""
-    short = [p for p in places if isinstance(p.node, ast.BinOp | ast.Subscript | ast.Call) and size(p.node) <= SHORT]
+    kinds = ast.BinOp | ast.Subscript | ast.Call
+    short = [p for p in places if isinstance(p.node, kinds) and node_count(p.node) <= SHORT]
     for a, b in itertools.combinations(short, 2):
         apart = span_of(a.node).last_line < b.node.lineno or a.node.end_col_offset <= b.node.col_offset
         if apart and type(a.node) is type(b.node) and ast.dump(a.node) != ast.dump(b.node):

@@ -18,8 +18,8 @@ from labgrader.reply.syntax import (
     changed,
     exchanged,
     filled,
+    node_count,
     parsed,
-    size,
     template,
     the,
     without,
@@ -131,7 +131,7 @@ class Scope:
                 self.names[node.id] = None
         for node in inside:
             longest = 3 if isinstance(node, ast.BinOp) else SHORT
-            if not isinstance(node, ast.Attribute | ast.Subscript | ast.Call | ast.BinOp) or size(node) > longest:
+            if not isinstance(node, ast.Attribute | ast.Subscript | ast.Call | ast.BinOp) or node_count(node) > longest:
                 continue
             used = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
             if used & self.names.keys() and isinstance(getattr(node, "ctx", ast.Load()), ast.Load):

@@ -313,7 +313,7 @@ def places(view: View) -> Iterator[tuple[str, Sequence[np.ndarray]]]:
             ("first column", (..., 0)),
             ("last column", (..., -1)),
         ):
-            yield f"in the {name}", [at(e, index) for e in view.expected]
+            yield f"in the {name}", [entry_at(e, index) for e in view.expected]
         yield "at the border", [border(e) for e in view.expected]
 
 
@@ -322,7 +322,7 @@ def spread(mask: np.ndarray, e: np.ndarray) -> np.ndarray:
     return np.broadcast_to(mask.reshape(mask.shape + (1,) * (e.ndim - mask.ndim)), e.shape)
 
 
-def at(e: np.ndarray, index: tuple) -> np.ndarray:
+def entry_at(e: np.ndarray, index: tuple) -> np.ndarray:
     """A mask of an index."""
     mask = np.zeros(e.shape, bool)
     if e.size:

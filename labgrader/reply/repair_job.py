@@ -45,12 +45,12 @@ class Look:
         public: Pairs,
         listed: Sequence[Listed] = (),
     ):
-        self.question = Question(reference=None, inputs=None, **comparing)
-        self.name, self.pieces, self.public, self.listed = name, pieces, public, listed
         if canonical:
             namespace = {"np": np}
             exec(canonical, namespace)
-            object.__setattr__(self.question, "canonical", list(namespace.values())[-1])
+            comparing = comparing | {"canonical": [*namespace.values()][-1]}
+        self.question = Question(reference=None, inputs=None, **comparing)
+        self.name, self.pieces, self.public, self.listed = name, pieces, public, listed
 
     def right(self, expected: object, got: object) -> bool:
         """Whether an output is right."""

@@ -49,7 +49,7 @@ def expressions(root: ast.AST) -> Iterator[Place]:
             yield from expressions(child)
 
 
-def size(node: ast.AST) -> int:
+def node_count(node: ast.AST) -> int:
     """The number of nodes of an expression, without contexts and operators."""
     return sum(isinstance(part, ast.expr | ast.keyword) for part in ast.walk(node))
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from labgrader.course import of_topic
 from labgrader.grade.batch import Record, read_record
-from labgrader.grade.read_programs import Read, read
+from labgrader.grade.read_programs import Read, read_program
 from labgrader.grade.shapes import Shapes
 from labgrader.handin.reading import Lab, source_of
 from labgrader.handin.roster import keys_of
@@ -131,18 +131,18 @@ def released_shapes(lab: Lab) -> set[str]:
     for cell in lab.notebook["cells"]:
         if cell["cell_type"] == "code":
             with suppress(SyntaxError):  # a cell's magic
-                found |= read(source_of(cell)).shapes.keys()
+                found |= read_program(source_of(cell)).shapes.keys()
     return found
 
 
 def models_of(course: Path, lab: Lab) -> dict[str, list[Hand]]:
     """By question the kit's own answers: its reference, and the model solution in course/solutions if that is there."""
     references = {name: question.source for name, question in of_topic(lab.topic).items()}
-    found = {name: [Hand("the kit's reference", text, read(text).shapes)] for name, text in references.items()}
+    found = {name: [Hand("the kit's reference", text, read_program(text).shapes)] for name, text in references.items()}
     path = Path(course) / "solutions" / lab.topic / f"{lab.topic}.ipynb"
     for cell in json.loads(path.read_bytes())["cells"] if path.is_file() else ():
         if (name := grade_id(cell)) in found and cell["cell_type"] == "code":
-            found[name].append(Hand("the model solution", source_of(cell), read(source_of(cell)).shapes))
+            found[name].append(Hand("the model solution", source_of(cell), read_program(source_of(cell)).shapes))
     return found
 
 

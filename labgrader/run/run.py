@@ -15,7 +15,7 @@ from labgrader.comparison import Case, Problem, expected_cases
 from labgrader.course import course
 from labgrader.program.slice import Program
 from labgrader.question import PUBLIC_SEED, Question
-from labgrader.reply.finding import MOST_FINDINGS, Finding, read
+from labgrader.reply.finding import MOST_FINDINGS, Finding, read_findings
 from labgrader.reply.judge import Verdict, verdict
 from labgrader.reply.listed import Listed, listed_in
 from labgrader.reply.repair_job import comparison_settings, fresh_cases, pairs
@@ -173,7 +173,7 @@ class Run:
                 reply = self.worker.ask((look, *job), LOOK_S, MOST_FOUND)
                 if reply == MORE[1:].decode():
                     reply = self.worker.ask(pairs(more_public_cases(question)), LOOK_S - stopwatch.used(), MOST_FOUND)
-                found += read(reply, pieces) if isinstance(reply, str) else []
+                found += read_findings(reply, pieces) if isinstance(reply, str) else []
         return found[:MOST_FINDINGS]
 
     def with_line(self, output: object) -> object:

@@ -51,8 +51,9 @@ def test_links_lead_to_files_and_headings(path):
 def test_a_page_of_docs_has_a_place_on_the_site_and_a_link_that_leads_to_it(path):
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md"), *ROOT.glob("lessons/*.md")]
     links = {(page, target) for page in pages for target in re.findall(r"\]\(([^)#\s]+)", page.read_text())}
-    assert any((page.parent / target).resolve() == path for page, target in links if page != path)
-    assert f'"docs/{path.stem}"' in (ROOT / "docs/site/conf.py").read_text()
+    is_linked = any((page.parent / target).resolve() == path for page, target in links if page != path)
+    assert is_linked, "link to it, from README or the page that its reader comes from"
+    assert f'"docs/{path.stem}"' in (ROOT / "docs/site/conf.py").read_text(), "write it into GUIDES"
 
 
 # --------------------------------------------------------------------------------- names in prose

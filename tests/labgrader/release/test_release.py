@@ -17,7 +17,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from labgrader.course import asked
 from labgrader.course import course as course_here
 from labgrader.release.bundle import bundle, topics_of_week
-from labgrader.release.release import mistakes, read, release, tidy, to_bytes
+from labgrader.release.release import mistakes, read_notebook, release, tidy, to_bytes
 
 ROOT = Path(__file__).parents[3]
 SOLUTION = '''def double(x):
@@ -90,7 +90,7 @@ def spoil(path: Path, old: str, new: str) -> None:
 
 def test_a_lab_has_blanks_that_raise_and_nothing_of_the_solution(course):
     release(course)
-    lab = read(course / "labs/90_one/90_one.ipynb")
+    lab = read_notebook(course / "labs/90_one/90_one.ipynb")
     by_id = {cell.metadata.nbgrader.grade_id: cell for cell in lab.cells if "nbgrader" in cell.metadata}
     blank = SOLUTION[: SOLUTION.index("### BEGIN")] + "# your lines\n    raise NotImplementedError"
     assert by_id["double"].source == blank
@@ -98,7 +98,8 @@ def test_a_lab_has_blanks_that_raise_and_nothing_of_the_solution(course):
     assert "2 * x" not in str(lab) and "Because" not in str(lab)
     assert all(not cell.get("outputs") and cell.get("execution_count") is None for cell in lab.cells)
     assert (course / "labs/90_one/table.csv").read_text() == "1,2\n"
-    ids = [cell.id for cell in read(course / "solutions/90_one/90_one.ipynb").cells]  # cells are found again by these
+    solution = read_notebook(course / "solutions/90_one/90_one.ipynb")
+    ids = [cell.id for cell in solution.cells]  # cells are found again by these
     assert [cell.id for cell in lab.cells] == ids and len(set(ids)) == len(ids)
     assert ids[1:4] == ["setup", "double", "check_double"] and ids[5] == f"{ids[4]}-2"
 
@@ -110,7 +111,7 @@ def test_a_lab_is_an_assignment_to_nbgrader(course):
 
     release(course)
     path = course / "labs/90_one/90_one.ipynb"
-    lab = read(path)
+    lab = read_notebook(path)
     cells = {cell.metadata.nbgrader.grade_id: cell for cell in lab.cells if "nbgrader" in cell.metadata}
     assert {name for name, cell in cells.items() if cell.metadata.get("editable", True)} == {"double", "why"}
     assert not any(cell.metadata.get("deletable", True) for cell in cells.values())
@@ -136,7 +137,7 @@ def test_the_same_bytes_every_time_whoever_ran_the_notebooks(course):
     ]
     before = snapshot(course)
     assert release(course) == [] and release(course, check=True) == []
-    again = read(course / "solutions/90_one/90_one.ipynb")
+    again = read_notebook(course / "solutions/90_one/90_one.ipynb")
     for number, cell in enumerate(again.cells):
         cell["id"] = f"random-{number}"
         cell.metadata["execution"] = {"iopub.status.busy": "2027-01-01T00:00:00Z"}
@@ -216,7 +217,7 @@ def test_a_broken_solution_changes_nothing(course, spoilt, says):
     spoil(course / "solutions/90_one/90_one.ipynb", "Twice", "Two times")
     path = course / "solutions/91_two/91_two.ipynb"
     if spoilt.startswith("#"):
-        notebook = read(path)
+        notebook = read_notebook(path)
         notebook.cells.append(new_code_cell(spoilt))
         nbformat.write(notebook, path)
     else:
@@ -315,7 +316,7 @@ def test_the_bundle_holds_what_students_need_and_no_model_answer(tmp_path):
         archive.extractall(tmp_path)
     course = tmp_path / "course"
     for path in ROOT.glob("solutions/*/*.ipynb"):
-        for cell in read(path).cells:
+        for cell in read_notebook(path).cells:
             mark = cell.metadata.get("nbgrader", {})
             if mark.get("solution") and cell.cell_type == "markdown":
                 lines = [line for line in cell.source.splitlines() if len(line) > 60]

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from labgrader.reply.finding import MOST_FINDINGS, Finding, Span, read, write
+from labgrader.reply.finding import MOST_FINDINGS, Finding, Span, read_findings, write
 
 PIECES = (("quiet", "import numpy as np"), ("f", "def f(größe):\n    return größe"))
 GOOD = {
@@ -22,8 +22,8 @@ def test_findings_come_back_as_they_were_written():
         Finding("overflow", 1, (Span(1, 0, 2, 18), Span(2, 4, 2, 10)), 1000.0),
         Finding("axis", 0, (Span(1, 0, 1, 0),), listed=2),
     ]
-    assert read(write(findings), PIECES) == findings
-    assert len(read(write(findings * 9), PIECES)) == MOST_FINDINGS
+    assert read_findings(write(findings), PIECES) == findings
+    assert len(read_findings(write(findings * 9), PIECES)) == MOST_FINDINGS
 
 
 @pytest.mark.parametrize(
@@ -46,9 +46,9 @@ def test_findings_come_back_as_they_were_written():
     ],
 )  # fmt: skip
 def test_what_nobody_would_write_is_not_read(text):
-    assert read(text, PIECES) == []
+    assert read_findings(text, PIECES) == []
 
 
 def test_long_lists_are_cut():
-    (finding,) = read(json.dumps([GOOD | {"spans": [SPAN] * 10_000}]), PIECES)
+    (finding,) = read_findings(json.dumps([GOOD | {"spans": [SPAN] * 10_000}]), PIECES)
     assert len(finding.spans) == 6

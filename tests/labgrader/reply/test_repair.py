@@ -17,7 +17,7 @@ from labgrader.program.live import LiveProgram, is_function
 from labgrader.program.slice import Program
 from labgrader.question import PUBLIC_SEED
 from labgrader.reply import repair as search
-from labgrader.reply.finding import IDLE, MOST_FINDINGS, WATCHES, Finding, read
+from labgrader.reply.finding import IDLE, MOST_FINDINGS, WATCHES, Finding, read_findings
 from labgrader.reply.judge import judge
 from labgrader.reply.mutation import mutations
 from labgrader.reply.repair_job import Look, comparison_settings, pairs
@@ -73,9 +73,9 @@ def some(answers: list) -> list:
 def looked_at(question, pieces, repair: bool = True) -> list[Finding]:
     """What a worker finds in a program, found in this process."""
     job = Look(*comparison_settings(question), question.function, pieces, pairs(public_cases(question)))
-    found = read(job.watch(), pieces)
+    found = read_findings(job.watch(), pieces)
     if repair:
-        found += read(job.repair(lambda: pairs(more_public_cases(question))), pieces)
+        found += read_findings(job.repair(lambda: pairs(more_public_cases(question))), pieces)
     return found[:MOST_FINDINGS]
 
 
@@ -100,7 +100,7 @@ def test_values_that_another_type_would_mend_are_not_called_right(answer):
     question, pieces = find(answer["question"]), pieces_of(answer)
     verdict = judge(question, LiveProgram(question.function, pieces).answer, PUBLIC_SEED)
     said = sentences(question, verdict.cases, verdict.outputs, pieces, looked_at(question, pieces))
-    assert next(s.says for s in said if s.kind == "cast").startswith("Another type belongs at the marked place")
+    assert next(s.says for s in said if s.kind == "cast").startswith("The marked place needs another dtype")
 
 
 SLOW = "k2 r^3"  # its search takes longer than a check gives it: here it has 30 s

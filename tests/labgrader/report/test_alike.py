@@ -13,7 +13,7 @@ from labgrader.course import of_topic, topics
 from labgrader.grade import copied_code
 from labgrader.grade.batch import Record, write_record
 from labgrader.grade.grade import Result
-from labgrader.grade.read_programs import read, read_all
+from labgrader.grade.read_programs import read_all, read_program
 from labgrader.grade.shapes import shapes
 from labgrader.handin.reading import read_lab
 from labgrader.program.effects import without_idle
@@ -208,7 +208,7 @@ def test_lines_without_effect_hide_no_copy_of_a_reference(lines):
     for question in known:
         copied = fingerprints(padded(question.source, lines))
         assert copied_code.of_the_kit(copied, question), question.name
-        kept, idle = (read(text).shapes.keys() for text in (question.source, padded(question.source, lines)))
+        kept, idle = (read_program(text).shapes.keys() for text in (question.source, padded(question.source, lines)))
         assert kept == idle, question.name
 
 
