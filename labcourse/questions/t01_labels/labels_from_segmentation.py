@@ -94,12 +94,6 @@ def some_alone(segmentation, class_of_part, which):
     return labels_from_segmentation(np.where(np.isin(segmentation >> 24, which), segmentation, -1), class_of_part)
 
 
-@wrong("That is the class of the body's base for all of its links. Each link has a column of its own: which one?")
-def base_for_all_links(segmentation, class_of_part):
-    body, _, seen = body_part_seen(segmentation)
-    return np.where(seen, class_of_part[body, 0], 0)
-
-
 @wrong("The upper bits are the link plus one, and so is the column: the base, link -1, is column 0.")
 def one_column_off(segmentation, class_of_part):
     body, part, seen = body_part_seen(segmentation)

@@ -39,11 +39,6 @@ def classes_last(y, C):
     return last(y, C)
 
 
-@wrong("Yours has the classes first. The images come first here, then the classes: (N, C, H, W).")
-def classes_first(y, C):
-    return np.moveaxis(last(y, C), -1, 0)
-
-
 @wrong("The numbers are right and stand in the wrong places: reshape does not move an axis.")
 def reshaped(y, C):
     return last(y, C).reshape(len(y), C, *y.shape[1:])
@@ -52,11 +47,6 @@ def reshaped(y, C):
 @wrong("Rows and columns are exchanged in yours: the last two axes are still H and W.")
 def rows_and_columns_exchanged(y, C):
     return last(y, C).swapaxes(1, 3)
-
-
-@wrong("A pixel of 255 gets a 1 in the last class of yours: what should its C entries be?")
-def ignored_as_last_class(y, C):
-    return np.moveaxis(last(np.minimum(y, C - 1), C), -1, 1)
 
 
 @wrong("A class that is not in these images has a plane too, of zeros: there are always C of them.")

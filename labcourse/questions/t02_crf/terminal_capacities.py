@@ -100,13 +100,6 @@ def unknown_arcs(psi):
     return psi[..., 1] - lowest, psi[..., 0] - lowest
 
 
-@wrong(
-    "Those are the lesson's arcs, for pixels of which nothing is known. What must a cut of a known pixel's arc cost?"
-)
-def strokes_ignored(psi, known, large):
-    return *unknown_arcs(psi), psi.min(axis=2).sum()
-
-
 @wrong("Try one pixel: on the source's side it has label 0, and which of its two arcs is cut then?")
 def source_and_sink_exchanged(psi, known, large):
     """A pixel that wants label 0 is bound to the sink."""

@@ -102,13 +102,6 @@ def smoothed_prediction(z, y, s):
     return -float(np.log((targets(y, z.shape[-1], s) * p).sum(axis=-1))[y != 255].sum())
 
 
-@wrong("lse stays whole: the targets sum to 1, so it is multiplied by 1, and the logits by their targets.")
-def lse_of_the_true_share_alone(z, y, s):
-    lse = np.logaddexp.reduce(z, axis=-1, keepdims=True)
-    C = z.shape[-1]
-    return float((((1.0 - s) * lse[..., 0]) - (targets(y, C, s) * z).sum(axis=-1))[y != 255].sum())
-
-
 @wrong(
     "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?", epsilon=EPSILONS
 )
@@ -160,11 +153,6 @@ def cross_entropy_with_ignored_lse(z, y, s):
 def cross_entropy_of_rounded_probabilities(z, y, s):
     with np.errstate(divide="ignore"):
         return loss(np.log(np.exp(log_probabilities(z))), y, s)
-
-
-@wrong("The maximum that you take out of the exponents comes back: lse is m plus the logarithm.")
-def cross_entropy_without_the_maximum(z, y, s):
-    return loss(log_probabilities(z) + z.max(axis=-1, keepdims=True), y, s)
 
 
 @wrong("z[:, y] takes the columns of all pixels' classes for each pixel: one entry per row is asked for.")

@@ -141,11 +141,6 @@ def grad_without_the_logarithm(z, y, s):
     return (softmax_over_classes(z) * Y).sum(axis=-1, keepdims=True) * cross_entropy_grad(z, y, s)
 
 
-@wrong("Your gradient sums to 1 over a pixel's classes: the target has not been taken off.")
-def grad_without_the_one_hot(z, y, s):
-    return softmax_over_classes(z) * (y != 255)[..., None]
-
-
 @wrong("The other classes move, too: where c is not the true class the slope is p[c] - s / C, not 0.")
 def grad_of_the_true_class_alone(z, y, s):
     return (softmax_over_classes(z) - target(z, y, s)) * target(z, y, 0.0)
@@ -181,12 +176,6 @@ def grad_that_overflows(z, y, s, ignored):
     counted = (y != 255)[..., None]
     grad = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True) - target(z, y, s)
     return np.where(counted, grad, 0.0) if ignored == "chosen" else grad * counted
-
-
-@wrong("Each pixel has probabilities of its own: how many numbers does your sum add up?")
-def grad_of_a_softmax_over_everything(z, y, s):
-    e = np.exp(z - z.max())
-    return (e / e.sum() - target(z, y, s)) * (y != 255)[..., None]
 
 
 @wrong("In the lesson a factor p cancels with the 1 / p of the logarithm. Which factor of yours should have cancelled?")

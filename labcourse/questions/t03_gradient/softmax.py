@@ -43,11 +43,6 @@ def largest(z, possible, **how):
     return np.where(possible, z, -np.inf).max(**how)
 
 
-@wrong("That is the lesson's softmax, of all classes. An impossible class has 0, and the others share what it had.")
-def softmax_of_all_classes(z, possible):
-    return softmax_over_classes(z)
-
-
 @wrong("A class that is not possible has 0 in yours. Do the others still sum to 1?")
 def impossible_classes_set_to_0(z, possible):
     return softmax_over_classes(z) * possible
@@ -136,11 +131,6 @@ def logits_divided_by_their_sum(z, possible):
 def wrong_axis(z, possible, axis):
     axis = min(axis, z.ndim - 1)
     return shifted(z, possible, largest(z, possible, axis=axis, keepdims=True), axis)
-
-
-@wrong("Which number, taken off, makes the largest exponent 0? With a smaller one np.exp still overflows.")
-def smallest_logit_taken_off(z, possible):
-    return shifted(z, possible, z.min(axis=-1, keepdims=True))
 
 
 @wrong(DIVIDED)

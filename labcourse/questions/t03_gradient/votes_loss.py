@@ -224,11 +224,6 @@ def background_is_a_thing(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, no_thing=(255,))
 
 
-@wrong("0 and 255 are not things: which numbers does your loop run over?")
-def every_number_is_a_thing(votes, instances, beta):
-    return scored(votes, instances, beta, round_loss, no_thing=())
-
-
 @wrong("You take all pixels of things together, with one middle. Each thing has a middle of its own.")
 def one_middle_for_all(votes, instances, beta):
     one = np.where((instances > 0) & (instances != 255), 1, instances).astype(np.uint8)

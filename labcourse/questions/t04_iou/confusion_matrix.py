@@ -103,11 +103,6 @@ def overflowing_bytes(y_true, y_pred, num_classes, ignore):
     return np.bincount(pair, minlength=num_classes**2)[: num_classes**2].reshape(num_classes, num_classes)
 
 
-@wrong("No cell is above 1: an index that occurs twice is written once, as in the lesson. What adds them up?")
-def written_once(y_true, y_pred, num_classes, ignore):
-    return np.minimum(pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes), 1)
-
-
 @wrong("np.bincount ends at the largest number that occurs: how long does its result have to be?")
 def as_long_as_the_largest_pair(y_true, y_pred, num_classes, ignore):
     """ValueError, where the last pair of classes does not occur."""

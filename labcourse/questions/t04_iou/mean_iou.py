@@ -82,11 +82,6 @@ def absent_is_1(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=1.0).mean()
 
 
-@wrong("A class that occurs nowhere adds nothing to your sum: does it count in what you divide by?")
-def absent_is_0(n_frames):
-    return iou_of(n_frames.sum(axis=0), empty=0.0).mean()
-
-
 @wrong("What is the mean of some numbers if one of them is NaN?")
 def nan_in_the_mean(n_frames):
     return iou_of(n_frames.sum(axis=0)).mean()

@@ -90,17 +90,6 @@ def parts(z, y):
     return p, (y[..., None] == np.arange(z.shape[-1])).astype(float), (y != 255)[..., None]
 
 
-@wrong("A share multiplies a probability. What does it do to a logit?")
-def shares_added(z, y, shares, tau):
-    p, Y, counted = parts(z + tau * shares, y)
-    return (p - Y) * counted
-
-
-@wrong("The loss lowers the logit of a rare class by log(share). Yours raises it: which sign does the shift have?")
-def raised(z, y, shares, tau):
-    return adjusted_grad(z, y, shares, -tau)
-
-
 @wrong("All logits of a pixel move, each by the share of its class: yours moves only the true one.")
 def true_logit_alone(z, y, shares, tau):
     p, Y, counted = parts(z + tau * np.log(shares) * parts(z, y)[1], y)

@@ -110,16 +110,6 @@ def weights_left_in(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / shares)))
 
 
-@wrong("Training with weights has raised each logit by log w already. Yours raises it once more.")
-def weights_put_in_again(z, w, shares, rounds):
-    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(w * guess / shares)))
-
-
-@wrong("The network's logits hold the shares of its training. A guess is to take their place: what do you divide by?")
-def old_shares_left_in(z, w, shares, rounds):
-    return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / w)))
-
-
 @wrong("More of a class in the new scenes makes it likelier there: which of the two shares is divided by the other?")
 def ratio_upside_down(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(shares / guess / w)))

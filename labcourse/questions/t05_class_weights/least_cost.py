@@ -63,11 +63,6 @@ def one_weight_per_class(q, cost):
     return (q * cost.sum(axis=1)).argmax(axis=-1)
 
 
-@wrong("With which probability do you pay cost[i, j]: with q[i], or with 1 - q[i]?")
-def saved_where_it_is_not_so(q, cost):
-    return ((1.0 - q) @ cost).argmax(axis=-1)
-
-
 @wrong("You decide for the class that costs most.")
 def dearest(q, cost):
     return (q @ cost).argmax(axis=-1)

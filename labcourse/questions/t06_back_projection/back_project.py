@@ -101,12 +101,6 @@ def cases_exchanged(depth, K, along_ray):
     return back_project(depth, K, not along_ray)
 
 
-@wrong("Away from the middle q is longer than 1, so a distance along it reaches less far: multiply or divide by |q|?")
-def multiplied_by_the_length(depth, K, along_ray):
-    q = plain_rays(depth.shape, K)
-    return holes(depth) * q * (length(q) if along_ray else 1.0)
-
-
 @wrong("Each pixel's ray has a length of its own: over which axis do x, y and z lie?")
 def one_length_for_all(depth, K, along_ray):
     q = plain_rays(depth.shape, K)
@@ -131,11 +125,6 @@ def length_without_the_1(depth, K, along_ray):
     q = plain_rays(depth.shape, K)
     with np.errstate(divide="ignore", invalid="ignore"):
         return holes(depth) * q / (length(q[..., :2]) if along_ray else 1.0)
-
-
-@wrong("Your cloud is mirrored and sheared: u counts columns, v counts rows, and the array is indexed [v, u].")
-def u_is_the_row(depth, K, along_ray):
-    return holes(depth) * rays(depth.shape[::-1], K, along_ray).swapaxes(0, 1)
 
 
 @wrong("You are off by half a pixel: in this kit the first pixel's centre is at u = v = 0.")

@@ -118,11 +118,6 @@ def centre_without_weights(P, sigma):
     return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][2], centre)
 
 
-@wrong("A point of twice the sigma counts a quarter: squares of distances are divided by squares.")
-def weights_not_squared(P, sigma):
-    return fit_plane(P, np.sqrt(sigma))
-
-
 @wrong("A point of a larger sigma is less sure, and must count less; yours counts more.")
 def unsure_points_count_more(P, sigma):
     return fit_plane(P, sigma**-0.5)

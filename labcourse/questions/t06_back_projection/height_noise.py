@@ -87,11 +87,6 @@ def jacobian(u, v, d, K, moves=columns, axis=0):
     return np.stack([du, dv, q, turned_about(axis, d * np.linalg.inv(K) @ (u, v, 1.0))], axis=1)
 
 
-@wrong("That is the lesson's noise of u, v and d. The tilt is a fourth error: how far does a small turn move P_cam?")
-def without_the_tilt(*arguments):
-    return np.linalg.norm(shares(*arguments)[:3])
-
-
 @wrong("The camera turns about its own x axis: a point's x stays, and y and z change.", axis=(1, 2))
 def another_axis_of_the_camera(*arguments, axis):
     return np.linalg.norm(shares(*arguments, axis=axis))

@@ -110,11 +110,6 @@ def less_than_half_a_turn_away(Sigma, now):
     return yaw
 
 
-@wrong("You return how far the hand has to turn. The angle from the base's x axis is asked for.")
-def turn_of_the_hand(Sigma, now):
-    return closing_yaw(Sigma, now) - now
-
-
 FEW_TURNS = (
     "The hand may have turned several times, either way: a fixed number of half turns need not bring you near `now`."
 )

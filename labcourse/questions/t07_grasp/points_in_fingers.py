@@ -119,12 +119,6 @@ def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
 
 
-@wrong("z of the grasp frame points down: the tips are at z = tips, and what is above them has smaller z.")
-def z_taken_for_upwards(P, T_base_grasp, *boxes):
-    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
-    return in_boxes(x, y, -z, *boxes)
-
-
 @wrong("You count what is under the tips: the grasp frame's z points down, so above is smaller z.")
 def below_the_tips_alone(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))

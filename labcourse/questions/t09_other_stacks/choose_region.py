@@ -184,11 +184,6 @@ def covariance_without_its_inverse(features, mean, covariance, allowed):
     return chosen(((features - mean) @ covariance * (features - mean)).sum(axis=1), allowed)
 
 
-@wrong("What is the covariance for? Area and elongation have units of their own, and your distance adds them up.")
-def euclidean(features, mean, covariance, allowed):
-    return chosen(((features - mean) ** 2).sum(axis=1), allowed)
-
-
 @wrong("A forbidden piece has distance 0 in yours, and wins: which distance never wins?")
 def forbidden_ones_at_the_mean(features, mean, covariance, allowed):
     return 1 + int((distances(features, mean, covariance) * allowed).argmin()) if allowed.any() else 0
@@ -202,11 +197,6 @@ def farthest(features, mean, covariance, allowed):
 @wrong("Row 0 holds piece 1: which number has your best row?")
 def row_in_place_of_the_number(features, mean, covariance, allowed):
     return max(choose_region(features, mean, covariance, allowed) - 1, 0)
-
-
-@wrong("How far is a piece from the mean target? You never subtract the mean.")
-def distances_from_zero(features, mean, covariance, allowed):
-    return choose_region(features, 0.0 * mean, covariance, allowed)
 
 
 @wrong("You choose first, and ask then whether it is allowed: a worse region that is allowed is never chosen.")

@@ -102,11 +102,6 @@ def kept_on_average(reference, other, tolerance):
     return np.abs(reference - other).mean() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
 
-@wrong("An engine whose logits are far too low keeps your contract: in which directions can a logit be off?")
-def kept_upwards_alone(reference, other, tolerance):
-    return (other - reference).max() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
-
-
 @wrong("NaN keeps no contract, and is neither above nor below a number: which step of yours lets it through?")
 def kept_unless_above(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance

@@ -122,11 +122,6 @@ def mask_without_going_round(hsv, lower, upper):
     return between(hsv, lower, upper).all(axis=-1)
 
 
-@wrong("A pixel is inside only if all three channels are.")
-def mask_of_any_channel(hsv, lower, upper):
-    return inside(hsv, lower, upper).any(axis=-1)
-
-
 @wrong("A pixel that equals a bound is inside, as in OpenCV.")
 def mask_without_bounds(hsv, lower, upper):
     h, rest = hsv[..., 0], (hsv[..., 1:] > lower[1:]) & (hsv[..., 1:] < upper[1:])
@@ -149,12 +144,6 @@ def mask_of_hue(hsv, lower, upper):
 def mask_in_degrees(hsv, lower, upper):
     doubled = hsv.astype(int) * (2, 1, 1)
     return hsv_mask(doubled, lower, upper)
-
-
-@wrong("The bounds and the hues are bytes: 10 - 170 wraps round at 256, not at 180.")
-def hue_by_a_remainder_of_bytes(hsv, lower, upper):
-    hue = (hsv[..., 0] - lower[0]) % 180 <= (upper[0] - lower[0]) % 180
-    return hue & ((hsv[..., 1:] >= lower[1:]) & (hsv[..., 1:] <= upper[1:])).all(axis=-1)
 
 
 @wrong("With a range from 5 to 20 you mark nearly every hue. When is `or` right?")

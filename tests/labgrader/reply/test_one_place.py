@@ -1,0 +1,87 @@
+"""CONTRIBUTING's rule: what a change of one place would fix is not listed, since repair marks that place.
+
+A right answer in which one place is changed may give what a listed mistake gives. If repair finds that place again, the
+hint has to say more than the place; tests/data/says_more.json names those that do, by question.
+"""
+
+import ast
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import grading_course as kit
+import pytest
+from alternatives import alternatives
+
+from labgrader.comparison import quiet
+from labgrader.course import find, of_topic, topics
+from labgrader.program.live import LiveProgram, defines, is_function
+from labgrader.question import Question
+from labgrader.reply.alarm import TimeIsUp, limited
+from labgrader.reply.listed import fingerprint
+from labgrader.reply.mutation import mutations
+from labgrader.reply.repair import repairs
+from labgrader.reply.repair_job import Look, comparison_settings, pairs
+from labgrader.run.run import listed_mistakes, more_public_cases, public_cases
+
+pytestmark = [pytest.mark.nightly, pytest.mark.bad_input]
+DATA = Path(__file__).parents[2] / "data/says_more.json"
+SAYS_MORE = json.loads(DATA.read_text())
+ANSWERS, SECONDS = 3, 4.0  # right answers of a question that are changed, and for how long each
+QUESTIONS = [question.name for topic in topics() for question in of_topic(topic).values()]
+
+
+def one_place_changed(question: Question) -> Iterator[tuple[str, int]]:
+    """Right answers with one place changed that give what a listed mistake gives: the text, the mistake's position."""
+    cases, listed = public_cases(question), listed_mistakes(question)
+    absent = ("torch", "cv2", "scipy", *question.forbidden)
+    texts = [kit.as_cell(answer, question.function) for answer in alternatives(question)]
+    for text in [text for text in texts if not any(name in text for name in absent)][:ANSWERS]:
+        end, tree = time.process_time() + SECONDS, ast.parse(text)
+        program = LiveProgram(question.function, (("quiet", "import numpy as np"), ("answer", text)))
+        for statement in filter(is_function, tree.body):
+            right = program.namespace[defines(statement)]
+            for mutation in sorted(mutations(statement), key=lambda mutation: mutation.cost):
+                if time.process_time() > end:
+                    break
+                with mutation.applied(), quiet():
+                    try:
+                        program.replace(statement)
+                    except Exception:  # a change that is no program
+                        continue
+                    told = set(range(len(question.misconceptions)))
+                    for case, of_case in zip(cases, listed, strict=True):
+                        told &= of_case.get(fingerprint(output_of(program, case.args)), frozenset())
+                        if not told:
+                            break
+                    if told:
+                        yield ast.unparse(tree), min(told)
+                program.namespace[defines(statement)] = right
+
+
+def output_of(program: LiveProgram, args: tuple) -> object:
+    """What a changed program gives; None if it stops, or takes long."""
+    try:
+        with limited(0.4):
+            return program.call(args)[0]
+    except (Exception, SystemExit, TimeIsUp):
+        return None
+
+
+def repaired(question: Question, text: str) -> bool:
+    """Whether repair marks a place of a program by which it would be right."""
+    pieces = (("quiet", "import numpy as np"), (question.function, text))
+    look = Look(*comparison_settings(question), question.function, pieces, pairs(public_cases(question)))
+    fresh = lambda: pairs(more_public_cases(question))  # noqa: E731
+    return bool(repairs(pieces, question.function, look.public, fresh, look.right, look.entries))
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_what_repair_would_mark_is_listed_only_if_its_hint_says_more(name):
+    question, found = find(name), set()
+    for text, position in one_place_changed(question):
+        mistake = question.misconceptions[position].answer.__name__
+        if mistake not in found and mistake not in SAYS_MORE.get(name, ()) and repaired(question, text):
+            found.add(mistake)
+    assert not found, "take them out of the question, or name them in tests/data/says_more.json"
