@@ -237,7 +237,7 @@ CALL = re.compile(r"""\bcheck\(\s*["']([\w.]+)["'],\s*(\w+)\s*\)""")
 
 
 def note_cell(info: object) -> None:
-    """Keep which cell is about to run; where a check has no answer, as that is not Python, let the check say so."""
+    """Record the id of the cell that is about to run: a check without an answer says why, if the cell is no Python."""
     cell = getattr(info, "cell_id", None)  # IPython 7, which Colab has, tells none
     if info.store_history and cell:
         cell_of_execution[len(jupyter().history_manager.input_hist_raw)] = cell  # it is put there next

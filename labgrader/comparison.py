@@ -201,7 +201,7 @@ def with_rows_as_outputs(expected: object, got: object) -> object:
 
 
 def as_expected(expected: object, got: object) -> object:
-    """The same numbers in the form that is expected: as a tuple, as an array, as a number."""
+    """`got` in the container of `expected` (a tuple, an array, a number), where its numbers allow it; else as it is."""
     got = with_rows_as_outputs(expected, got)
     if isinstance(expected, tuple):
         if isinstance(got, tuple) and len(got) == len(expected):

@@ -58,7 +58,10 @@ class Record:
 
 @dataclass(frozen=True)
 class Batch:
-    """How to grade: what is said of these by the command that grades."""
+    """One run of the grader: a lab, its submissions, the folder for what comes out, and the secret of this course.
+
+    workers: processes beside each other; force: grade again what has a record; unsafe: without a sandbox.
+    """
 
     lab: Lab
     submissions: Sequence[Submission]

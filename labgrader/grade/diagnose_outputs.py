@@ -26,7 +26,9 @@ SECONDS, MEMORY = 20, 3 << 30  # of a processor, for one answer; bytes of addres
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found about a wrong answer. named: whether the hint names the mistake; failed: why nothing was found.
+    """What was found about a wrong answer. named: whether one knows from the hint what to change.
+
+    failed: why nothing was found.
 
     shown: the case that is told, and the marked lines. needs_a_look: whether nothing is said before somebody looks at
     the program.

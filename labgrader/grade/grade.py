@@ -198,7 +198,7 @@ class Grading:
         )
 
     def of_later_tasks(self, name: str, is_right: Callable[[str], bool]) -> list[str]:
-        """Say which answers to tasks below its own an answer calls, and has from the kit, since they are wrong.
+        """Flags that name later tasks which an answer calls and has from the kit, since the student's own is wrong.
 
         A later answer may hold an earlier one: mean IoU of one class alone is its IoU.
         """

@@ -74,10 +74,7 @@ def handed_in_late(late: Lateness) -> str:
 
 
 def apply_change(grade, comment, change: Change | None) -> None:
-    """Give an answer in words what a change says, and take that back when the change is gone.
-
-    The score of a person stays what it is; extra credit makes the difference.
-    """
+    """Apply a change to an answer in words, or undo it: the manual score stays, `extra_credit` holds the difference."""
     if change is not None:
         wanted = grade.max_score if change.everybody else 0.0
         if grade.manual_score is None:

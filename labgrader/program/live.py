@@ -60,7 +60,7 @@ class LiveProgram:
 
 
 def is_function(node: ast.stmt) -> bool:
-    """Whether a statement defines a function, without a decorator, which may cost a second each time."""
+    """Whether a statement can be compiled again at no cost: NAME = lambda, or a def without decorators."""
     if isinstance(node, ast.Assign):
         return isinstance(node.value, ast.Lambda) and isinstance(node.targets[0], ast.Name)
     return isinstance(node, ast.FunctionDef) and not node.decorator_list

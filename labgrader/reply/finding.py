@@ -21,7 +21,7 @@ WATCHES = {
     "writes": "This line changes an argument, perhaps through another name for it or for a part of it. Whoever calls "
     "the function still needs the old values: work on a copy.",
 }
-# What has no effect: said where nothing else names a mistake.
+# What has no effect: `unread` is told before repairs, `unused` where nothing else names a mistake.
 IDLE = {
     "unread": "Your function never reads the marked argument. What is it for in this task?",
     "unused": "Nothing uses what the marked line computes. Where does it belong?",

@@ -45,10 +45,7 @@ class View:
         return a.shape == b.shape and not self.different(a, b).any()
 
     def gives(self, change: Callable) -> bool:
-        """Whether a change of the expected arrays makes them the returned ones, and not all of them as they were.
-
-        Zeros show nothing: too many things are zero.
-        """
+        """Whether change(expected) is what came in all cases, and shows in at least one: zeros show nothing."""
         shows = 0
         for e, g in zip(self.expected, self.got, strict=True):
             p = attempt(change, e)

@@ -80,7 +80,7 @@ class Trial:
 
     @property
     def finding(self) -> Finding:
-        """The place and the kind of it."""
+        """Where it changes the program, and how."""
         return Finding(self.mutation.kind, self.piece, self.mutation.spans)
 
 

@@ -1,4 +1,4 @@
-"""One look at the program of a wrong answer, in its worker: instruments first, then repair."""
+"""What a worker does to look at a program: `watch` and `repair`; `Run.findings` puts in order what they find."""
 
 import inspect
 from collections.abc import Callable, Sequence

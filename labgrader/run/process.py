@@ -96,7 +96,7 @@ def problem_reply(problem: Problem) -> bytes:
 class Session:
     """What a worker is asked to do: cut programs out of a notebook, run one, call its function, look for its mistake.
 
-    more: gives the cases that a repair needs beside the public ones, once it needs them.
+    more: fetches the cases that a repair needs beside the public ones; it is called at most once.
     """
 
     def __init__(self, more: Callable[[], list]):

@@ -72,8 +72,8 @@ class Budget:
 class Run:
     """An answer to a question as a program, in a worker that has run nothing before; a context manager.
 
-    budget: of the notebook that it is of, which pays for it; a new one by default. used_s: what it and its cases took,
-    called_s: the last cases alone.
+    budget: of the notebook that it is of, which pays for it; a new one by default. used_s: CPU seconds so
+    far; called_s: of the last `outputs`. not_run: the problem of a piece that did not run, None if all ran.
     """
 
     def __init__(

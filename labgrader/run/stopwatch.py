@@ -1,7 +1,6 @@
 """How long a process has worked: its CPU time, so that a busy machine takes nothing away from an answer.
 
-Time in which it could run but waits for a processor counts nowhere. Time in which it does neither counts a fifth: an
-answer that only sleeps, and uses no CPU time, ends after five times its limit.
+Waiting for a processor is free; sleep counts a fifth: an answer that only sleeps ends after five times its limit.
 
 Its memory is asked for here as well, on systems whose kernel sets no limit to that.
 """
