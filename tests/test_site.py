@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+import report_pages
 
 pytest.importorskip("sphinx", reason="needs `make test-site`")
 pytestmark = pytest.mark.timeout(1800)  # the first test waits for the site, and that for its explorers' pictures
@@ -188,15 +189,32 @@ def test_a_double_click_turns_a_view_back(site, browser):
     tab.close()
 
 
+def what_axe_says(tab) -> list[str]:
+    """What axe-core finds serious or critical on a page."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    found = Axe().run(tab).response["violations"]
+    return [f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in found if v["impact"] in ("serious", "critical")]
+
+
+@pytest.mark.debian("chromium")
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_axe_finds_nothing_serious_on_the_pages_that_grading_writes(tmp_path, browser, width, scheme):
+    tab = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
+    for name, file in report_pages.write_report_pages(tmp_path).items():
+        tab.goto(file.as_uri())
+        tab.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+        assert not what_axe_says(tab), name
+    tab.close()
+
+
 @pytest.mark.debian("chromium")
 @pytest.mark.parametrize("page", PAGES)
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_axe_finds_nothing_serious_and_nothing_is_cut_or_dimmed(site, browser, page, width, scheme):
-    from axe_playwright_python.sync_playwright import Axe
-
     tab = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
     tab.goto((site / page).as_uri())
-    found = Axe().run(tab).response["violations"]
+    serious = what_axe_says(tab)
     widest = tab.evaluate("document.documentElement.scrollWidth")
     cut = tab.evaluate(
         "[...document.querySelectorAll('pre, .picture')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
@@ -205,6 +223,5 @@ def test_axe_finds_nothing_serious_and_nothing_is_cut_or_dimmed(site, browser, p
         "[...document.querySelectorAll('.picture img')].filter((e) => getComputedStyle(e).filter != 'none').length"
     )
     tab.close()
-    serious = [f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in found if v["impact"] in ("serious", "critical")]
     assert not serious
     assert widest <= width and not cut and not dimmed

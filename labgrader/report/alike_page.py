@@ -14,9 +14,9 @@ MOST_SHOWN = 200  # groups of answers on the page; the table has all pairs
 MOST_NAMED = 10  # groups of people in the terminal
 MOST_PEOPLE = 4  # of a group, in the terminal
 COLUMNS = ("question", "student", "other", "share", "shapes")
-WIDE = """body{max-width:96rem}.pair{display:grid;grid-template-columns:1fr 1fr;gap:1rem}
-.pair pre{white-space:pre-wrap;overflow-wrap:anywhere;margin:.2rem 0}mark{background:#ffe9a8}
-@media(max-width:60rem){.pair{grid-template-columns:1fr}}"""
+WIDE = """body{max-width:96rem}.pair{display:grid;grid-template-columns:repeat(2,minmax(0,1fr));gap:1rem}
+.pair pre{white-space:pre-wrap;overflow-wrap:anywhere;margin:.2rem 0}mark{background:var(--mark);color:inherit}
+@media(max-width:60rem){.pair{grid-template-columns:minmax(0,1fr)}}"""
 SAYS = (
     "Each answer shares most of what is its own with another one of its group: what is in the lab, in the model "
     "solution or in many answers was left out. Marked are the lines that hold it. Names, layout and order do not "

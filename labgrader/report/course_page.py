@@ -21,12 +21,12 @@ from labgrader.grade.policy import Policy, read_policy
 from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
 from labgrader.handin.reading import read_lab
 from labgrader.handin.roster import Person, identity, person_of, read_roster
-from labgrader.report.outputs import harmless, page
+from labgrader.report.outputs import harmless, page, scrolled
 from labgrader.report.platforms import CANVAS, person_by_name
 from labgrader.support import write_atomically
 
 FOLDER, TOTAL = "course", "Course total"
-WIDE = "body{max-width:none}s{color:#666}"
+WIDE = "body{max-width:none}s{color:var(--soft)}"
 
 
 @dataclass
@@ -170,12 +170,13 @@ def course_page(labs: Sequence[str], rows: Sequence[Row], policy: Policy) -> str
     weights = ", ".join(f"{lab} {policy.weights.get(lab, 1.0):g}" for lab in labs)
     said = f"Weights: {weights}. Dropped: the lowest {policy.drop_lowest}. Free late days: {policy.late_days}."
     heads = "".join(f'<th scope="col">{escape(head)}</th>' for head in ("student", *labs, TOTAL))
-    parts = ["<h1>The course</h1>", f"<p>{escape(said)}</p>", f"<table><tr>{heads}</tr>"]
+    parts = ["<h1>The course</h1>", f"<p>{escape(said)}</p>"]
+    table = [f"<table><tr>{heads}</tr>"]
     for row in rows:
         cells = "".join(f"<td>{of_lab(row, lab)}</td>" for lab in labs)
         total = f"{row.total:.1f} %{' (not final)' if row.waits else ''}"
-        parts.append(f'<tr><th scope="row">{escape(row.name)}</th>{cells}<td>{total}</td></tr>')
-    return page("The course", [*parts, "</table>"], WIDE)
+        table.append(f'<tr><th scope="row">{escape(row.name)}</th>{cells}<td>{total}</td></tr>')
+    return page("The course", [*parts, scrolled("\n".join([*table, "</table>"]), "points by lab")], WIDE)
 
 
 def of_lab(row: Row, lab: str) -> str:

@@ -33,15 +33,22 @@ DISCRIMINATION = (
 STARTS = "[=+@\uff1d\uff0b\uff0d\uff20\ufe66\ufe62\ufe63\ufe6b\u207a\u207b\u207c\u208a\u208b\u208c-]"
 CUTS = "[;,|\t\n\v\f\r\x1c-\x1e\x85\u2028\u2029\uff0c\uff1b]"
 UNSEEN = "[\\s\u200b-\u200f\u2060\ufeff]"
-STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:46rem;margin:2rem auto;padding:0 1rem;color:#222}
-h1{font-size:1.5rem}.points{float:right;color:#555}section{border-left:5px solid;padding:.2rem 1rem;margin:1rem 0}
-.right{border-color:#2e7d32}.wrong{border-color:#c62828}.look{border-color:#f9a825}
-.warning{background:#fff3cd;padding:.6rem 1rem}
+# Colours are said once for each scheme; contrast of text is 4.5 to 1 or more in both.
+STYLE = """:root{color-scheme:light dark;--ink:#222;--soft:#555;--page:#fff;--box:#f6f6f6;--line:#ddd;--note:#fff3cd;
+--mark:#ffe9a8;--rubric:#eef4fb;--bar:#1565c0;--right:#2e7d32;--wrong:#c62828;--look:#f9a825;--failed:#b00020}
+@media(prefers-color-scheme:dark){:root{--ink:#e6e6e6;--soft:#b0b0b0;--page:#16181b;--box:#24272b;--line:#444;
+--note:#4a3b00;--mark:#5c4a00;--rubric:#1d2a38;--bar:#64b5f6;--right:#66bb6a;--wrong:#ef5350;--failed:#ff8a80}}
+body{font:16px/1.5 system-ui,sans-serif;max-width:46rem;margin:2rem auto;padding:0 1rem;color:var(--ink);
+background:var(--page);overflow-wrap:anywhere}
+h1{font-size:1.5rem}.points{float:right;color:var(--soft)}
+section{border-left:5px solid;padding:.2rem 1rem;margin:1rem 0}
+.right{border-color:var(--right)}.wrong{border-color:var(--wrong)}.look{border-color:var(--look)}
+.warning{background:var(--note);padding:.6rem 1rem}
 h2{font-size:1.1rem;margin:.2rem 0}h2[id]{font-size:1.3rem;margin-top:2rem}h3{font-size:1rem;margin:.2rem 0}
-p{margin:.3rem 0}table{border-collapse:collapse}pre{overflow:auto}
-td,th{padding:.2rem 1rem;text-align:left;border-bottom:1px solid #ddd}pre{background:#f6f6f6;padding:.5rem}
-th{font-weight:normal}tr:first-child>th[scope=col]{font-weight:bold}.bar{background:#1565c0;height:1rem}
-.key{color:#666;font-size:.85rem}.bars td,.bars th{border:0;padding:.05rem .5rem}"""
+p{margin:.3rem 0}table{border-collapse:collapse;overflow-wrap:normal}.scrolls,pre{overflow:auto}
+td,th{padding:.2rem 1rem;text-align:left;border-bottom:1px solid var(--line)}pre{background:var(--box);padding:.5rem}
+th{font-weight:normal}th[scope=row]{overflow-wrap:anywhere;min-width:7rem}tr:first-child>th[scope=col]{font-weight:bold}.bar{background:var(--bar);height:1rem}
+.key{color:var(--soft);font-size:.85rem}.bars td,.bars th{border:0;padding:.05rem .5rem}"""
 
 
 def write_outputs(
@@ -150,11 +157,21 @@ def answer_key(student: str, lab: Lab, question: str) -> str:
 
 def page(title: str, parts: Iterable[str], style: str = "") -> str:
     """A page of HTML; its title and parts are HTML already. style: more CSS."""
+    return head(title, style) + "\n".join(filter(None, parts)) + "\n</main></body></html>\n"
+
+
+def head(title: str, style: str = "") -> str:
+    """How a page begins, whatever it shows: for a phone as for a desk, in the light and in the dark scheme."""
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f"<style>{STYLE}\n{style}</style>"
-        "</head><body>\n" + "\n".join(filter(None, parts)) + "\n</body></html>\n"
+        '<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
+        f"<style>{STYLE}\n{style}</style></head><body><main>\n"
     )
+
+
+def scrolled(table: str, label: str) -> str:
+    """A table that scrolls where the page is narrower, by keys, too. label: what it holds, in words."""
+    return f'<div class="scrolls" tabindex="0" role="region" aria-label="{label}">{table}</div>'
 
 
 def class_csv(found: Sequence[Standing], records: Sequence[Record]) -> str:
@@ -174,12 +191,13 @@ def class_page(lab: Lab, found: Sequence[Standing], comments: Mapping[str, str],
     """The page for the instructor, with a sample of each group."""
     parts = [f"<h1>{escape(lab.topic)}: {len(records)} submissions</h1>", warning_of(records)]
     heads = ("question", "tried", "passed", "discrimination", *COUNTED.values(), "kinds of mistakes")
-    parts.append("<table><tr>" + "".join(f'<th scope="col">{head}</th>' for head in heads) + "</tr>")
+    rows = ["<table><tr>" + "".join(f'<th scope="col">{name}</th>' for name in heads) + "</tr>"]
     for s in found:
         link = f'<a href="#{escape(s.question)}">{escape(s.question)}</a>'
         cells = (s.tried, s.passed, two_decimals(s.discrimination), *s.counts.values(), len(s.groups))
-        parts.append(f'<tr><th scope="row">{link}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
-    parts += ["</table>", f"<p>{DISCRIMINATION}</p>", histogram(lab, records), attempted(records)]
+        rows.append(f'<tr><th scope="row">{link}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    parts.append(scrolled("\n".join([*rows, "</table>"]), "questions"))
+    parts += [f"<p>{DISCRIMINATION}</p>", histogram(lab, records), attempted(records)]
     for standing in found:
         parts.append(f'<h2 id="{escape(standing.question)}">{escape(standing.question)}</h2>')
         parts += [group_section(group, comments.get(group.name, "")) for group in standing.groups]
@@ -201,7 +219,7 @@ def histogram(lab: Lab, records: Sequence[Record]) -> str:
     for i in reversed(range(steps)):
         count, last = found.count(i), i + 1 == steps
         upto = f"{most * i / steps:.3g} to {'' if last else 'below '}{most * (i + 1) / steps:.3g}"
-        bar = f'<div class="bar" style="width:{20 * count / max(1, len(found)):.1f}rem"></div>'
+        bar = f'<div class="bar" style="width:calc({count / max(1, len(found)):.3f} * min(20rem, 40vw))"></div>'
         parts.append(f'<tr><th scope="row">{upto}</th><td>{bar}</td><td>{count}</td></tr>')
     return "".join([*parts, "</table>"])
 
@@ -227,8 +245,8 @@ def group_section(group: Group, comment: str) -> str:
     sample = escape(group.sample[:LONGEST_SAMPLE])
     return (
         f'<section class="wrong"><h3>{escape(group.name)}: {count}{kind}</h3><p>{escape(group.says)}</p>{said}'
-        f"<p>{escape(', '.join(group.students))}</p><details><summary>The first of them</summary><pre>{sample}</pre>"
-        "</details></section>"
+        f"<p>{escape(', '.join(group.students))}</p><details><summary>The first of them</summary>"
+        f'<pre tabindex="0">{sample}</pre></details></section>'
     )
 
 

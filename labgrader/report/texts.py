@@ -15,7 +15,7 @@ from labgrader.grade.gradebook import opened, rubrics_of
 from labgrader.handin.pictures import Pictures
 from labgrader.handin.reading import Lab, plain_text, source_of
 from labgrader.program.notebook import grade_id
-from labgrader.report.outputs import STYLE, answer_key
+from labgrader.report.outputs import answer_key, head
 from labgrader.report.rendered import rendered
 from labgrader.support import counted
 
@@ -116,14 +116,15 @@ def save(course: Path, lab: Lab, question: str, data: Mapping[str, object]) -> i
 
 # ------------------------------------------------------------------------------------------------------ the page
 
-PAGE_STYLE = """body{max-width:90rem}nav a{margin-right:1rem}.words{overflow-wrap:anywhere}.words img{max-width:100%}
+PAGE_STYLE = """body{max-width:90rem}nav a{margin-right:1rem}.words pre,.rubric pre{white-space:pre-wrap}
+.words img{max-width:100%}
 .two{display:grid;grid-template-columns:minmax(16rem,1fr) 2fr;gap:1.5rem;align-items:start}
-article{border-left:5px solid #f9a825;padding:.2rem 1rem;margin:1rem 0}article.done{border-color:#2e7d32}
-article:focus{outline:3px solid #1565c0}.rubric{position:sticky;top:0;background:#eef4fb;padding:.5rem 1rem;
+article{border-left:5px solid var(--look);padding:.2rem 1rem;margin:1rem 0}article.done{border-color:var(--right)}
+article:focus{outline:3px solid var(--bar)}.rubric{position:sticky;top:0;background:var(--rubric);padding:.5rem 1rem;
 max-height:100vh;box-sizing:border-box;overflow:auto}@media(max-width:60rem){.two{display:block}
 .rubric{position:static;max-height:none}}input{width:5rem;font:inherit}textarea{width:100%;font:inherit}
-label{display:block}.status{color:#555;margin-left:1rem}.failed{color:#b00020;font-weight:bold}kbd{border:1px solid
-#999;border-radius:3px;padding:0 .3rem}"""
+label{display:block}.status{color:var(--soft);margin-left:1rem}.failed{color:var(--failed);font-weight:bold}
+kbd{border:1px solid #999;border-radius:3px;padding:0 .3rem}"""
 
 PICTURES, MATHJAX_FILES = "pictures", "mathjax"  # places below the secret of the address, beside the questions
 MATHJAX = f"{MATHJAX_FILES}/MathJax.js?config=TeX-AMS-MML_HTMLorMML-full"
@@ -185,15 +186,17 @@ def texts_page(lab: Lab, texts: Texts, questions: Sequence[str], nonce: str) -> 
     links = "".join(f'<a href="{escape(name)}">{escape(name)}</a>' for name in questions)
     count = f'{counted(len(texts.answers), "answer")}, <span id="left" role="status">{left}</span> without points'
     empty = f"; {counted(texts.empty, 'student')} wrote nothing" if texts.empty else ""
-    rubric = f'<div class="rubric" tabindex="0">{rendered(texts.rubric)}</div>' if texts.rubric else ""
+    rubric = (
+        f'<div class="rubric" tabindex="0" role="region" aria-label="rubric">{rendered(texts.rubric)}</div>'
+        if texts.rubric
+        else ""
+    )
     articles = "\n".join(article(text, texts.most, i) for i, text in enumerate(texts.answers, start=1))
     return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<link rel="icon" href="data:,"><style>{STYLE}\n{PAGE_STYLE}</style></head><body>\n'
-        f"<h1>{title}</h1><nav>{links}</nav>\n"
+        f"{head(title, PAGE_STYLE)}<h1>{title}</h1><nav>{links}</nav>\n"
         f"<p>{count}{empty}. What you type is saved at once.</p><p>{KEYS}</p>\n"
         f'<div class="{"two" if rubric else ""}">{rubric}\n<div>{articles}</div></div>\n'
-        f'<script nonce="{nonce}">{SCRIPT}</script>\n'
+        f'</main><script nonce="{nonce}">{SCRIPT}</script>\n'
         f'<script nonce="{nonce}" src="{MATHJAX}"></script>\n</body></html>\n'
     )
 
