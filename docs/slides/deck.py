@@ -171,7 +171,7 @@ def title_of(cells: list, place: int, words: list[str]) -> str:
     source = cells[place]["source"] if cells[place]["cell_type"] == "markdown" else ""
     first = re.findall(r"\w+", words[0])[:5] if words else []
     found = re.search(r"\W+".join(map(re.escape, first)), source, re.IGNORECASE)
-    headings = re.findall(r"^#+ (.+)$", source[: found.start()] if found else source, re.MULTILINE)
+    headings = re.findall(r"^#+ (.+)$", source[: found.start()] if found else "", re.MULTILINE)
     return headings[-1] if headings else title(cells, place - 1) if place else title(cells, place)
 
 

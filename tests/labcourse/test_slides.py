@@ -123,6 +123,16 @@ def test_a_question_that_is_about_no_slide_near_it_is_refused():
             deck.objects(slides, 4)
 
 
+def test_a_slide_that_begins_with_a_sentence_of_the_cell_above_has_the_heading_of_that_sentence(tmp_path):
+    cells = [nbformat.v4.new_markdown_cell(text) for text in ("# Masks\n\nA toy.", "Why?\n\n## Cups\n\nA cup.")]
+    cells[1].metadata.slides = [
+        {"kind": "question", "begin": ["A toy", "Why"], "minutes": 1, "about": ["this"]},
+        {"kind": "answer", "begin": ["A cup"], "minutes": 1},
+    ]
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "04_iou.ipynb")
+    assert [slide["title"] for slide in deck.slides_of(tmp_path / "04_iou.ipynb")] == ["Masks", "Cups"]
+
+
 def test_a_beginning_that_no_sentence_has_is_named(tmp_path):
     book = nbformat.v4.new_notebook(
         cells=[nbformat.v4.new_markdown_cell("# Masks\n\nA mask is an image. A mask is not.")]
