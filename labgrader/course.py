@@ -50,9 +50,9 @@ class Course:
     said. ignored: the label of what nobody judged, if the course has one; no_text: what a text that is to be written
     holds in a released lab. language: of hints, "de", where they were translated (`labgrader.languages`). dropped:
     topics that are there and not taught: no lab is released, no page or bundle has them. metadata: the key of a
-    released notebook's metadata that says the version. project and repository: its name and its address, of [project];
-    wheel: what installs it elsewhere (`labgrader.release.publishing`), and extras: what of its optional dependencies a
-    topic needs there.
+    released notebook's metadata that says the version. project: its name; repository and site: its addresses, of
+    [project]; wheel: what installs it elsewhere (`labgrader.release.publishing`), and extras: what of its optional
+    dependencies a topic needs there.
     """
 
     root: Path
@@ -75,6 +75,7 @@ class Course:
     dropped: tuple[str, ...] = ()
     project: str = ""
     repository: str = ""
+    site: str = ""
     wheel: str = ""
     extras: dict[str, str] = field(default_factory=dict)
 
@@ -134,7 +135,8 @@ def read_course(path: Path) -> Course:
         sys.path.append(str(root))
     project = settings.get("project", {})
     of_project = {"version": str(project.get("version", "0")), "project": project.get("name", "")}
-    of_project["repository"] = project.get("urls", {}).get("Repository", "")
+    urls = project.get("urls", {})
+    of_project |= {"repository": urls.get("Repository", ""), "site": urls.get("Documentation", "")}
     return Course(root, path, **of_project | said)
 
 

@@ -16,6 +16,9 @@ def release(
     bundle: Annotated[
         Path | None, typer.Option(help="Write a zip for students of these topics: no solutions, no tests.")
     ] = None,
+    repository: Annotated[
+        Path | None, typer.Option(help="Write the same into a git repository, to be published (docs/publish.md).")
+    ] = None,
     week: Annotated[int | None, typer.Option(help="The topics of a week of the syllabus, instead of names.")] = None,
     course: Annotated[
         Path, typer.Option(help="Folder that holds lessons, solutions and labs.", callback=of_course)
@@ -24,6 +27,7 @@ def release(
     """Generate labs/ from solutions/ with nbgrader, and tidy the notebooks of solutions/ and lessons/."""
     from labgrader.release import bundle as bundling
     from labgrader.release import release as releasing
+    from labgrader.release.repository import repository as publish
 
     if week is not None:
         topics = [*(topics or []), *bundling.topics_of_week(week)]
@@ -32,10 +36,14 @@ def release(
         typer.echo(f"{path}: not what `labkit release` makes of it" if check else f"changed {path}")
     if not changed:
         typer.echo("labs, solutions and lessons are as they should be")
+    made = {}
     if bundle is not None:
-        made = bundling.bundle(course, bundle, topics or ())
-        for name, reason in made.left_out.items():
+        made[bundle] = bundling.bundle(course, bundle, topics or ())
+    if repository is not None:
+        made[repository] = publish(course, repository, topics or ())
+    for target, one in made.items():
+        for name, reason in one.left_out.items():
             typer.echo(f"left out {name}: {reason}")
-        everything = "" if made.tracked else ", all that lies there: this is no git repository"
-        typer.echo(f"wrote {bundle}: {len(made.names)} files{everything}")
+        everything = "" if one.tracked else ", all that lies there: this is no git repository"
+        typer.echo(f"wrote {target}: {len(one.names)} files{everything}")
     raise typer.Exit(1 if check and changed else 0)

@@ -13,7 +13,7 @@ import io
 import os
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,6 +33,14 @@ MARKS = {
 }
 
 
+class Chosen(NamedTuple):
+    """What students get of a course: contents by name, what was left out and why, and whether there is a repository."""
+
+    contents: dict[str, bytes]
+    left_out: dict[str, str]
+    tracked: bool
+
+
 class Bundle(NamedTuple):
     """What is in a zip, by names in order; what was left out that lies beside it, and why.
 
@@ -50,7 +58,25 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> Bundle:
     topics: whose lessons and labs; all if none is given, and then the guides are there, too. The same course gives the
     same bytes. Raises ValueError if a topic is not there, or the labs are not as the solutions make them.
     """
-    course, target, here = Path(course), Path(target), course_here()
+    target, chosen = Path(target), for_students(course, topics)
+    archived = io.BytesIO()
+    with zipfile.ZipFile(archived, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(chosen.contents):
+            entry = zipfile.ZipInfo(f"{target.stem}/{name}", date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (0o755 if os.access(Path(course) / name, os.X_OK) else 0o644) << 16
+            archive.writestr(entry, chosen.contents[name])
+    write_atomically(target, archived.getvalue())
+    return Bundle(sorted(chosen.contents), chosen.left_out, chosen.tracked)
+
+
+def for_students(course: Path, topics: Sequence[str] = (), change: Callable = unpublished) -> Chosen:
+    """What students get of a course, as `bundle` says it; raises ValueError as that does.
+
+    change: (notebook, name, course) -> the notebook as they get it. By default its links lead to the files beside it,
+    wherever the course is published.
+    """
+    course, here = Path(course), course_here()
     if drift := release(course, topics, check=True):
         raise ValueError(f"course: run `{here.command} release` first, {drift[0]} is not what it makes")
     why, is_tracked = looked_through(course, here.bundle)
@@ -60,19 +86,11 @@ def bundle(course: Path, target: Path, topics: Sequence[str] = ()) -> Bundle:
     for name in kept:
         if name.endswith(".md"):
             contents[name] = taught_rows(contents[name].decode("utf-8")).encode()
-        if name.endswith(".ipynb"):  # its links lead to the files of the bundle, wherever the course is published
-            contents[name] = to_bytes(unpublished(read_notebook(course / name), name, course))
+        if name.endswith(".ipynb"):
+            contents[name] = to_bytes(change(read_notebook(course / name), name, course))
     if here.start:
         contents |= dict.fromkeys((START, "README.md"), start_page(course, topics).encode())
-    archived = io.BytesIO()
-    with zipfile.ZipFile(archived, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name in sorted(contents):
-            entry = zipfile.ZipInfo(f"{target.stem}/{name}", date_time=(1980, 1, 1, 0, 0, 0))
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = (0o755 if name in why and os.access(course / name, os.X_OK) else 0o644) << 16
-            archive.writestr(entry, contents[name])
-    write_atomically(target, archived.getvalue())
-    return Bundle(sorted(contents), {name: said for name, said in why.items() if said}, is_tracked)
+    return Chosen(contents, {name: said for name, said in why.items() if said}, is_tracked)
 
 
 def looked_through(course: Path, places: Sequence[str]) -> tuple[dict[str, str], bool]:

@@ -2,6 +2,7 @@
 
     [project.urls]
     Repository = "https://github.com/OWNER/NAME"   # its branch main
+    Documentation = "https://OWNER.github.io/NAME/"   # the site, if it is elsewhere than its own workflow puts it
     [tool.labgrader]
     wheel = "NAME==1.0"                            # what pip installs: name and version, or a wheel's address
 
@@ -125,10 +126,11 @@ def badges(root: Path, site: Course, first: str) -> list[str]:
         return []
     owner, _, name = place.partition("/")
     tests = f"https://github.com/{place}/actions/workflows/laptops.yml"
+    pages = site.site or f"https://{owner}.github.io/{name}/"
     shield = "https://img.shields.io/badge"
     found = [
         ("tests", ".github/workflows/laptops.yml", f"{tests}/badge.svg", tests),
-        ("site", ".github/workflows/site.yml", f"{shield}/site-lessons-blue", f"https://{owner}.github.io/{name}/"),
+        ("site", "." if site.site else ".github/workflows/site.yml", f"{shield}/site-lessons-blue", pages),
         ("licence", "LICENSE", f"{shield}/licence-MIT-green", "LICENSE"),
         ("cite", "CITATION.cff", f"{shield}/cite-CITATION.cff-green", "CITATION.cff"),
         ("Open in Colab", first if site.wheel else "", f"{COLAB}/assets/colab-badge.svg", address(first, site)),
