@@ -1,8 +1,11 @@
 """Regenerates README's pictures: the demo, a lab in JupyterLab, the site (`make pictures`, after `make site`).
 
-It needs Debian's Chromium. NAMES as arguments choose: demo, lab, site.
+It needs Debian's Chromium. NAMES as arguments choose: demo, lab, site, explorers. The last are the moving pictures of
+docs/ten_minutes.md, for readers of the repository, where no script runs; the site has the explorers in their place.
 """
 
+import json
+import math
 import os
 import shutil
 import subprocess
@@ -14,11 +17,21 @@ import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS, SITE = ROOT / "docs", ROOT / "out" / "site"
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(DOCS / "site")]
+from explorers import OUT, build  # noqa: E402
 from serving import TOKEN, cell_with, jupyterlab, open_page, wait_until_idle  # noqa: E402
 
 DEMO_SEED = 8  # README says so
 CHROMIUM = "/usr/bin/chromium"
+# The lesson of an explorer, the control that moves in its picture, where the others stand, and where in the last frame.
+MOVES = {
+    "keyhole": ("03_gradient_network", "sees", {}, {"show the image and the true class": "yes"}),
+    "sliding_mask": ("04_iou", "shift", {"radius": "4"}, {}),
+    "name_that_bug": ("06_back_projection", "bug", {"mystery": "0"}, {}),
+    "jaws_at_a_yaw": ("07_grasp", "yaw", {}, {}),
+}
+GIF_WIDTH, COLOURS, ROUND_MS, LEAST_MS, LAST_MS = 640, 96, 9000, 450, 2000
+MOST_FRAMES = 25  # every second one of those that have more
 
 
 def demo(browser) -> None:
@@ -81,7 +94,43 @@ def site(browser) -> None:
     phone.screenshot(path=DOCS / "site_phone.png")
 
 
-ALL = {"demo": demo, "lab": lab, "site": site}
+def explorers(browser) -> None:
+    """A GIF for each explorer of MOVES: one control goes through its options."""
+    from PIL import Image
+
+    for name, (lesson, moved, others, last) in MOVES.items():
+        build([f"lessons/{lesson}"])
+        folder = OUT / lesson / name
+        numbers = states(folder, moved, others)
+        numbers += states(folder, moved, others | last)[-1:] if last else []
+        frames = [Image.open(folder / f"{n}.webp").convert("RGB") for n in numbers]
+        size = (GIF_WIDTH, round(GIF_WIDTH * frames[0].height / frames[0].width))
+        frames = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
+        frames = [frame.quantize(COLOURS, dither=Image.Dither.NONE) for frame in frames]
+        durations = [max(LEAST_MS, ROUND_MS // len(frames))] * (len(frames) - 1) + [LAST_MS]
+        target = DOCS / f"explorer_{name}.gif"
+        frames[0].save(target, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=True)
+
+
+def states(folder: Path, moved: str, others: dict[str, str]) -> list[int]:
+    """The numbers of an explorer's states in which one control goes through its options and the others stand still."""
+    controls = json.loads((folder / "state.json").read_text(encoding="utf-8"))["controls"]
+    wrong = {moved, *others} - {control["label"] for control in controls}
+    if wrong:
+        raise ValueError(f"MOVES: {folder.name} has no control {', '.join(wrong)}")
+    stand = [c["options"].index(others[c["label"]]) if c["label"] in others else c["start"] for c in controls]
+    place = next(i for i, control in enumerate(controls) if control["label"] == moved)
+    count = len(controls[place]["options"])
+    found = []
+    for option in range(0, count, math.ceil(count / MOST_FRAMES)):
+        number = 0
+        for i, control in enumerate(controls):  # the last control's options lie next to each other
+            number = number * len(control["options"]) + (option if i == place else stand[i])
+        found.append(number)
+    return found
+
+
+ALL = {"demo": demo, "lab": lab, "site": site, "explorers": explorers}
 
 if __name__ == "__main__":
     from playwright.sync_api import sync_playwright

@@ -127,6 +127,11 @@ def test_every_explorer_of_a_lesson_has_a_picture_and_words_for_each_state(site)
     assert sum(path.stat().st_size for path in site.glob("_static/explorers/*/*")) < 15e6
 
 
+def test_ten_minutes_has_the_explorers_in_the_place_of_its_moving_pictures(site):
+    page = (site / "docs/ten_minutes.html").read_text().split("<article")[1]
+    assert page.count('class="explorer"') == 4 and "explorer_" not in page and "[explorer" not in page
+
+
 @pytest.fixture(scope="module")
 def browser():
     from playwright.sync_api import sync_playwright

@@ -219,6 +219,8 @@ def contents() -> str:
 
 # ------------------------------------------------------------------------------------------- how a page is read
 
+# Where a page has an explorer: a link to its lesson, of words or of the moving picture that the repository shows.
+EXPLORER = re.compile(r"(?:\[!)?\[explorer: (\w+)[^]]*\]\([^)]*\)(?:\]\([^)]*\))?")
 LINK = re.compile(r"(?<!!)\[([^\]\n]*)\]\((?!\w+:|#)([^)\s#]+)(#[^)\s]*)?\)")
 
 
@@ -247,7 +249,7 @@ def read_source(app, page: str, source: list[str]) -> None:
     if (ROOT / f"{page}.md").exists():
         path = Path(__file__).parent / "landing.md" if page == root_doc else path.with_suffix(".md")
         text = source[0] if page != root_doc else path.read_text().replace("](../demo", "](docs/demo")
-        text = re.sub(r"\[explorer: (\w+)\]\(.*\)", lambda match: explorers.page(match[1], page), text)
+        text = re.sub(EXPLORER, lambda match: explorers.page(match[1], page), text)
         text = links_that_lead_somewhere(course.taught_rows(text), path.parent.relative_to(ROOT))
         source[0] = f"{text}\n\n{NAMES}\n\n{contents()}" if page == root_doc else text
         return

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from notebooks import LABS, LESSONS, ROOT, SOLUTIONS, code, is_compared, prose
 
 from labgrader.course import topics
@@ -109,3 +110,22 @@ def test_each_topics_lessons_have_an_explorer(topic):
 def test_at_least_half_of_the_cells_with_output_are_compared(path):
     shown = [cell for cell in code(path) if cell.outputs]
     assert 2 * sum(map(is_compared, shown)) >= len(shown)
+
+
+def test_a_page_of_the_repository_shows_its_explorers_as_moving_pictures_and_says_where_the_sliders_are():
+    """No script runs there; landing.md is the site's alone."""
+    pages = [page for page in ROOT.glob("docs/*.md") if "explorer: " in page.read_text(encoding="utf-8")]
+    assert [page.name for page in pages] == ["ten_minutes.md"]
+    text = pages[0].read_text(encoding="utf-8")
+    title, first = text.split("\n\n")[:2]
+    assert "sliders" in first and "`make site`" in first and "minutes" in first
+    shown = re.findall(r"^\[!\[explorer: (\w+)\. ([^]]+)\]\((\w+\.gif)\)\]\(([^)]+)\)$", text, re.MULTILINE)
+    assert len(shown) == text.count("[explorer: ") == 4
+    for name, words, file, lesson in shown:
+        picture = ROOT / "docs" / file
+        assert name in file and len(words.split()) >= 8 and (ROOT / "docs" / lesson).is_file()
+        assert picture.stat().st_size < 400_000
+        with Image.open(picture) as gif:
+            assert gif.n_frames >= 5 and gif.info["loop"] == 0 and gif.width >= 600
+        before, after = text.split(f"({file})")
+        assert "**Predict:**" in before.rpartition("\n## ")[2] and "<details>" in after.partition("\n## ")[0]
