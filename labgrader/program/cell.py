@@ -105,18 +105,25 @@ class Parsed:
 
     def is_earlier(self, name: str, position: int) -> bool:
         """Whether a statement that runs needs the value that a name had before the cell changes it: k = k + 1."""
-        above = any(name in statement.binds for statement in self.statements[:position])
-        return not above and name in self.binds and name in self.statements[position].reads
+        return self.first.get(name, -1) >= position and name in self.statements[position].reads
 
     def changes(self, name: str) -> bool:
         """Whether the cell makes the value of a name out of the one that it had before."""
-        positions = (i for i, statement in enumerate(self.statements) if name in statement.binds)
-        return any(self.is_earlier(name, i) for i in positions)
+        return name in self.first and self.is_earlier(name, self.first[name])
 
     @cached_property
-    def binds(self) -> set[str]:
+    def first(self) -> dict[str, int]:
+        """By each name that the cell gives a value the position of the first statement that does."""
+        found: dict[str, int] = {}
+        for i, statement in enumerate(self.statements):
+            for name in statement.binds:
+                found.setdefault(name, i)
+        return found
+
+    @property
+    def binds(self) -> Collection[str]:
         """All names that the cell gives a value."""
-        return set().union(*(statement.binds for statement in self.statements))
+        return self.first.keys()
 
     def defines(self, name: str) -> bool:
         """Whether the cell defines a function of this name, and does not merely use the name for something."""
