@@ -2,14 +2,16 @@
 
 import json
 import sqlite3
+import warnings
 from contextlib import closing
 from pathlib import Path
 
 import grading_course as kit
+import nbformat
 import pytest
 
 from labgrader.grade.batch import Record, secret_for, write_record
-from labgrader.grade.gradebook import fault_of_file, opened
+from labgrader.grade.gradebook import copy_for_formgrader, fault_of_file, opened
 from labgrader.grade.overview import read_comments
 from labgrader.grade_course import grade_course
 from labgrader.handin.reading import read_lab, read_submissions
@@ -109,3 +111,22 @@ def test_the_labs_own_name_is_not_said(tmp_path):
 )
 def test_a_folder_without_the_lab_names_what_is_there(tmp_path, files, says):
     assert says in read(tmp_path, files).reason
+
+
+def test_equal_ids_of_a_students_cells_reach_no_file_that_nbformat_reads_and_warns_of(tmp_path):
+    """The copy for formgrader and feedback has the lab's ids, which differ, so nothing is printed for each reading."""
+    kit.write_lab(tmp_path, TOPIC)
+    notebook = kit.lab_notebook(TOPIC, kit.right_answers(TOPIC)) | {"nbformat": 4, "nbformat_minor": 5}
+    for cell in notebook["cells"]:
+        cell["id"] = "same"
+    kit.submit(tmp_path, "ada", TOPIC, notebook)
+    lab = read_lab(tmp_path, TOPIC)
+    for number, cell in enumerate(lab.notebook["cells"]):
+        cell["id"] = f"cell-{number}"
+    lab.notebook["nbformat_minor"] = 5
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (submission,) = read_submissions(tmp_path / "submitted", lab)
+        copied = copy_for_formgrader(lab, Record("ada", "", (), True, "d", "k"), submission, {}, {})
+        nbformat.reads(copied.decode(), as_version=4)
+    assert not submission.reason and "same" not in {cell["id"] for cell in json.loads(copied)["cells"]}
