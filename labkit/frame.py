@@ -29,8 +29,10 @@ class RGBDFrame:
     rgb: uint8 (H, W, 3), RGB. depth: metres, float32 (H, W); 0 or NaN where there is no reading. K: intrinsics, (3, 3),
     pixel centres at integers. T_base_cam: (4, 4), maps camera coordinates (x right, y down, z forward) to base
     coordinates. labels: true classes, uint8 (H, W), if known; 255 is "ignore". instances: (H, W), 0 or the object's
-    number, if known: uint8, or uint16 if a number is above 255. table_z: height of the table in the base frame, metres,
-    if known. Raises ValueError naming the argument that does not fit. Topics 01 and 06.
+    number, if known, and where nobody knows the greatest number of the type (`unknown_number`): uint8, 255; uint16,
+    65535, for images of another type that have a number above 254. table_z: height of the table in the base frame,
+    metres, if known. A frame stays as it was checked: its arrays are copies that cannot be written to. Raises
+    ValueError naming the argument that does not fit. Topics 01 and 06.
 
     >>> rgb, depth = np.zeros((2, 3, 3), np.uint8), np.ones((2, 3), np.float32)
     >>> frame = RGBDFrame(rgb, depth, K=np.diag([9.0, 9.0, 1.0]), T_base_cam=np.eye(4))
@@ -52,16 +54,17 @@ class RGBDFrame:
         def put(name, value):  # the dataclass is frozen: only here may it still take its checked values
             object.__setattr__(self, name, value)
 
-        put("rgb", check_rgb("rgb", self.rgb))
-        put("depth", check_depth("depth", self.depth).astype(np.float32, copy=False))
+        put("rgb", frozen(check_rgb("rgb", self.rgb), np.uint8))
+        put("depth", frozen(check_depth("depth", self.depth), np.float32))
         check_same_size("rgb", self.rgb, "depth", self.depth)
-        put("K", check_K("K", self.K))
-        put("T_base_cam", check_T("T_base_cam", self.T_base_cam))
+        put("K", frozen(check_K("K", self.K), np.float64))
+        put("T_base_cam", frozen(check_T("T_base_cam", self.T_base_cam), np.float64))
         for name, count in (("labels", IGNORE), ("instances", 65_536)):
             if getattr(self, name) is not None:
                 image = check_shape(name, check_labels(name, getattr(self, name), count), (None, None))
                 check_same_size("rgb", self.rgb, name, image)
-                put(name, image.astype(np.uint8 if image.max(initial=0) <= 255 else np.uint16, copy=False))
+                wide = name == "instances" and image.dtype != np.uint8 and image.max(initial=0) >= IGNORE
+                put(name, frozen(image, np.uint16 if wide else np.uint8))
         if self.table_z is not None:
             put("table_z", check_height("table_z", self.table_z))
 
@@ -95,6 +98,14 @@ class RGBDFrame:
             instances=None if instances is None else read_image("instances", instances, (np.uint8, np.uint16)),
             table_z=table_z,
         )
+
+
+def frozen(array: np.ndarray, dtype) -> np.ndarray:
+    """An array of that type whose numbers nobody can change: itself if it is one, else a copy."""
+    if array.flags.writeable or array.base is not None or array.dtype != dtype:
+        array = array.astype(dtype)
+        array.flags.writeable = False
+    return array
 
 
 def read_image(name: str, path, dtype, colour: bool = False) -> np.ndarray:

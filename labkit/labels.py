@@ -22,6 +22,17 @@ PALETTE = np.array([[40, 44, 52], [86, 180, 233], [230, 97, 0], [0, 158, 115]], 
 IGNORE_COLOUR = np.array([255, 255, 255], dtype=np.uint8)
 
 
+def unknown_number(instances) -> int:
+    """The number in an image of objects' numbers that says "nobody knows": the greatest of its type, 255 or 65535.
+
+    instances: an array, or a tensor as an array. An image of more bits has none.
+
+    >>> unknown_number(np.zeros((2, 2), np.uint8)), unknown_number(np.zeros((2, 2), np.uint16))
+    (255, 65535)
+    """
+    return int(np.iinfo(instances.dtype).max)
+
+
 def one_hot(y: Integer[np.ndarray, "*shape"], C: int = len(CLASSES)) -> UInt8[np.ndarray, "*shape C"]:
     """Turn labels into the one-hot tensor Y, with one more axis, of length C; an ignored pixel is all zeros.
 

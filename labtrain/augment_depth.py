@@ -15,10 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import DepthSensor
-from labkit.labels import IGNORE, OBSTACLE, TARGET
+from labkit.labels import IGNORE, OBSTACLE, TARGET, unknown_number
 from labkit.learning.channels import geometry_channels, mirrored
 from labkit.learning.view import resized, rolled_camera
 from labtrain.augment import Draws, random_colour, random_hue, random_noise, random_sharpness
+from labtrain.images import in_8_bits
 from labtrain.paint import BANDS, painted
 
 SIZES = 0.8, 1.7  # of a world, to that which was rendered, where things shall be told apart
@@ -138,7 +139,7 @@ def hidden_things(frame: RGBDFrame, rng: np.random.Generator) -> RGBDFrame:
     """Take the depth, or most of it, from one thing in fifteen: black, shiny and clear things give no reading."""
     depth = frame.depth.copy()
     for number in np.unique(frame.instances):
-        if 0 < number < IGNORE and rng.random() < 1.0 / 15.0:
+        if 0 < number < unknown_number(frame.instances) and rng.random() < 1.0 / 15.0:
             lost = cv2.blur(rng.random(depth.shape, np.float32), (5, 5)) < rng.uniform(0.45, 0.75)
             depth[(frame.instances == number) & lost] = 0.0
     return replace(frame, depth=depth)
@@ -221,7 +222,7 @@ def augment_frames(
         if measured and seen.instances is not None:
             seen = hidden_things(seen, rng)
         depth = random_sensor(seen.depth, rng) if measured else seen.depth
-        of_things = np.full_like(seen.labels, IGNORE) if seen.instances is None else seen.instances
+        of_things = np.full_like(seen.labels, IGNORE) if seen.instances is None else in_8_bits("frames", seen.instances)
         images = (
             seen.rgb,
             geometry_channels(depth, seen.K, seen.T_base_cam, 0.0),

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
+from jaxtyping import Integer, UInt8
 from tqdm.auto import tqdm
 
 from labkit.frame import RGBDFrame
 from labkit.geometry.projection import back_project_to_base
-from labkit.labels import CLASSES, IGNORE, SURFACE
+from labkit.labels import CLASSES, IGNORE, SURFACE, unknown_number
 from labkit.support.validation import check_labels, check_rgb, require
 
 
@@ -18,9 +19,9 @@ class ImagesInMemory:
     dataset: a sequence of (rgb uint8 (H, W, 3), labels (H, W)), arrays or tensors, or of RGBDFrame with labels.
     rgb: uint8 tensor (N, H, W, 3); y: uint8 tensor (N, H, W). depth: keep depth and cameras, too, for a network that
     looks at geometry; a frame that does not state its table's height gets that of the pixels labelled surface.
-    instances: keep them, too (255 where a frame has none), for a network that tells things apart. Raises ValueError if
-    the dataset is empty or has no frames though depth is asked for, its images differ in size, or a label is out of
-    range.
+    instances: keep them, too, for a network that tells things apart: uint8, each frame's things in the order of their
+    numbers, 255 where nobody knows. Raises ValueError if the dataset is empty or has no frames though depth is asked
+    for, its images differ in size, a label is out of range, or a frame has more than 254 things.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class ImagesInMemory:
                 self.depth[i] = item.depth
                 self.cameras[i] = [*item.K.ravel(), *item.T_base_cam.ravel(), table_height(item)]
             if instances and getattr(item, "instances", None) is not None:
-                self.instances[i] = item.instances
+                self.instances[i] = in_8_bits(f"{name}[{i}]", item.instances)
         self.rgb, self.y = torch.from_numpy(rgb), torch.from_numpy(y)
 
     def pictures(self, chosen: Sequence[int]) -> list:
@@ -84,6 +85,23 @@ def image_and_labels(name: str, item) -> tuple[np.ndarray, np.ndarray]:
     rgb, y = np.ascontiguousarray(check_rgb(name, np.asarray(rgb))), np.asarray(y)
     require(name, y.shape == rgb.shape[:2], f"labels of the size of the image, {rgb.shape[:2]}", y.shape)
     return rgb, y
+
+
+def in_8_bits(name: str, instances: Integer[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W"]:
+    """An image of objects' numbers as uint8, numbered anew from 1 if it has another type; 255 where nobody knows.
+
+    Raises ValueError naming `name` if it shows more than 254 objects.
+
+    >>> in_8_bits("frame", np.array([[0, 255, 300, 65535]], np.uint16))
+    array([[  0,   1,   2, 255]], dtype=uint8)
+    """
+    if instances.dtype == np.uint8:
+        return instances
+    numbers, place = np.unique(instances, return_inverse=True)
+    is_thing = (numbers > 0) & (numbers != unknown_number(instances))
+    require(name, is_thing.sum() < IGNORE, f"at most {IGNORE - 1} objects in a frame", is_thing.sum())
+    new = np.where(is_thing, np.cumsum(is_thing), np.where(numbers == 0, 0, IGNORE)).astype(np.uint8)
+    return new[place].reshape(instances.shape)
 
 
 def table_height(frame: RGBDFrame) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from labkit.frame import RGBDFrame
+from labkit.labels import unknown_number
 from labkit.support.validation import require
 
 SHARE = 0.65  # of things that get paint
@@ -30,7 +31,8 @@ def painted(frame: RGBDFrame, rng: np.random.Generator, share: float = SHARE, ba
     """
     require("frame", frame.instances is not None, "one with instances", "one without")
     rgb = frame.rgb.copy()
-    for number in np.unique(frame.instances[frame.instances > 0]):
+    on_things = (frame.instances > 0) & (frame.instances != unknown_number(frame.instances))
+    for number in np.unique(frame.instances[on_things]):
         if rng.random() >= share:
             continue
         v, u = np.nonzero(frame.instances == number)

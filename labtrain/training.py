@@ -269,8 +269,12 @@ class Trainer:
         if not workers:
             return map(self.batch_of_step, steps)
         how = {"collate_fn": self.batch_of_step, "num_workers": workers, "multiprocessing_context": "fork"}
+        threads = cv2.getNumThreads()
         cv2.setNumThreads(1)  # its threads do not outlive a fork, and a worker would wait for them
-        return iter(DataLoader(steps, batch_size=None, worker_init_fn=_leave_ctrl_c, **how))
+        try:
+            return iter(DataLoader(steps, batch_size=None, worker_init_fn=_leave_ctrl_c, **how))
+        finally:
+            cv2.setNumThreads(threads)
 
     def step(self, batch) -> float:
         """Make one optimiser step and return its loss, over all ranks' images; batch: that of `batch_of_step`."""

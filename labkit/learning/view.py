@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from labkit.frame import RGBDFrame
-from labkit.labels import IGNORE
+from labkit.labels import unknown_number
 
 PIXEL = 0.0025  # metres of the table that the view's median pixel covers
 NEAR_TABLE = 0.25  # metres over or under the table: pixels in between tell the size of a pixel
@@ -51,7 +51,7 @@ def canonical_view(frame: RGBDFrame, pixel: float = PIXEL) -> CanonicalView | No
 
     Pixels near the table's height count for the median, all if there are none. Colour is interpolated; depth, and
     labels and instances if known, are the nearest pixel's. Beyond the picture there is no depth, colour repeats the
-    border, and labels and instances are 255. A camera that looks down by more than 80 degrees is turned by whole
+    border, and labels and instances are unknown. A camera that looks down by more than 80 degrees is turned by whole
     quarters, to where base z points up best. Quarter turns of one picture have the very same view. Topic 06.
 
     >>> looking_ahead = np.array([[ 0.0, 0.0, 1.0, 0.0],  # the picture's right is -y of the base, its lower edge -z
@@ -143,7 +143,7 @@ def rolled_camera(frame: RGBDFrame, roll: float, K: Float[np.ndarray, "3 3"], si
 
     It stays where it is, so depth does not change: pixel x of the new picture shows what K R K_new^-1 x of the old one
     did. Depth, and labels and instances if known, are the nearest pixel's; beyond the old picture there is no depth,
-    and labels and instances are 255.
+    and labels and instances are unknown.
     """
     turn = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
     M = (frame.K @ turn @ np.linalg.inv(K))[:2]
@@ -164,7 +164,7 @@ def resampled(rgb, depth, labels, instances, M, size: tuple[int, int], scale: fl
     return (
         warped(smoothed(rgb, scale), M, size, cv2.INTER_LINEAR),
         warped(depth, M, size, *nearest),
-        *(None if known is None else warped(known, M, size, *nearest, IGNORE) for known in (labels, instances)),
+        *(None if x is None else warped(x, M, size, *nearest, unknown_number(x)) for x in (labels, instances)),
     )
 
 

@@ -157,7 +157,7 @@ class World:
     def _label(self, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Turn the renderer's body numbers (-1 for nothing) into labels and instances."""
         label_of = np.full(self.client.getNumBodies() + 1, BACKGROUND, dtype=np.uint8)
-        instance_of = np.zeros(len(label_of), dtype=np.uint8)
+        instance_of = np.zeros(len(label_of), dtype=np.uint16)
         label_of[self.surfaces] = SURFACE
         for number, thing in enumerate(self.spec.objects, start=1):
             label_of[self.bodies[thing.name]] = thing.class_id

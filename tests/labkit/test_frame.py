@@ -1,3 +1,6 @@
+from dataclasses import replace
+from itertools import product
+
 import cv2
 import numpy as np
 import pytest
@@ -5,6 +8,7 @@ from PIL import Image
 from scenes import png_that_claims, random_image
 
 from labkit.frame import RGBDFrame, read_image
+from labkit.labels import unknown_number
 
 K = np.array([[100.0, 0.0, 4.0], [0.0, 110.0, 3.0], [0.0, 0.0, 1.0]])
 GOOD = {
@@ -29,6 +33,43 @@ def test_a_good_frame_keeps_its_values_in_the_kits_types():
     assert frame.depth.dtype == np.float32 and np.array_equal(frame.depth, depth.astype(np.float32), equal_nan=True)
     assert frame.labels.dtype == np.uint8 and frame.size == (8, 6) and frame.table_z == 0.25
     assert repr(frame) == "RGBDFrame(8 x 6, labels, table_z=0.25)"
+
+
+def test_a_frame_stays_as_it_was_checked():
+    """Neither through what it was made of nor through itself can a number come in that nobody checked."""
+    images = {"labels": np.ones((6, 8), np.uint8), "instances": np.ones((6, 8), np.uint16)}
+    given = {name: np.array(value) for name, value in (GOOD | images).items()}
+    frame = RGBDFrame(**given)
+    again = replace(frame, table_z=0.1)
+    before = {name: getattr(frame, name).copy() for name in given}
+    for name, array in given.items():
+        array[...] = 7
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(frame, name)[0, 0] = 7
+    for name, array in before.items():
+        assert np.array_equal(getattr(frame, name), array) and np.array_equal(getattr(again, name), array)
+    assert again.depth is frame.depth, "what cannot change need not be copied"
+
+
+def test_a_few_readings_that_are_far_too_far_are_no_millimetres():
+    depth = np.full((20, 30), 0.8, np.float32)
+    depth[3, 4] = 150.0
+    frame = RGBDFrame(np.zeros((20, 30, 3), np.uint8), depth, K, np.eye(4))
+    assert frame.depth[3, 4] == 150.0
+    depth[:2] = 850.0  # a tenth of them
+    with pytest.raises(ValueError, match=r"^depth: .*850, which looks like millimetres"):
+        RGBDFrame(np.zeros((20, 30, 3), np.uint8), depth, K, np.eye(4))
+
+
+def test_no_number_of_a_thing_is_lost_or_taken_for_unknown():
+    """255 is unknown where the numbers have 8 bits; of a wider type it is a thing like any other, whatever its size."""
+    for numbers, unknown in (([0, 1, 255], 255), ([0, 255], 255)):
+        frame = RGBDFrame(**GOOD, instances=np.resize(np.array(numbers, np.uint8), (6, 8)))
+        assert unknown_number(frame.instances) == unknown
+    for kind, numbers in product((np.uint16, np.int64), ([0, 255], [0, 256, 300, 511], [0, 1, 65_535], [0, 3])):
+        image = np.resize(np.array(numbers, kind), (6, 8))
+        frame = RGBDFrame(**GOOD, instances=image)
+        assert np.array_equal(frame.instances, image) and unknown_number(frame.instances) not in {*numbers} - {65_535}
 
 
 @pytest.mark.bad_input
