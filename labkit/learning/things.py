@@ -19,10 +19,10 @@ import numpy as np
 from jaxtyping import Float, Float32, Int32, Integer
 
 from labkit.frame import RGBDFrame
-from labkit.labels import IGNORE
+from labkit.labels import IGNORE, unknown_number
 from labkit.learning.inference import VOTE_UNIT, InstanceOutput
 from labkit.learning.view import resized
-from labkit.support.validation import check_finite, check_shape, require
+from labkit.support.validation import check_finite, check_labels, check_shape, require
 
 if TYPE_CHECKING:
     import torch
@@ -138,7 +138,8 @@ def group(
 
     foreground: probability that a pixel is on a thing; those above 0.5 vote. votes: (du, dv), pixels, from each pixel
     to the middle of its thing. Peaks of the smoothed histogram of votes are the things; a pixel is of the peak that its
-    vote is nearest to. The certainty of a thing is the mean over its pixels of its foreground where the vote agrees
+    vote is nearest to. A vote that leaves the picture by more than its width or height makes no peak. The certainty of
+    a thing is the mean over its pixels of its foreground where the vote agrees
     with the peak, and 0 where it does not. Raises ValueError for another shape, NaN, or a foreground outside 0..1.
 
     >>> foreground, votes = np.zeros((40, 90)), np.zeros((40, 90, 2))
@@ -156,10 +157,11 @@ def group(
     v, u = np.nonzero(foreground > 0.5)
     numbers = np.zeros(foreground.shape, np.int32)
     places = np.stack([u, v], axis=1) + votes[v, u]
-    peaks = peaks_of(histogram(places))
+    size = np.array(foreground.shape[::-1])
+    peaks = peaks_of(histogram(places[((places >= -size) & (places <= 2 * size)).all(axis=1)]))
     if len(peaks) == 0:
         return numbers, ()
-    distance, nearest = nearest_of(places, peaks)
+    distance, nearest = nearest_of(np.clip(places, -size, 2 * size), peaks)
     pixels = np.bincount(nearest, minlength=len(peaks))
     order = [k for k in np.argsort(-pixels, kind="stable") if pixels[k] >= LEAST]
     number_of = np.zeros(len(peaks), np.int32)
@@ -192,12 +194,26 @@ def histogram(places: Float[np.ndarray, "N 2"]) -> tuple[Float32[np.ndarray, "r 
 
 
 def peaks_of(smoothed) -> Float[np.ndarray, "K 2"]:
-    """The places (u, v) of a histogram's peaks: cells that are the highest within APART pixels, and ENOUGH."""
+    """The places (u, v) of a histogram's peaks: cells that are the highest within APART pixels, and ENOUGH.
+
+    Cells of one height that are so near each other are one peak, in their middle.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     counts, first = smoothed
     reach = int(APART // CELL)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     row, column = np.nonzero((counts == cv2.dilate(counts, disc)) & (counts > ENOUGH))
-    return first + CELL * np.stack([column, row], axis=1)
+    cells, height = np.stack([column, row], axis=1), counts[row, column]
+    if len(cells) == 0:
+        return np.zeros((0, 2))
+    a, b = cKDTree(cells).query_pairs(APART / CELL, output_type="ndarray").T
+    a, b = a[height[a] == height[b]], b[height[a] == height[b]]
+    count, peak = connected_components(coo_array((np.ones(len(a)), (a, b)), (len(cells), len(cells))), directed=False)
+    sums = np.stack([np.bincount(peak, axis, count) for axis in (column, row)], axis=1)
+    return first + CELL * sums / np.bincount(peak)[:, None]
 
 
 def nearest_of(places: Float[np.ndarray, "N 2"], peaks: Float[np.ndarray, "K 2"]):
@@ -210,10 +226,14 @@ def nearest_of(places: Float[np.ndarray, "N 2"], peaks: Float[np.ndarray, "K 2"]
 def vote_targets(instances: Integer[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W 2"]:
     """The true votes: (du, dv) from each pixel of a thing to the mean place of all its pixels; 0 elsewhere.
 
+    instances: numbers of things up to 65535, 0 for none, `unknown_number` where nobody knows. Raises ValueError for
+    others.
+
     >>> vote_targets(np.array([[7, 7, 7, 0, 2]]))[0, :, 0].tolist()
     [1.0, 0.0, -1.0, 0.0, 0.0]
     """
-    v, u = np.nonzero((instances > 0) & (instances != IGNORE))
+    instances = check_shape("instances", check_labels("instances", instances, 65_536, ignore=None), (None, None))
+    v, u = np.nonzero((instances > 0) & (instances != unknown_number(instances)))
     number = instances[v, u]
     votes = np.zeros((*instances.shape, 2), np.float32)
     pixels = np.maximum(np.bincount(number), 1)
@@ -225,14 +245,15 @@ def vote_targets(instances: Integer[np.ndarray, "H W"]) -> Float32[np.ndarray, "
 def things_loss(z: "torch.Tensor", instances: "torch.Tensor") -> "torch.Tensor":
     """Give the loss of the channels `THINGS` (N, 3, H, W): the foreground's cross-entropy, and the votes' smooth L1.
 
-    instances: (N, H, W), 0 is no thing, pixels of 255 are left out. A vote counts where a thing is. Its loss is
+    instances: uint8 (N, H, W), 0 is no thing, pixels of 255 are left out. A vote counts where a thing is. Its loss is
     quadratic up to 4 pixels of error and linear beyond, so that a pixel that cannot know, on a half hidden thing, does
     not pull more than others. All is summed over pixels and divided by the number of those counted, as
-    `segmentation_loss` is.
+    `segmentation_loss` is. Raises ValueError for another type, whose 255 may be a thing.
     """
     import torch
     from torch.nn import functional as F
 
+    require("instances", instances.dtype == torch.uint8, "uint8, 255 where nobody knows", instances.dtype)
     known = instances != IGNORE
     foreground = (instances > 0) & known
     truth = torch.from_numpy(np.stack([vote_targets(each) for each in instances.cpu().numpy()])).to(z.device)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
 from itertools import product
 
@@ -12,7 +13,7 @@ import torch
 import data_gen
 from labkit.frame import RGBDFrame
 from labkit.instance_metrics import score_instances
-from labkit.labels import IGNORE
+from labkit.labels import IGNORE, unknown_number
 from labkit.learning.engines import open_engine
 from labkit.learning.inference import THINGS, VOTE_UNIT, Engine, NetworkInput
 from labkit.learning.network import TorchEngine, UNetRGBD, load_model, save_model, weights_path, with_things
@@ -28,7 +29,7 @@ from labkit.learning.things import (
     vote_targets,
 )
 from labkit.learning.view import canonical_view
-from labtrain.augment_depth import random_bend, random_depth_loss, random_exposure
+from labtrain.augment_depth import hidden_things, random_bend, random_depth_loss, random_exposure
 from labtrain.images import ImagesInMemory
 from labtrain.paint import painted
 from labtrain.training import THINGS_RECIPE, Trainer, train
@@ -135,7 +136,7 @@ def test_vote_targets_are_the_mean_place_of_each_thing(crowd):
         reached = np.stack([u, v], axis=1) + votes[v, u]
         assert np.abs(reached - (u.mean(), v.mean())).max() < 1e-3
     assert not votes[true == 0].any()
-    assert not vote_targets(np.full((3, 3), IGNORE)).any()
+    assert not vote_targets(np.full((3, 3), IGNORE, np.uint8)).any()
 
 
 # The loss -----------------------------------------------------------------------------------------------------------
@@ -243,6 +244,42 @@ def test_a_network_of_classes_alone_finds_no_things(crowd):
         segment_instances(UNetRGBD(), crowd)
 
 
+def square(off=(0.0, 0.0), side: int = 30):
+    """Foreground and votes of one square thing; of every second column the votes are `off` by so many pixels."""
+    foreground, votes = np.zeros((60, 70)), np.zeros((60, 70, 2))
+    inside = np.s_[10 : 10 + side, 20 : 20 + side]
+    v, u = np.mgrid[inside]
+    foreground[inside] = 1.0
+    votes[inside] = np.stack([u.mean() - u, v.mean() - v], axis=-1)
+    votes[10 : 10 + side, 20 : 20 + side : 2] += off
+    return foreground, votes
+
+
+@pytest.mark.parametrize("off", [(3, 0), (0, 3), (-3, 3), (6, 0), (9, 0), (-3, -6)])
+@pytest.mark.parametrize("least", [8, 30])
+def test_votes_that_are_split_between_two_cells_are_one_thing(off, least):
+    """Two peaks of one height, nearer than peaks can be apart."""
+    numbers, certainty = group(*square(off, least))
+    assert len(certainty) == 1 and np.array_equal(numbers > 0, square(side=least)[0] > 0.5)
+    assert certainty[0] == 1.0 or np.hypot(*off) / 2.0 > 0.5 * np.sqrt(least**2 / np.pi)
+
+
+@pytest.mark.parametrize("far", [30_000.0, -1e6, 1e300])
+def test_a_vote_that_leads_nowhere_costs_no_memory_and_no_thing(far):
+    foreground, votes = square()
+    votes[20, 30] = far, -far
+    tracemalloc.start()
+    try:
+        numbers, certainty = group(foreground, votes)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 20e6 and np.array_equal(numbers > 0, foreground > 0.5)
+    assert certainty == (pytest.approx(1.0 - 1.0 / 900.0),)
+    numbers, certainty = group(foreground, np.full_like(votes, far))
+    assert not numbers.any() and certainty == ()
+
+
 # Paint and training -------------------------------------------------------------------------------------------------
 
 
@@ -259,6 +296,54 @@ def test_paint_stays_on_things_keeps_their_shading_and_is_repeatable(crowd):
         assert rgb[:, 20:].max() <= 0.55 * 255.0
     with pytest.raises(ValueError, match="one with instances"):
         painted(RGBDFrame(crowd.rgb, crowd.depth, crowd.K, crowd.T_base_cam), np.random.default_rng(0))
+
+
+def many(frame: RGBDFrame, numbers, kind) -> RGBDFrame:
+    """A frame whose upper edge shows things of these numbers, a pixel each, and nothing else."""
+    instances = np.zeros(frame.depth.shape, kind)
+    instances[0, : len(numbers)] = numbers
+    return replace(frame, instances=instances)
+
+
+@pytest.mark.parametrize("numbers", [(256, 300, 511), (1, 255, 256), (255, 65_534), (7, 7, 2)])
+def test_training_tells_things_of_any_number_apart(crowd, numbers):
+    """Also those above 255, and 255 itself where it is a thing's; `unknown_number` alone is unknown."""
+    frames = [
+        many(crowd, numbers, np.uint16),
+        many(crowd, (*numbers, 65_535), np.uint16),
+        replace(crowd, instances=None),
+    ]
+    kept = ImagesInMemory(frames, depth=True, instances=True, progress=False).instances
+    assert kept.dtype == np.uint8 and (kept[2] == IGNORE).all()
+    for image in kept[:2]:
+        own = image[0, : len(numbers)]
+        assert not image[1:].any() and own.min() > 0 and own.max() < IGNORE
+        assert np.array_equal(np.unique(own, return_inverse=True)[1], np.unique(numbers, return_inverse=True)[1])
+    assert kept[0, 0, len(numbers)] == 0 and kept[1, 0, len(numbers)] == IGNORE
+
+
+@pytest.mark.bad_input
+def test_more_things_than_8_bits_can_number_are_refused(crowd):
+    ImagesInMemory([many(crowd, range(300, 554), np.uint16)], depth=True, instances=True, progress=False)
+    with pytest.raises(ValueError, match=r"^dataset\[0\]: expected at most 254 objects in a frame, got 255"):
+        ImagesInMemory([many(crowd, range(300, 555), np.uint16)], depth=True, instances=True, progress=False)
+    with pytest.raises(ValueError, match=r"^instances: expected uint8, 255 where nobody knows"):
+        things_loss(torch.zeros((1, 3, 2, 2)), torch.full((1, 2, 2), 255))
+
+
+def test_what_is_unknown_is_neither_painted_nor_hidden_nor_voted_for_and_a_thing_of_number_255_is(crowd):
+    for kind, unknown in ((np.uint8, 255), (np.uint16, 65_535)):
+        nobody_knows = replace(crowd, instances=np.full(crowd.depth.shape, unknown, kind))
+        thing = replace(crowd, instances=np.full(crowd.depth.shape, 255, np.uint16))
+        assert not vote_targets(nobody_knows.instances).any() and vote_targets(thing.instances).any()
+        changed = 0
+        for seed in range(12):
+            assert np.array_equal(painted(nobody_knows, np.random.default_rng(seed)).rgb, crowd.rgb)
+            assert np.array_equal(hidden_things(nobody_knows, np.random.default_rng(seed)).depth, crowd.depth)
+            changed += (painted(thing, np.random.default_rng(seed)).rgb != crowd.rgb).any()
+        assert changed > 3
+        view = canonical_view(many(crowd, (255,), kind)).frame.instances  # beyond the picture nobody knows
+        assert unknown_number(view) == unknown and (view == unknown).any()
 
 
 def test_bands_lie_square_to_a_thing_s_length():
@@ -294,7 +379,7 @@ def test_bad_exposure_and_depth_leave_instances_and_say_nothing_of_their_own(cro
 def test_batches_made_ahead_by_other_processes_are_the_same():
     """In a process of its own: here, threads that other tests began might be waited for after the fork."""
     program = """if True:
-        import torch, data_gen
+        import cv2, torch, data_gen
         from dataclasses import replace
         from labkit.learning.network import UNetRGBD
         from labtrain.training import THINGS_RECIPE, ImagesInMemory, Trainer
@@ -302,14 +387,15 @@ def test_batches_made_ahead_by_other_processes_are_the_same():
         data = ImagesInMemory(frames, depth=True, instances=True, progress=False)
         config = replace(THINGS_RECIPE, steps=3, batch=2, crop=(32, 48))
         trainer = Trainer(data, config, torch.device("cpu"), UNetRGBD(things=True))
+        threads = cv2.getNumThreads()
         for step, ahead in enumerate(trainer.ahead(2)):
             here = trainer.batch_of_step(step)
             for one, other in zip([*here[0], *here[1:]], [*ahead[0], *ahead[1:]]):
                 assert torch.equal(one, other)
-        print("same", step + 1)
+        print("same", step + 1, cv2.getNumThreads() == threads)
     """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=200)
-    assert done.stdout == "same 3\n", done.stderr
+    assert done.stdout == "same 3 True\n", done.stderr
 
 
 def test_instances_are_carried_into_the_batch_as_labels_are(crowd):
@@ -323,8 +409,6 @@ def test_instances_are_carried_into_the_batch_as_labels_are(crowd):
 
 
 def test_training_leaves_classes_as_they_are_and_goes_on_where_it_stopped(tmp_path, crowd):
-    from dataclasses import replace
-
     config = replace(THINGS_RECIPE, steps=4, epochs=1, crop=(64, 96), batch=2)
     frames = [crowd] * 4
     torch.manual_seed(0)
