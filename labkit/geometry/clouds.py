@@ -223,5 +223,6 @@ def _check_cloud(name: str, P) -> Float[np.ndarray, "N 3"]:
 
 def _check_reach(name: str, reach, P: Float[np.ndarray, "N 3"]) -> None:
     require(name, np.ndim(reach) == 0 and np.isfinite(reach) and reach > 0.0, "metres above 0", reach)
-    if len(P) and P.max() - P.min() > 1e6 * reach:  # the keys of the grid's cells would not fit in 64 bits
+    # The keys of the grid's cells would not fit in 64 bits.
+    if len(P) and np.ptp(P.astype(np.float64), axis=0).max() > 1e6 * reach:
         raise ValueError(f"{name}: expected more than a millionth of the cloud's width, got {reach}")

@@ -5,7 +5,7 @@ Topic 06.
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Float32, Real
+from jaxtyping import Float, Float32, Real, UInt16
 
 from labkit.support.validation import check_depth, check_K, check_shape, require
 
@@ -100,6 +100,18 @@ def fitting_units(middle: float) -> list[float]:
     ([0.0001], [0.001, 0.0001])
     """
     return [unit for unit in UNITS if LIKELY[0] <= unit * middle <= LIKELY[1]]
+
+
+def whole_units(depth: Float[np.ndarray, "H W"], unit: float) -> UInt16[np.ndarray, "H W"]:
+    """Depth, metres, in whole units of so many metres, as files and messages of 16 bits hold it.
+
+    0 is no reading, and so is what 16 bits cannot hold: further than 65,535 units. Topic 06.
+
+    >>> whole_units(np.array([[1.2344, np.nan, 65.535, 70.0]]), 0.001)
+    array([[ 1234,     0, 65535,     0]], dtype=uint16)
+    """
+    units = np.rint(np.nan_to_num(depth) * (1.0 / unit))
+    return np.where(units <= np.iinfo(np.uint16).max, units, 0).astype(np.uint16)
 
 
 # ------------------------------------------------------------------------------------------------- another size

@@ -4,9 +4,8 @@ import threading
 import time
 from collections.abc import Iterable
 
-import numpy as np
-
 from labkit.frame import RGBDFrame
+from labkit.geometry.depth_units import whole_units
 from labkit.node import convert
 from labkit.node.messages import (
     DEFAULT_TOPICS,
@@ -27,7 +26,8 @@ from labkit.support.validation import require
 class Camera:
     """Publish frames as a camera's driver does: the pose, the calibration, depth, and colour, all of one stamp.
 
-    depth: "32FC1" for metres, "16UC1" for millimetres. frame_id names the optical frame (x right, y down, z forward).
+    depth: "32FC1" for metres, "16UC1" for millimetres, in which what is further than 65.535 m is no reading. frame_id
+    names the optical frame (x right, y down, z forward).
 
     >>> from labkit.node.bus import Bus
     >>> bus, seen = Bus(), []
@@ -65,7 +65,7 @@ class Camera:
         where = Transform(pose.header, self.frame_id, pose.position, pose.orientation)
         depth = frame.depth
         if self.depth == "16UC1":
-            depth = np.rint(1000.0 * np.nan_to_num(depth)).astype(np.uint16)
+            depth = whole_units(depth, 0.001)
         width, height = frame.size
         publish, topics = self.transport.publish, self.topics
         publish(topics.tf, Transforms((where,)))

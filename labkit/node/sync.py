@@ -11,8 +11,9 @@ class Synchronizer:
     """Approximate time synchronisation of several streams (topic 08).
 
     `add` returns one message per stream as soon as all their stamps lie within `slop` nanoseconds, else None. Of
-    several that would do, it takes the ones nearest to the message just added. Each stream keeps `depth` messages that
-    wait. A message that is pushed out, or is older than what was taken, is counted in `left`, by stream.
+    several sets that would do, it takes the one whose messages are in sum nearest to the one just added. Each stream
+    keeps `depth` messages that wait. A message that is pushed out, or is older than what was taken, is counted in
+    `left`, by stream.
 
     Stamps need not rise. A stamp that is `restart` nanoseconds behind its stream's newest says that the clock was set
     back: what waits is then of the time before, and pairs with nothing that comes after. Raises ValueError for a slop
@@ -51,16 +52,32 @@ class Synchronizer:
         queue.append((stamp, message))
         if not all(self._waiting.values()):
             return None
-        chosen = {name: min(q, key=lambda item: abs(item[0] - stamp)) for name, q in self._waiting.items()}
-        chosen[stream] = (stamp, message)
-        stamps = [when for when, _ in chosen.values()]
-        if max(stamps) - min(stamps) > self.slop:
+        chosen = self._nearest_set({**self._waiting, stream: [(stamp, message)]}, stamp)
+        if chosen is None:
             return None
         for name, (when, _) in chosen.items():
             newer = [item for item in self._waiting[name] if item[0] > when]
             self.left[name] += len(self._waiting[name]) - len(newer) - 1
             self._waiting[name] = deque(newer, self._waiting[name].maxlen)
         return {name: message for name, (_, message) in chosen.items()}
+
+    def _nearest_set(self, waiting: dict, stamp: int) -> dict | None:
+        """A message of each stream within `slop` of each other, nearest to a stamp; None if there is no such set.
+
+        The earliest of a set is one of those that wait: from each of them on, the nearest of every stream.
+        """
+        best, least = None, None
+        for first in sorted({when for queue in waiting.values() for when, _ in queue}):
+            if not stamp - self.slop <= first <= stamp:
+                continue
+            near = {name: [item for item in q if first <= item[0] <= first + self.slop] for name, q in waiting.items()}
+            if not all(near.values()):
+                continue
+            chosen = {name: min(items, key=lambda item: abs(item[0] - stamp)) for name, items in near.items()}
+            total = sum(abs(when - stamp) for when, _ in chosen.values())
+            if least is None or total < least:
+                best, least = chosen, total
+        return best
 
     def flush(self) -> None:
         """Give up what waits, and count it: nothing more will come."""

@@ -17,8 +17,8 @@ from labkit.node.messages import NANOSECONDS, Transform
 class TransformTree:
     """Transforms by child frame, each with its parent; moving ones are kept for `seconds` and interpolated (topic 08).
 
-    A frame has one parent and is static or moves: what was said last holds, and what was known before is forgotten. One
-    thread may fill the tree while another asks it.
+    A frame has one parent and is static or moves: what was said last holds, and what was known before is forgotten. Of
+    two transforms of one stamp, too, the last one holds. One thread may fill the tree while another asks it.
 
     >>> tree = TransformTree()
     >>> from labkit.node.messages import Header
@@ -56,7 +56,9 @@ class TransformTree:
                 return
             if history and stamp < history[-1][0] - self._span:
                 history.clear()
-            bisect.insort(history, (stamp, T_parent_child), key=lambda item: item[0])
+            at = bisect.bisect_left(history, stamp, key=lambda item: item[0])
+            said_before = at < len(history) and history[at][0] == stamp
+            history[at : at + said_before] = [(stamp, T_parent_child)]
             while history[-1][0] - history[0][0] > self._span:
                 history.pop(0)
 

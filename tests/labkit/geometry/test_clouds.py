@@ -174,6 +174,17 @@ def test_dense_clouds_agree_with_brute_force_too():
     assert [len(points) for points in cluster_indices(far, 0.01, 1)] == [*sizes, 1]
 
 
+@pytest.mark.parametrize("away", [(5e5, 0.0, 0.0), (0.0, -5e5, 3e5)])
+def test_a_small_cloud_that_is_far_away_is_as_good_as_any(away):
+    """What counts is its own width along each axis, not how the axes differ."""
+    P = box_cloud((0.05, 0.03, 0.02), 300)
+    far = P + away
+    groups, near = cluster_indices(far, 0.01, 5), cluster_indices(P, 0.01, 5)
+    assert [g.tolist() for g in groups] == [g.tolist() for g in near] and len(inlier_indices(far, 0.01)) > 200
+    sheet = np.where([1, 1, 0], P, 0.0) + away
+    assert fit_plane(sheet, 0.001).inliers.all()
+
+
 # Bad input
 
 CLOUD, NAN_CLOUD = np.zeros((5, 3)), np.array([[0.0, 0.0, np.nan]])

@@ -13,7 +13,10 @@ import pytest
 from scenes import png_that_claims
 from scipy.spatial.transform import Rotation
 
+from labkit.frame import RGBDFrame
 from labkit.node import convert
+from labkit.node.actors import Camera
+from labkit.node.bus import Bus
 from labkit.node.messages import CameraInfo, CompressedImage, Header, Image, PointCloud2, PointField, Pose
 
 RECORDED = Path(__file__).parent / "recorded"
@@ -105,6 +108,18 @@ def test_depth_is_metres_with_no_infinity():
     metres = convert.encode_image(np.array([[0.5, np.inf, -np.inf, np.nan]], np.float32), "32FC1", H)
     found = convert.depth_image(metres)
     assert found[0, 0] == 0.5 and np.isnan(found[0, 1:]).all() and found.dtype == np.float32
+
+
+def test_what_16_bits_cannot_hold_is_no_reading():
+    """70 m in millimetres would come back as 4.464 m."""
+    bus, seen = Bus(), []
+    bus.subscribe("/camera/depth/image_raw", object, seen.append)
+    depth = np.array([[0.8, 65.535, 70.0, np.nan, 0.0]], np.float32)
+    frame = RGBDFrame(np.zeros((1, 5, 3), np.uint8), depth, np.diag([9.0, 9.0, 1.0]), np.eye(4))
+    for encoding, far in (("16UC1", 0.0), ("32FC1", 70.0)):
+        Camera(bus, depth=encoding).publish(frame)
+        found = np.nan_to_num(convert.depth_image(seen[-1]))
+        assert np.allclose(found, [[0.8, 65.535, far, 0.0, 0.0]], atol=1e-5)
 
 
 def test_16_bit_depth_may_be_called_mono16():

@@ -32,7 +32,7 @@ def test_every_moment_is_found_under_jitter_and_in_any_order():
 
 
 def test_against_every_combination():
-    """A set is given exactly when some message of each other stream lies within the bound; checked by trying all."""
+    """A set is given exactly when a combination lies within the bound, and it is one of the nearest; by trying all."""
     rng = np.random.default_rng(1)
     for _ in range(300):
         sync, waiting = Synchronizer(STREAMS, slop=10, depth=50), {stream: [] for stream in STREAMS}
@@ -40,14 +40,23 @@ def test_against_every_combination():
             stream, stamp = str(rng.choice(STREAMS)), int(rng.integers(0, 120))
             together = sync.add(stream, stamp, stamp)
             waiting[stream].append(stamp)
-            others = [waiting[name] for name in STREAMS if name != stream]
-            nearest = [min(q, key=lambda other: abs(other - stamp)) for q in others] if all(others) else []
-            fits = bool(nearest) and max(*nearest, stamp) - min(*nearest, stamp) <= 10
-            assert (together is not None) == fits
+            sets = [s for s in itertools.product(*(waiting[name] for name in STREAMS)) if stamp in s]
+            sets = [s for s in sets if s[STREAMS.index(stream)] == stamp and max(s) - min(s) <= 10]
+            assert (together is not None) == bool(sets)
             if together:
-                assert together[stream] == stamp
-                assert sorted(together[name] for name in STREAMS if name != stream) == sorted(nearest)
+                given = tuple(together[name] for name in STREAMS)
+                assert given in sets
+                off = [sum(abs(when - stamp) for when in s) for s in (given, *sets)]
+                assert off[0] == min(off)
                 waiting = {name: [s for s in waiting[name] if s > together[name]] for name in STREAMS}
+
+
+def test_the_nearest_of_each_stream_are_no_set_but_another_is():
+    """Depth at 15 is nearest to colour at 0, and 33 away from the calibration; depth at -18 is not."""
+    sync = Synchronizer(STREAMS, slop=20)
+    for stream, stamp in (("depth", -18), ("info", -18), ("depth", 15)):
+        assert sync.add(stream, stamp, stamp) is None
+    assert sync.add("rgb", 0, 0) == {"rgb": 0, "depth": -18, "info": -18}
 
 
 def test_lost_messages_cost_their_frame_and_no_other():
@@ -169,6 +178,19 @@ def test_the_tree_agrees_with_tf2():
         T = tree.lookup(target, source, stamp)
         assert np.allclose(T[:3, 3], t, atol=1e-6)
         assert np.allclose(T[:3, :3], Rotation.from_quat(q).as_matrix(), atol=1e-6)
+
+
+def test_of_two_transforms_of_one_stamp_the_last_one_holds():
+    tree = TransformTree()
+    for stamp, x in ((0, 0.0), (100, 1.0), (200, 4.0), (100, 2.0), (200, 6.0), (0, -2.0)):
+        tree.add(Transform(Header(stamp, "base"), "camera", (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    assert [tree.lookup("base", "camera", stamp)[0, 3] for stamp in (0, 50, 100, 150, 200)] == [
+        -2.0,
+        0.0,
+        2.0,
+        4.0,
+        6.0,
+    ]
 
 
 def test_what_is_not_known_is_said():
