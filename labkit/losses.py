@@ -142,7 +142,7 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
     counted = labels != IGNORE
     logits = logits if logits.dtype == torch.float64 else logits.float()
     # One sum finds any NaN or infinity; at an ignored pixel it would spare the loss and spoil the gradient.
-    if not torch.isfinite(logits.detach().sum()):
+    if not torch.isfinite(logits.detach().sum()) and not torch.isfinite(logits).all():
         bad = logits.numel() - torch.isfinite(logits).sum().item()
         raise ValueError(f"logits: expected finite numbers, got {bad} NaN or infinite; has the training diverged?")
     if weights is not None:
@@ -150,7 +150,11 @@ def segmentation_loss(logits: "torch.Tensor", labels: "torch.Tensor", weights=No
         weights = torch.from_numpy(_check_weights("weights", array, logits.shape[1])).to(logits)
     losses = cross_entropy(logits, labels, weight=weights, ignore_index=IGNORE, reduction="none")
     # Summed in float64: in float32, a batch of some 100,000 pixels is off in the fourth digit.
-    return (losses.sum(dtype=torch.float64) / counted.sum().clamp(min=1)).to(logits.dtype)
+    loss = (losses.sum(dtype=torch.float64) / counted.sum().clamp(min=1)).to(logits.dtype)
+    if not torch.isfinite(loss):
+        largest = logits.detach().abs().max()
+        raise ValueError(f"logits: expected smaller ones, got up to {largest:.3g} in size; has the training diverged?")
+    return loss
 
 
 segmentation_loss.sums_over_pixels = True  # but for the division: so ranks can share a batch, see `train`

@@ -218,7 +218,7 @@ def reliability_counts(
 
     p: probabilities; bin k holds those from k / bins to (k + 1) / bins, the last one 1 as well. Counts add up over
     frames, as a confusion matrix does; a point of a reliability diagram is (sum of p, true) / pixels. Raises ValueError
-    for shapes that differ or a p outside 0..1. Topic 07_grasp.
+    for shapes that differ, a p outside 0..1, or no bin. Topic 07_grasp.
 
     >>> reliability_counts(np.array([0.1, 0.2, 0.9]), np.array([False, True, True]), bins=2)
     array([[2. , 0.3, 1. ], [1. , 0.9, 1. ]])
@@ -227,7 +227,8 @@ def reliability_counts(
     true = check_shape("true", true, p.shape)
     if p.size and not (p.min() >= 0.0 and p.max() <= 1.0):
         raise ValueError(f"p: expected probabilities in 0..1, got {p.min():.4g} to {p.max():.4g}")
-    place = np.minimum((p.ravel() * bins).astype(np.int64), bins - 1)
+    edges = np.arange(1, check_whole("bins", bins, 1)) / bins  # p * bins would round 0.29 * 100 down to 28
+    place = np.searchsorted(edges.astype(p.dtype if p.dtype.kind == "f" else np.float64), p.ravel(), side="right")
     columns = (np.ones(p.size), p.ravel(), true.ravel())
     return np.column_stack([np.bincount(place, weights, minlength=bins) for weights in columns]).astype(np.float64)
 

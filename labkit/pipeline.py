@@ -19,7 +19,15 @@ from labkit.learning.inference import Engine, FunctionEngine, check_probabilitie
 from labkit.learning.things import predicts_instances, segment_instances
 from labkit.notices import notices
 from labkit.support.validation import check_height, check_pixel, check_rgb, check_whole, require
-from labkit.targets import WORKSPACE, Segmentation, TargetFinder, instances_in, labels_in, separate_objects
+from labkit.targets import (
+    WORKSPACE,
+    Segmentation,
+    TargetFinder,
+    certainty_in,
+    instances_in,
+    labels_in,
+    separate_objects,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +203,7 @@ class Pipeline:
                 found = self.find_objects(frame)
                 instances = instances_in(frame, getattr(found, "instances", found))
             labels = np.where(instances > 0, self.target_class, 0).astype(np.uint8)
-            certainty = getattr(found, "certainty", None)
+            certainty = certainty_in(instances, getattr(found, "certainty", None))
             return Segmentation(labels, self.target_class, instances=instances, certainty=certainty)
         require("model", self.model is not None, "one to perceive with", "None; `locate` takes labels from elsewhere")
         instances = certainty = None

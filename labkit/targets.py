@@ -199,6 +199,24 @@ def instances_in(frame: RGBDFrame, instances) -> Integer[np.ndarray, "H W"]:
     return instances
 
 
+def certainty_in(instances: Integer[np.ndarray, "H W"], certainty) -> tuple[float, ...] | None:
+    """Return how sure each object is, by its number from 1 on; None if nobody says; raises ValueError if they differ.
+
+    >>> certainty_in(np.array([[0, 7]]), [0.9])
+    Traceback (most recent call last):
+    ...
+    ValueError: certainty: expected one for each number of an object, 1 to 7, got 1
+    """
+    if certainty is None:
+        return None
+    certainty = check_finite("certainty", check_shape("certainty", certainty, (None,)))
+    count = int(instances.max(initial=0))
+    require("certainty", len(certainty) == count, f"one for each number of an object, 1 to {count}", len(certainty))
+    fits = count == 0 or (certainty.min() >= 0.0 and certainty.max() <= 1.0)
+    require("certainty", fits, "numbers in 0..1", lambda: certainty.tolist())
+    return tuple(certainty.tolist())
+
+
 def separate_objects(P: Float[np.ndarray, "N 3"]) -> list[Integer[np.ndarray, "_"]]:
     """Clean the points of the target class and split them: two targets are two lists of indices into P."""
     kept = inlier_indices(P)

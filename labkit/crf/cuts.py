@@ -15,7 +15,7 @@ from itertools import cycle
 import numpy as np
 from jaxtyping import Bool, Integer
 
-from labkit.crf.energy import MapResult, PottsCRF
+from labkit.crf.energy import MapResult, PottsCRF, timed
 from labkit.crf.integers import IntegerPotts, inside, pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE, Graph, max_flow, new_forest
 from labkit.crf.messages import _trws
@@ -27,6 +27,7 @@ START_SWEEPS = 6
 NEAR = 3
 
 
+@timed
 def expansion(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None) -> MapResult:
     """Minimise by expansion moves, from `labels` if they are given, until no class can expand (topic 02).
 
@@ -49,6 +50,7 @@ def _expansion(crf: PottsCRF, integer: IntegerPotts, labels: Integer[np.ndarray,
     return moves.result(crf, tried)
 
 
+@timed
 def trws_expansion(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-4) -> MapResult:
     """Let TRW-S find the bound and a start, and expansion moves the rest of the way down.
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from labkit.crf.energy import OFFSETS, MapResult, PottsCRF, pair_slices
+from labkit.crf.energy import OFFSETS, MapResult, PottsCRF, pair_slices, timed
 from labkit.crf.integers import grid_steps, inside, pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE, Graph, both_ways, max_flow, new_forest
 from labkit.support.validation import as_array, check_shape, require
@@ -48,6 +48,7 @@ def marginals(crf: PottsCRF) -> Float[np.ndarray, "H W C"]:
     return p
 
 
+@timed
 def brute_force(crf: PottsCRF) -> MapResult:
     """Return the labelling of least energy out of all C^(H W); raises ValueError beyond 2^22 of them."""
     chunks = ((energies.min(), labellings[energies.argmin()]) for labellings, energies in enumerate_labellings(crf))
@@ -56,6 +57,7 @@ def brute_force(crf: PottsCRF) -> MapResult:
     return MapResult(labels, energy, lower_bound=energy, iterations=1)
 
 
+@timed
 def unary(crf: PottsCRF) -> MapResult:
     """Return each pixel's cheapest class: exact if the pairwise terms vanish (topic 02), else where solvers start.
 
@@ -69,6 +71,7 @@ def unary(crf: PottsCRF) -> MapResult:
     return MapResult(labels, energy, lower_bound=energy if not crf.weights.any() else bound - slack, iterations=1)
 
 
+@timed
 def min_cut(crf: PottsCRF) -> MapResult:
     """Return the labelling of least energy for two classes: the cheapest cut between a source and a sink (topic 02).
 

@@ -8,11 +8,12 @@ softmax of what the pixel costs on average; sweeping over the pixels lowers F wi
 import numpy as np
 from jaxtyping import Float
 
-from labkit.crf.energy import MapResult, PottsCRF
+from labkit.crf.energy import MapResult, PottsCRF, timed
 from labkit.crf.energy_kernels import mean_field_sweep
 from labkit.support.validation import MAX_ITERATIONS, check_whole, require
 
 
+@timed
 def mean_field(crf: PottsCRF, iterations: int = 10, temperatures: tuple[float, float] | None = None) -> MapResult:
     """Return each pixel's most probable class under the mean-field distribution; `temperatures` as below. No bound."""
     q = mean_field_marginals(crf, iterations, temperatures)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Int, Integer, UInt8
 
-from labkit.crf.energy import MapResult, PottsCRF, pair_slices
+from labkit.crf.energy import MapResult, PottsCRF, pair_slices, timed
 from labkit.crf.energy_kernels import icm_sweep
 from labkit.crf.integers import IntegerPotts, inside, quantise
 from labkit.crf.message_kernels import Skew, skewed, trws_labels, trws_sweep
@@ -21,6 +21,7 @@ from labkit.support.validation import MAX_ITERATIONS, check_whole
 LABEL_EVERY = 5
 
 
+@timed
 def trws(crf: PottsCRF, iterations: int = 50, tolerance: float = 1e-5) -> MapResult:
     """Minimise by sequential tree-reweighted message passing, with a proven lower bound (topic 02).
 
@@ -68,6 +69,7 @@ def message_passing(
             yield iteration, trws_labels(unary, weights, messages, skew), proven
 
 
+@timed
 def icm(crf: PottsCRF, labels: Integer[np.ndarray, "H W"] | None = None, iterations: int = 100) -> MapResult:
     """Iterated conditional modes: change single pixels while that lowers the energy, from the unary one or `labels`.
 

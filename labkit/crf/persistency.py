@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from labkit.crf.cuts import Moves, trws_expansion
-from labkit.crf.energy import MapResult, PottsCRF
+from labkit.crf.energy import MapResult, PottsCRF, timed
 from labkit.crf.integers import pixel_numbers, quantise
 from labkit.crf.maxflow_kernels import SOURCE
 from labkit.crf.message_kernels import trws_bound
@@ -25,6 +25,7 @@ MANY_UNCERTAIN, MANY_LEFT = 0.3, 0.05
 NEAR = 10
 
 
+@timed
 def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -> MapResult:
     """Fix what is certain, label the rest by expansion moves, and let TRW-S prove how good that is (topic 02).
 

@@ -21,7 +21,7 @@ from jaxtyping import Float, UInt8
 import labkit
 from labkit.labels import TARGET
 from labkit.learning.channels import CHANNELS
-from labkit.learning.inference import THINGS, Engine, FunctionEngine, NetworkInput
+from labkit.learning.inference import THINGS, Engine, FunctionEngine, NetworkInput, check_class_count
 from labkit.learning.onnx_file import check_onnx, parsed
 from labkit.support.files import write_atomically
 from labkit.support.validation import check_rgb, check_shape, require
@@ -289,4 +289,5 @@ def labels_of_scores(scores: Float[np.ndarray, "1 C H W"]) -> UInt8[np.ndarray, 
     array([[1, 0]], dtype=uint8)
     """
     scores = check_shape("scores", scores, (1, None, None, None))
+    check_class_count("scores", scores.shape[1])
     return scores[0].argmax(axis=0).astype(np.uint8)

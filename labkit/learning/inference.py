@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
 from labkit.frame import RGBDFrame
+from labkit.labels import IGNORE
 from labkit.learning.channels import geometry_channels, mirrored
 from labkit.learning.view import CanonicalView, canonical_view
 from labkit.support.validation import check_finite, check_rgb, check_shape, require
@@ -155,7 +156,9 @@ class Engine(ABC):
         picture's own pixels.
         """
         view, arrays = self._seen(picture)
-        return self._back(view, self._outputs(arrays, mirror, self.classes))
+        z = self._outputs(arrays, mirror, self.classes)
+        check_class_count("model", len(z))
+        return self._back(view, z)
 
     def _seen(self, picture):
         """The canonical view of a picture, None if the network sees it as it is, and the arrays for the network."""
@@ -164,6 +167,7 @@ class Engine(ABC):
 
     def _probabilities(self, view, runs: Sequence[Float32[np.ndarray, "C h w"]]) -> Float32[np.ndarray, "H W C"]:
         """The class probabilities of one run, or the mean of two runs', at the picture's own pixels."""
+        check_class_count("model", len(runs[0]))
         p = _softmax(self._back(view, runs[0]))
         for z in runs[1:]:
             p = 0.5 * (p + _softmax(self._back(view, z)))
@@ -229,6 +233,11 @@ class FunctionEngine(Engine):
         return z.transpose(0, 3, 1, 2).astype(np.float32)
 
 
+def check_class_count(name: str, count: int) -> None:
+    """Raise a ValueError naming the argument unless labels of 8 bits can tell so many classes apart, 255 being none."""
+    require(name, 1 <= count <= IGNORE, f"1 to {IGNORE} classes", count)
+
+
 def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
     """Return what a model gave as an array (H, W, C) if these are probabilities of its classes at each pixel.
 
@@ -240,6 +249,7 @@ def check_probabilities(p, size: tuple[int, int]) -> Float[np.ndarray, "H W C"]:
     ValueError: probabilities: expected numbers in 0..1 that sum to 1 at each pixel, got 20 to 235; are they scores?
     """
     p = check_finite("probabilities", check_shape("probabilities", p, (*size, None)))
+    check_class_count("probabilities", p.shape[-1])
     low, high = p.min(), p.max()
     total = p @ np.ones(p.shape[-1], np.float32)  # several times as fast as p.sum(axis=-1)
     fits = low >= -1e-3 and high <= 1.001 and np.abs(total - 1.0).max() <= 0.01

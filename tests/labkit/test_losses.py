@@ -145,6 +145,24 @@ def test_low_precision_logits_are_reduced_in_float32_and_added_up_in_float64():
         assert loss.dtype == torch.float32 and loss.item() == pytest.approx(exact.item(), rel=3e-7)
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_the_training_loss_of_large_logits_is_right_or_refused_in_true_words(dtype):
+    """Their sum overflows, though each of them, and the loss, is a number."""
+    large = 2e38 if dtype == torch.float32 else 1e308
+    logits = torch.zeros((1, 2, 2, 3), dtype=dtype)
+    logits[:, 0] = large
+    right, wrong = torch.zeros((1, 2, 3), dtype=torch.int64), torch.full((1, 2, 3), 255)
+    wrong[0, 0, 0] = 1
+    assert losses.segmentation_loss(logits, right) == 0.0
+    assert losses.segmentation_loss(logits, wrong).item() == pytest.approx(large, rel=1e-6)
+    logits[:, 1] = -large
+    with pytest.raises(ValueError, match=rf"^logits: expected smaller ones, got up to {large:.3g}".replace("+", r"\+")):
+        losses.segmentation_loss(logits, wrong)
+    logits[0, 0, 0, 0] = torch.nan
+    with pytest.raises(ValueError, match=r"^logits: expected finite numbers, got 1 NaN or infinite"):
+        losses.segmentation_loss(logits, right)
+
+
 def test_a_batch_of_ignored_pixels_trains_nothing():
     logits, labels = batch(seed=8, share_ignored=1.0)
     logits.requires_grad_()

@@ -237,6 +237,17 @@ def test_reliability_counts_are_those_of_a_loop(bins):
     assert not metrics.reliability_counts(p[:0], true[:0]).any()
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("bins", [7, 10, 100, 1000])
+def test_a_probability_at_the_edge_of_two_bins_is_in_the_upper_one(bins, dtype):
+    """Also where p * bins is rounded down, as 0.29 * 100 is."""
+    edges = np.array([k / bins for k in range(bins + 1)], dtype)
+    counts = metrics.reliability_counts(edges, edges > 2.0, bins)[:, 0]
+    np.testing.assert_array_equal(counts, [1.0] * (bins - 1) + [2.0])
+    below = np.nextafter(edges[1:-1], dtype(0.0))
+    np.testing.assert_array_equal(metrics.reliability_counts(below, below > 2.0, bins)[:, 0], [1.0] * (bins - 1) + [0])
+
+
 # ---------------------------------------------------------------------------------------------------- what is refused
 
 ONE, Y = np.array([0, 1]), np.zeros((3, 4), int)
@@ -265,6 +276,7 @@ REFUSED = [  # the argument that the error names, the function, its arguments
     ("confidence", metrics.wilson_interval, (5, 10, 95)),
     ("p", metrics.reliability_counts, (2.0 * np.eye(2), np.eye(2) > 0)),
     ("true", metrics.reliability_counts, (np.eye(2), np.array([False]))),
+    *(("bins", metrics.reliability_counts, (np.eye(2), np.eye(2) > 0, bins)) for bins in (0, -1, 2.5)),
 ]
 
 

@@ -1,6 +1,7 @@
 """The chain from frame to grasps, judged by the simulator's own poses."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from torch import nn
 from labkit.frame import RGBDFrame
 from labkit.grasp import GraspPlan, Gripper
 from labkit.labels import IGNORE, OBSTACLE, SURFACE, TARGET, one_hot
-from labkit.learning.engines import open_engine
+from labkit.learning.engines import labels_of_scores, open_engine
 from labkit.learning.network import SmallSegNet, UNetRGBD
 from labkit.pipeline import (
     Pipeline,
@@ -239,6 +240,41 @@ def test_each_object_of_a_function_of_a_frame_is_a_target(frame):
     assert {grasp.target for grasp in p.plan.grasps} <= {0, 1, 2}
     q = Pipeline().locate(frame, p.labels, instances=frame.instances)
     assert [len(cloud) for cloud in q.clouds] == [len(cloud) for cloud in p.clouds]
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("number", "certainty", "got"),
+    [(7, [0.9], "got 1"), (1, [0.9, 0.8], "got 2"), (1, [], "got 0"), (1, 0.9, "shape"), (1, [90.0], "0..1")],
+)
+def test_a_function_that_is_sure_of_other_objects_than_it_found_is_refused(number, certainty, got, frame):
+    """Each number up to the largest has a certainty; one more or less would be another object's."""
+    found = SimpleNamespace(instances=number * (frame.instances == 1), certainty=certainty)
+    pipeline = Pipeline(find_objects=lambda f: found)
+    for at in (None, np.argwhere(frame.instances == 1)[0, ::-1]):
+        with pytest.raises(ValueError, match=rf"^certainty: expected .*{got}"):
+            pipeline.run(frame, at=at)
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("classes", [0, 256])
+def test_a_model_of_more_or_fewer_classes_than_labels_have_numbers_is_refused(classes, frame):
+    """At 256 the last one would be taken for "ignore", and beyond for the first ones."""
+
+    class Network(nn.Module):
+        def forward(self, x):
+            return torch.zeros(len(x), classes, *x.shape[2:])
+
+    says = rf"^(model|probabilities): expected 1 to 255 classes, got {classes}$"
+    for model in (Network(), lambda rgb: np.full((*rgb.shape[:2], classes), 1.0 / max(classes, 1))):
+        with pytest.raises(ValueError, match=says):
+            Pipeline(model, target_class=0).run(frame)
+        with pytest.raises(ValueError, match=says):
+            segment_rgb_image(model, frame.rgb)
+    with pytest.raises(ValueError, match=r"^model: expected 1 to 255 classes"):
+        open_engine(Network()).logits(frame)
+    with pytest.raises(ValueError, match=r"^scores: expected 1 to 255 classes"):
+        labels_of_scores(np.zeros((1, classes, 2, 3), np.float32))
 
 
 @pytest.mark.bad_input

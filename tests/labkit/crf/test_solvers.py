@@ -1,5 +1,6 @@
 """Every solver against brute force, one another, scipy's maximum flow, and attempts to refute its lower bound."""
 
+import time
 from itertools import product
 
 import numpy as np
@@ -139,6 +140,16 @@ def test_flow_through_small_grids_with_many_ties_equals_scipys(shape, seed, top)
         p, _ = pair_slices(offset)
         weights[d][p] = rng.integers(0, top + 1, weights[d][p].shape)
     assert grid_max_flow(excess, weights, offsets)[0] == scipy_flow(excess, weights, offsets)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_says_its_seconds_whoever_calls_it(method):
+    crf = noisy_image(0, 3, 4, 2, 1.0, 0.5)
+    start = time.perf_counter()
+    own, by_name = METHODS[method](crf), solve(crf, method)
+    assert own.seconds > 0.0 and by_name.seconds > 0.0
+    assert own.seconds + by_name.seconds < time.perf_counter() - start
+    assert np.array_equal(own.labels, by_name.labels)
 
 
 def test_gap_is_relative_and_infinite_without_proof():
