@@ -7,6 +7,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,9 @@ from labkit.support.images import check_pixels, image_size
 from labkit.support.validation import require
 
 MOST_BYTES = 1 << 30
+BARE = (".raw", ".depth")  # of librealsense's viewer, and within an .r3d
+SMALL = 1 << 16  # bytes of a camera's matrix and lens, and more
+UNREADABLE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError)
 EXR = 'EXR is read by the package OpenEXR (pip install "labkit-manipulation[exr]"); or save depth as TIFF or NPY'
 
 
@@ -35,6 +39,8 @@ def open_array(name: str, path) -> ArrayFile:
     Raises FileNotFoundError, or ValueError for a damaged file or one that claims more than a camera's picture.
     """
     path = Path(path)
+    known = path.suffix.lower() not in BARE
+    require(name, known, "16-bit PNG, TIFF, PFM, NPY, NPZ or EXR", f"{path}, which says no size and no type of number")
     require(name, path.stat().st_size <= MOST_BYTES, f"a file of at most {MOST_BYTES >> 20} MiB", path)
     data = path.read_bytes()
     for magic, read in FORMATS.items():
@@ -50,6 +56,24 @@ def read_npy(name: str, data: bytes, path) -> Real[np.ndarray, "..."]:
     whole = len(data) - start >= count * dtype.itemsize
     require(name, whole, f"{count} numbers in {path}", "fewer: is it cut short?")
     return np.frombuffer(data, dtype, count, start).reshape(shape, order=order)
+
+
+def read_npz(name: str, path) -> dict[str, Real[np.ndarray, "..."]]:
+    """The small arrays of numbers of an NPZ file by name, as cv2.calibrateCamera's results are kept."""
+    data = Path(path).read_bytes()
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            small = [
+                info for info in archive.infolist()[:100] if info.file_size <= SMALL and info.filename[-4:] == ".npy"
+            ]
+            members = {info.filename[:-4]: archive.read(info) for info in small}
+    except UNREADABLE as error:
+        raise ValueError(f"{name}: {path} is not an NPZ that can be read: {error}") from None
+    found = {}
+    for member, content in members.items():
+        with suppress(ValueError):  # arrays of objects stand beside those of numbers
+            found[member] = read_npy(name, content, path)
+    return found
 
 
 def _npy_header(name: str, data: bytes, path) -> tuple[np.dtype, str, tuple[int, ...], int]:
@@ -95,7 +119,7 @@ def _of_npz(name: str, data: bytes, path) -> ArrayFile:
             require(name, chosen.file_size <= MOST_BYTES, f"at most {MOST_BYTES >> 20} MiB", chosen.file_size)
             with archive.open(chosen) as member:
                 return _of_npy(name, member.read(chosen.file_size), path)
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError) as error:
+    except UNREADABLE as error:
         raise ValueError(f"{name}: {path} is not an NPZ that can be read: {error}") from None
 
 

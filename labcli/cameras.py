@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Shaped
 
-from labcli.arrays import read_npy
+from labcli.arrays import read_npy, read_npz
 from labcli.camera_formats import Intrinsics, camera_of, matrix_of
 from labcli.documents import numbers_of, parsed, text_of
-from labkit.geometry.lens import rectified
+from labcli.realsense import CSV, WITHOUT, cameras_printed
+from labkit.geometry.lens import Lens, rectified
 from labkit.support.validation import require
 
 FOUND_NONE = (
@@ -50,15 +51,34 @@ def read_intrinsics(text: str, picture=None, name: str | None = None) -> Intrins
         raise ValueError(f"{error}, in {path}") from None
 
 
+def with_lens(numbers: list[float]) -> Intrinsics:
+    """The camera of fx, fy, cx, cy and what TUM's data sets write behind them: k1, k2, p1, p2, k3.
+
+    >>> with_lens([517.3, 516.5, 318.6, 255.3, 0.26, -0.95, -0.005, 0.003, 1.16]).distortion
+    (0.26, -0.95, -0.005, 0.003, 1.16)
+    """
+    said = "intrinsics: the numbers behind fx fy cx cy are taken for the lens's k1 k2 p1 p2 k3"
+    return Intrinsics(matrix_of(numbers[:4]), lens=Lens(tuple(numbers[4:]), "brown_conrady"), said=(said,))
+
+
 @lru_cache(maxsize=4)  # a folder of pictures asks for each
 def _cameras(path: Path, changed: int) -> dict[str, Intrinsics | ValueError]:
     """All cameras that a file tells of, by name; one that cannot be followed is its ValueError."""
     if path.suffix == ".npy":
         K = matrix_of(read_npy("intrinsics", path.read_bytes(), path).ravel()[:16].tolist())
         return {} if K is None else {"": Intrinsics(K)}
+    if path.suffix == ".npz":
+        return dict(_found({name: array.tolist() for name, array in read_npz("intrinsics", path).items()}, {}, ""))
     content = text_of("intrinsics", path)
-    if (K := matrix_of(numbers_of(content))) is not None:
+    numbers = numbers_of(content)
+    if len(numbers) in (8, 9) and numbers[2] and numbers[3]:  # a matrix of nine has a 0 in one of these places
+        return {"": with_lens(numbers)}
+    if (K := matrix_of(numbers)) is not None:
         return {"": Intrinsics(K, same_view=path.name == "camera_matrix.csv")}  # Stray Scanner's
+    if printed := cameras_printed(content):
+        said = (WITHOUT,) if content.startswith(CSV) else ()
+        found = dict(_found(printed.get("", printed), {}, ""))
+        return {name: replace(c, said=said) if isinstance(c, Intrinsics) else c for name, c in found.items()}
     lines = COLMAP_LINE.findall(content) if not content.lstrip().startswith(("{", "[")) else []
     if lines:
         facts = {

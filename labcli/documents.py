@@ -21,6 +21,24 @@ DEEPEST = 20  # of what is nested in a file
 OPENCV = re.compile(r"^%YAML:1\.0")  # what OpenCV writes and YAML does not know
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
+ROS2_BAG = (
+    "a recording of ROS 2; play it, and `ros2 topic echo --once TOPIC > camera.yaml` writes a CameraInfo down, or "
+    "answer it whole with `labkit node bag`"
+)
+NO_TEXT = {  # what a file begins with, and what it is
+    b"PK\x03\x04": "an archive, as Record3D's .r3d is: unpack it, and name the file in it",
+    b"#ROSBAG V2.0": (
+        "a recording of ROS 1; `rostopic echo -b BAG -n 1 TOPIC > camera.yaml` writes a CameraInfo down, or answer it "
+        "whole with `labkit node bag`"
+    ),
+    b"SQLite format 3": ROS2_BAG,
+    b"\x89MCAP": ROS2_BAG,
+    b"\x89PNG": "a picture",
+    b"\xff\xd8\xff": "a picture",
+    b"%PDF": "a PDF",
+    b"%time,field": "what `rostopic echo -p` prints: leave -p out",
+}
+
 
 def numbers_of(text: str) -> list[float]:
     """The numbers of a text that holds nothing else but brackets and lines that begin with #; none if it does.
@@ -38,6 +56,10 @@ def numbers_of(text: str) -> list[float]:
 def text_of(name: str, path) -> str:
     """The text of a small file; `name` is the argument that the errors speak of, FileNotFoundError or ValueError."""
     path = Path(path)
+    with path.open("rb") as file:
+        begins = file.read(16)
+    for magic, what in NO_TEXT.items():
+        require(name, not begins.startswith(magic), f"a text in {path}", what)
     require(name, path.stat().st_size <= max(MOST_BYTES.values()), "a small file", f"{path.stat().st_size} bytes")
     return path.read_text(encoding="utf-8-sig", errors="replace")
 

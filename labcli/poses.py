@@ -124,6 +124,13 @@ def _of_facts(facts, way: str, picture: str | None) -> Pose | None:
     if "t_00" in facts:  # Polycam's
         pose = _pose([_number(facts.get(f"t_{row}{column}")) for row in range(3) for column in range(4)], way)
         return Pose(Z_UP @ pose.T @ FROM_OPENGL, "T_base_cam", (OPENGL, *pose.said))
+    if "cam_R_w2c" in facts:  # BOP's, whose world the base frame is then; millimetres
+        R, t = np.reshape(_numbers(facts["cam_R_w2c"]), (3, 3)), np.array(_numbers(facts.get("cam_t_w2c")))
+        return _pose(np.column_stack([R, 0.001 * t]).ravel().tolist(), "T_cam_base")
+    if facts and all(name.isdigit() for name in facts) and picture is not None:  # a frame each
+        own = next((value for name, value in facts.items() if picture.isdigit() and int(name) == int(picture)), None)
+        require("camera_pose", own is not None, f"a frame of the picture {picture!r}", ", ".join(list(facts)[:8]))
+        return _of_facts(own, way, None)
     for place, turn in (("position", "orientation"), ("translation", "rotation")):
         if isinstance(facts.get(place), dict) and isinstance(facts.get(turn), dict):
             numbers = [_number(facts[place].get(axis)) for axis in "xyz"]

@@ -113,6 +113,35 @@ POLYCAM |= {f"t_{row}{column}": float(row == column) for row in range(3) for col
 ORB_SLAM = "%YAML:1.0\nCamera.fx: 600.0\nCamera.fy: 601.0\nCamera.cx: 320.0\nCamera.cy: 240.0\nCamera.k1: 0.1\n"
 ORB_SLAM += "Camera.k2: -0.2\nCamera.p1: 0.001\nCamera.p2: 0.002\nCamera.width: 640\nCamera.height: 480\n"
 ORB_SLAM += "DepthMapFactor: 5000.0\n"
+REALSENSE = """ Intrinsic of "Color" / 640x480 / {YUYV/RGB8/BGR8/RGBA8/BGRA8/Y8/Y16}
+  Width:      \t640
+  Height:     \t480
+  PPX:        \t320
+  PPY:        \t240
+  Fx:         \t600
+  Fy:         \t601
+  Distortion: \tBrown Conrady
+  Coeffs:     \t0.1  \t-0.2  \t0.001  \t0.002  \t0
+  FOV (deg):  \t56.14 x 43.53
+
+"""
+VIEWER = """Frame Info:
+Type,Color
+Format,RGB8
+Frame Number,139
+Timestamp (ms),1650000000.00
+Resolution x,640
+Resolution y,480
+Bytes per pixel,3
+
+Intrinsic:,
+Fx,600.000000
+Fy,601.000000
+PPx,320.000000
+PPy,240.000000
+Distorsion,Inverse Brown Conrady
+"""
+PYREALSENSE = "[ 640x480  p[320 240]  f[600 601]  Brown Conrady [0.1 -0.2 0.001 0.002 0] ]\n"
 LENS, SIZE = (0.1, -0.2, 0.001, 0.002), (640, 480)
 PLAIN = {"fx": 600, "fy": 601, "cx": 320, "cy": 240}
 
@@ -133,6 +162,15 @@ FILES = {  # name of the file, its content, size, lens
     "Polycam": ("1700.json", json.dumps(POLYCAM), SIZE, ()),
     "Record3D": ("metadata", json.dumps({"K": [600, 0, 0, 0, 601, 0, 320, 240, 1], "w": 640, "h": 480}), SIZE, ()),
     "Stray Scanner": ("camera_matrix.csv", "600.0,0.0,320.0\n0.0,601.0,240.0\n0.0,0.0,1.0\n", None, ()),
+    "rs-enumerate-devices -c": ("d455.txt", REALSENSE, SIZE, LENS),
+    "realsense-viewer": ("1_Color_metadata.csv", VIEWER, SIZE, ()),
+    "print of pyrealsense2": ("intrinsics.txt", PYREALSENSE, SIZE, LENS),
+    "TUM's nine numbers": (
+        "freiburg1.txt",
+        "# fx fy cx cy d0 ...\n600 601 320 240 0.1 -0.2 0.001 0.002 0\n",
+        None,
+        LENS,
+    ),
     "ORB-SLAM": ("TUM.yaml", ORB_SLAM, SIZE, LENS),
     "lists of lists": ("K.json", json.dumps({"K": K, "dist": LENS, "image_size": SIZE}), SIZE, LENS),
     "cam_K as three lists": ("bop.json", json.dumps({"cam_K": K, "depth_scale": 0.1}), None, ()),

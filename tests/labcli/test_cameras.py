@@ -5,11 +5,12 @@ import time
 
 import numpy as np
 import pytest
-from camera_files import FILES, FLAT, KALIBR, NERF, PLAIN, ROS2, K
+from camera_files import FILES, FLAT, KALIBR, NERF, PLAIN, REALSENSE, ROS2, VIEWER, K
 
 from labcli import cameras
 from labcli.camera_formats import READERS
 from labcli.cameras import read_intrinsics
+from labcli.poses import read_pose
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -49,6 +50,51 @@ OPEN3D = "open3d.json", json.dumps({"width": 640, "height": 480, "intrinsic_matr
 def test_a_matrix_may_be_an_npy_and_words(tmp_path):
     np.save(tmp_path / "K.npy", np.array(K))
     assert read_intrinsics(str(tmp_path / "K.npy")).K.tolist() == read_intrinsics(str(np.array(K))).K.tolist() == K
+
+
+def test_what_opencvs_calibration_gave_may_be_kept_in_an_npz(tmp_path):
+    """As the tutorial keeps it, with arrays of other kinds beside it."""
+    others = {"rvecs": np.array([None, "x"], object), "tvecs": np.zeros((2, 3, 1))}
+    np.savez(tmp_path / "B.npz", mtx=np.array(K), dist=np.array([[0.1, -0.2, 0.001, 0.002, 0.0]]), **others)
+    found = read_intrinsics(str(tmp_path / "B.npz"))
+    assert found.K.tolist() == K and found.distortion == (0.1, -0.2, 0.001, 0.002, 0.0)
+    np.savez(tmp_path / "depth.npz", depth=np.ones((480, 640)))
+    with pytest.raises(ValueError, match=r"intrinsics: found no camera matrix in .*depth\.npz"):
+        read_intrinsics(str(tmp_path / "depth.npz"))
+
+
+def test_of_a_camera_that_prints_all_its_sizes_the_named_one_is_taken(tmp_path):
+    large = REALSENSE.replace("640", "1280").replace("480", "960").replace('"Color"', '"Depth"')
+    small = REALSENSE.replace("640", "320").replace("480", "240")
+    (tmp_path / "d455.txt").write_text(large + small + REALSENSE)
+    with pytest.raises(ValueError, match="got Depth 1280x960, Color 320x240, Color 640x480; --camera-name says which"):
+        read_intrinsics(str(tmp_path / "d455.txt"))
+    assert read_intrinsics(str(tmp_path / "d455.txt"), name="color 640x480").size == (640, 480)
+
+
+def test_a_lens_that_the_viewer_leaves_out_is_said(tmp_path):
+    (tmp_path / "a_metadata.csv").write_text(VIEWER)
+    assert "no coefficients of the lens" in read_intrinsics(str(tmp_path / "a_metadata.csv")).said[0]
+
+
+@pytest.mark.parametrize(
+    "begins, says",
+    [
+        (b"PK\x03\x04", "an archive, as Record3D's .r3d is: unpack it"),
+        (b"#ROSBAG V2.0\n", "a recording of ROS 1; `rostopic echo -b"),
+        (b"SQLite format 3\0", "a recording of ROS 2"),
+        (b"\x89MCAP0\r\n", "a recording of ROS 2"),
+        (b"\x89PNG\r\n", "a picture"),
+        (b"%time,field.header.seq,", "what `rostopic echo -p` prints: leave -p out"),
+    ],
+)
+@pytest.mark.parametrize("read", [read_intrinsics, read_pose])
+def test_a_file_that_is_no_text_says_what_it_is_whatever_its_size(begins, says, read, tmp_path):
+    with (tmp_path / "capture").open("wb") as file:
+        file.write(begins)
+        file.truncate(1 << 33)
+    with pytest.raises(ValueError, match=f"expected a text in .*capture, got {says}"):
+        read(str(tmp_path / "capture"))
 
 
 def test_an_angle_of_view_is_a_focal_length(tmp_path):

@@ -14,6 +14,7 @@ from scenes import png_that_claims
 from typer.testing import CliRunner
 
 from labcli import evaluate_folder
+from labcli.arrays import open_array
 from labcli.cameras import read_intrinsics
 from labcli.cli import app
 from labcli.own_data import PictureFolder
@@ -471,3 +472,10 @@ def test_with_depth_of_a_phones_size_as_many_things_are_found_in_photographs(tmp
         found[name] = scores.over_half
     print(found)
     assert found["a phone's"] >= found["as it is"]
+
+
+@pytest.mark.parametrize("name", ["1_Depth.raw", "0.depth"])
+def test_bare_numbers_are_refused_with_what_to_save(name, tmp_path):
+    (tmp_path / name).write_bytes(bytes(640 * 480 * 2))
+    with pytest.raises(ValueError, match=rf"^depth: expected 16-bit PNG, TIFF, .* got .*{name}, which says no size"):
+        open_array("depth", tmp_path / name)

@@ -62,6 +62,18 @@ def test_poses_are_read_from_files(kind, tmp_path):
     assert any("OpenGL's axes" in sentence for sentence in said) == (kind == "NeRF")
 
 
+def test_a_bop_frame_has_its_own_pose_in_millimetres(tmp_path):
+    """The kit's own data sets are written so, too, and their world is the robot's base."""
+    T_cam_world = invert_transform(T)
+    ours = {"cam_R_w2c": T_cam_world[:3, :3].ravel().tolist(), "cam_t_w2c": (1000.0 * T_cam_world[:3, 3]).tolist()}
+    other = {"cam_R_w2c": np.eye(3).ravel().tolist(), "cam_t_w2c": [0.0, 0.0, 800.0]}
+    facts = {str(i): {"cam_K": K.ravel().tolist(), **pose} for i, pose in enumerate((other, ours))}
+    (tmp_path / "scene_camera.json").write_text(json.dumps(facts))
+    assert np.allclose(read_pose(str(tmp_path / "scene_camera.json"), "rgb/000001.png").in_base()[0], T)
+    with pytest.raises(ValueError, match=r"^camera_pose: expected a frame of the picture '000007', got 0, 1"):
+        read_pose(str(tmp_path / "scene_camera.json"), "rgb/000007.png")
+
+
 def test_polycams_world_has_y_up(tmp_path):
     """Its camera looks along -z of its own, with y up; the base frame has z up, and x is x."""
     z_up = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
