@@ -4,7 +4,7 @@
     OUT/scene_camera.json   cam_K, cam_R_w2c, cam_t_w2c (millimetres), depth_scale (millimetres for one unit of depth),
                             table_z (the kit's own: height of the table in the world frame, millimetres)
     OUT/scene_gt.json       for each object cam_R_m2c, cam_t_m2c (millimetres), obj_id, and its name, family and class
-    OUT/dataset.json        generator version, config, seeds, size, classes, families, and the SHA-256 of every image
+    OUT/dataset.json        generator version, config, camera, seeds, size, classes, families, every image's SHA-256
 
 World frame = robot base. Lengths are millimetres in BOP's files alone. `dataset.json` comes last: with it, a dataset
 is complete.
@@ -21,9 +21,11 @@ import cv2
 import numpy as np
 from tqdm.auto import tqdm
 
+from data_gen.cameras import Ranges, check_camera
 from data_gen.families import FAMILIES
 from data_gen.scenes import CONFIGS, sample_scene
 from labkit.frame import RGBDFrame
+from labkit.geometry.depth_units import whole_units
 from labkit.geometry.sensor import DepthSensor
 from labkit.labels import CLASSES
 from labkit.sim.spec import SceneSpec
@@ -61,17 +63,18 @@ def generate(
     executor: Executor | None = None,
     sensor: DepthSensor | None = None,
     progress: bool = True,
+    camera: Ranges | None = None,
 ) -> "Dataset":
     """Write one frame per seed to the folder `out` and return the dataset.
 
     executor: any concurrent.futures.Executor, None for this process. sensor: how depth is spoilt, None for exact depth.
-    Frames that an interrupted run left are kept, and the result is the same bytes. Raises ValueError if `out` holds
-    another dataset, and OSError naming the file if it cannot be written.
+    camera: as for `sample_scene`. Frames that an interrupted run left are kept, and the result is the same bytes.
+    Raises ValueError if `out` holds another dataset, and OSError naming the file if it cannot be written.
     """
     out, seeds = Path(out), [int(seed) for seed in seeds]
     if not seeds:
         raise ValueError("seeds: expected at least one")
-    request = _request(seeds, config, size, sensor)
+    request = _request(seeds, config, size, sensor, camera)
     unfinished = out / ".unfinished"
     if (out / "dataset.json").exists():
         _check_same(out, request, read_description(out))
@@ -85,7 +88,7 @@ def generate(
 
     missing = [i for i in range(len(seeds)) if not (unfinished / f"{i:06d}.json").exists()]
     bar = tqdm(total=len(seeds), initial=len(seeds) - len(missing), unit="scene", disable=not progress)
-    jobs = ((str(out), i, seeds[i], config, tuple(size), sensor) for i in missing)
+    jobs = ((str(out), i, seeds[i], config, tuple(size), sensor, camera) for i in missing)
     with bar:
         for _ in as_they_come(write_frame, jobs, executor):
             bar.update()
@@ -93,8 +96,8 @@ def generate(
     return Dataset(out)
 
 
-def _request(seeds, config, size, sensor) -> dict:
-    """What makes a dataset the one that was asked for."""
+def _request(seeds, config, size, sensor, camera) -> dict:
+    """What makes a dataset the one that was asked for; what an older one does not name was None."""
     width, height = size
     require("config", config in CONFIGS, f"one of {sorted(CONFIGS)}", repr(config))
     require("size", min(width, height) >= 1, "width and height of at least 1", size)
@@ -104,6 +107,7 @@ def _request(seeds, config, size, sensor) -> dict:
         "seeds": seeds,
         "size": [int(width), int(height)],
         "sensor": None if sensor is None else vars(sensor),
+        "camera": check_camera(camera) or None,
         "classes": list(CLASSES),
         "families": FAMILY_NUMBER,
     }
@@ -117,10 +121,10 @@ def _check_same(out: Path, request: dict, found: dict) -> None:
         )
 
 
-def write_frame(out: str, index: int, seed: int, config: str, size, sensor: DepthSensor | None) -> None:
+def write_frame(out: str, index: int, seed: int, config: str, size, sensor: DepthSensor | None, camera=None) -> None:
     """Render one frame and write its images, then the note that says they are all there."""
     out = Path(out)
-    spec = sample_scene(seed, config)
+    spec = sample_scene(seed, config, camera)
     with World(spec) as world:
         frame = picture_of(world, size)
         poses = world.poses()
@@ -128,7 +132,7 @@ def write_frame(out: str, index: int, seed: int, config: str, size, sensor: Dept
         frame = sensor.apply(frame, np.random.default_rng([seed, 1]))
     images = {
         "rgb": cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR),
-        "depth": np.round(frame.depth * (1000.0 / DEPTH_UNIT_MM)).astype(np.uint16),
+        "depth": whole_units(frame.depth, 0.001 * DEPTH_UNIT_MM),
         "labels": frame.labels,
         "instances": frame.instances,
     }

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from data_gen import clutter
+from data_gen.cameras import Ranges, with_camera
 from data_gen.families import FAMILIES, quaternion
 from data_gen.wide import WIDE
 from labkit.labels import OBSTACLE, TARGET
@@ -112,15 +113,11 @@ CONFIGS = {
     ),
 }
 
-
-# Ranges in place of every config's own, metres and degrees: empty, but in a notebook whose course has another camera
-# (`labcourse.camera`).
-HELD: dict[str, tuple[float, float]] = {}
 MOST_TRIES = 10_000  # to find a camera that sees all targets
 
 
-def sample_scene(seed: int, config: str = "train") -> SceneSpec:
-    """Draw a scene; the same seed and config give the same scene.
+def sample_scene(seed: int, config: str = "train", camera: Ranges | None = None) -> SceneSpec:
+    """Draw a scene; the same seed, config and camera give the same scene.
 
     config: "train", "test" (the same distribution, other scenes), "hard" (shapes, textures and viewpoints that are not
     in train), "wide" (more proportions, viewpoints and clutter than train, none of them hard's: training data), "any"
@@ -128,7 +125,9 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     as another camera sees them: from overhead, wide-angled, drawn by another renderer, with depth of a stereo pair),
     "clutter" (1 to 20 things from a marker to a jug, in heaps or loosely, on tables that end in view, beside shelves,
     with the arm in the picture: training data), "bin" (such things in a bin) or "messy" (both, before more kinds of
-    bins and furniture: training data). Raises ValueError for a negative seed or an unknown config.
+    bins and furniture: training data). camera: ranges in place of the config's own, metres and degrees, as
+    `data_gen.cameras.check_camera` says: the things of the scene stay. Raises ValueError for a negative seed, an
+    unknown config, or a camera that makes no sense or sees no target.
 
     >>> spec = sample_scene(7, "test")
     >>> spec == sample_scene(7, "test"), spec.class_counts()["target"] in (1, 2, 3)
@@ -136,7 +135,7 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
     """
     require("config", config in CONFIGS, f"one of {sorted(CONFIGS)}", repr(config))
     require("seed", isinstance(seed, (int, np.integer)) and seed >= 0, "an integer of at least 0", repr(seed))
-    kind = _as_held(CONFIGS[config])
+    kind = with_camera(CONFIGS[config], camera)
     rng = np.random.default_rng([kind.stream, int(seed)])
     if kind.crowd:
         return _crowded(rng, kind, int(seed), config)
@@ -153,16 +152,6 @@ def sample_scene(seed: int, config: str = "train") -> SceneSpec:
         seed=int(seed),
         config=config,
     )
-
-
-def _as_held(kind: SceneConfig) -> SceneConfig:
-    """A config with the ranges of HELD."""
-    ranges = {key: tuple(np.radians(ends)) for key, ends in HELD.items() if key != "distance"}
-    changed = {"distance": HELD["distance"]} if "distance" in HELD else {}
-    changed |= {"elevations": (ranges["elevation"],)} if "elevation" in ranges else {}
-    changed |= {"roll": ranges["roll"][1]} if "roll" in ranges else {}
-    changed |= {"fov_y": ranges["fov_y"]} if "fov_y" in ranges else {}
-    return replace(kind, **changed) if changed else kind
 
 
 def _crowded(rng: np.random.Generator, kind: SceneConfig, seed: int, config: str) -> SceneSpec:
@@ -295,7 +284,8 @@ def _camera(rng: np.random.Generator, kind: SceneConfig, azimuth: float, targets
         u, v = pixels[:, 0] / pixels[:, 2], pixels[:, 1] / pixels[:, 2]
         if (P_cam[:, 2] > 0.3).all() and (abs(u - 160) < 136).all() and (abs(v - 120) < 100).all():
             return camera
-    raise ValueError(f"camera: expected one that sees all targets, found none with {HELD or kind}: a larger distance?")
+    low, high = kind.distance
+    raise ValueError(f"camera: expected one that sees all targets, found none at {low:g} to {high:g} m: further away?")
 
 
 def _objects(rng, kind: SceneConfig, table: Table, azimuth: float) -> tuple[ObjectSpec, ...]:

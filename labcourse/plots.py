@@ -9,13 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from labcourse import camera
 from labkit.labels import CLASSES, IGNORE, PALETTE
 
 
 def style() -> None:
-    """Set a notebook up: small pictures, a font that is read beside text, and the course's camera, if it has one."""
-    camera.hold()
+    """Set a notebook up: small pictures, and a font that is read beside text."""
     plt.rcParams.update(
         {
             "figure.dpi": 80,

@@ -123,6 +123,39 @@ def test_no_folder_is_longer_than_a_page():
     ]
 
 
+CHANGES = {"add", "append", "clear", "discard", "extend", "insert", "pop", "popitem", "remove", "setdefault", "update"}
+
+
+def changed_globals(path: Path) -> set[str]:
+    """Names in capitals, a module's own or another's, whose values a function of the file changes, and `global`s."""
+    found = set()
+    for function in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)):
+        for node in ast.walk(function):
+            changed = []
+            if isinstance(node, ast.Global):
+                found |= set(node.names)
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in CHANGES:
+                changed = [node.func.value]
+            elif isinstance(node, ast.Assign | ast.AugAssign | ast.Delete):
+                targets = [node.target] if isinstance(node, ast.AugAssign) else node.targets
+                changed = [target.value for target in targets if isinstance(target, ast.Subscript)]
+                changed += [target for target in targets if isinstance(target, ast.Attribute)]
+            names = [ast.unparse(value).rpartition(".")[2] for value in changed]
+            found |= {name for name in names if name.isupper() and len(name) > 1}
+    return found
+
+
+def test_no_function_of_the_library_changes_a_global():
+    """The same arguments would give other results later, or in another process."""
+    rooms = ("labkit", "labtrain", "labros", "data_gen", "labcourse", "labcli")
+    found = {
+        str(path.relative_to(ROOT)): names
+        for path in tracked(*(f"{room}/*.py" for room in rooms))
+        if (names := changed_globals(path))
+    }
+    assert found == {"labkit/support/compiled.py": {"KERNELS"}}  # which kernels are loaded: no result hangs on it
+
+
 def test_what_judges_and_grades_knows_no_course():
     """Not even in words: another course must not read of this one's tasks."""
     said = [

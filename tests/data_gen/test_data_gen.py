@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import runpy
+import shutil
 import subprocess
 import sys
 import time
@@ -30,6 +31,7 @@ from labkit.sim.shapes import object_mesh
 from labkit.sim.spec import Camera, SceneSpec, Table
 from labkit.sim.world import World
 from labkit.support.files import write_atomically
+from labtrain.executors import executor_for
 
 SIZE = (80, 60)
 OVERHEAD = Camera.looking_at((0.55, 0.0, 0.0), 0.9, 0.3, 1.5)
@@ -304,6 +306,38 @@ def test_depth_noise_is_off_unless_asked_for_and_spoils_depth_alone(tmp_path):
     assert (noisy.depth == 0).sum() > (exact.depth == 0).sum()
 
 
+def distances(folder: Path) -> list[float]:
+    """From each frame's camera to the mean place of its targets, metres."""
+    frames = data_gen.load(folder)
+    targets = [[thing["cam_t_m2c"] for thing in frames.objects(i) if thing["class"] == "target"] for i in range(4)]
+    return [float(np.linalg.norm(np.mean(places, axis=0))) / 1000.0 for places in targets]
+
+
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_a_camera_of_ones_own_holds_in_every_process_and_is_part_of_the_request(workers, tmp_path):
+    """A far camera stands far away in each worker, too, and no later call takes its frames for those of another."""
+    far, out, how = {"distance": (2.0, 2.1)}, tmp_path / "far", {"size": SIZE, "progress": False}
+    with executor_for(workers) as executor:
+        data_gen.generate(out, range(4), "test", executor=executor, camera=far, **how)
+    assert all(1.8 < distance < 2.3 for distance in distances(out))
+    before = digest(out)
+    for camera in (None, {"distance": (2.0, 2.2)}, {**far, "roll": 5}):
+        with pytest.raises(ValueError, match=r"^out: .*other camera"):
+            data_gen.generate(out, range(4), "test", camera=camera, **how)
+    data_gen.generate(out, range(4), "test", camera={"distance": [2, 2.1]}, **how)  # the same in other words
+    assert digest(out) == before
+
+
+def test_a_dataset_from_before_cameras_were_named_is_still_the_one_asked_for(undisturbed, tmp_path):
+    old = json.loads((undisturbed / "dataset.json").read_text())
+    assert old.pop("camera") is None
+    shutil.copytree(undisturbed, tmp_path / "old")
+    (tmp_path / "old/dataset.json").write_text(json.dumps(old))
+    assert len(data_gen.generate(tmp_path / "old", range(6), "test", SIZE, progress=False)) == 6
+    with pytest.raises(ValueError, match=r"^out: .*other camera"):
+        data_gen.generate(tmp_path / "old", range(6), "test", SIZE, progress=False, camera={"distance": 1.0})
+
+
 # Bad input ----------------------------------------------------------------------------------------------------------
 
 
@@ -316,6 +350,7 @@ def test_depth_noise_is_off_unless_asked_for_and_spoils_depth_alone(tmp_path):
         (lambda out: data_gen.generate(out, [], "test"), "seeds"),
         (lambda out: data_gen.generate(out, [0], "easy"), "config"),
         (lambda out: data_gen.generate(out, [0], "test", (0, 10)), "size"),
+        (lambda out: data_gen.generate(out, [0], "test", camera={"distance": 0.1}), "camera: distance"),
     ],
 )
 def test_wrong_arguments_are_named_and_nothing_is_written(call, name, tmp_path):

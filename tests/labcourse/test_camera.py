@@ -1,4 +1,4 @@
-"""A course's own camera: in force where a notebook says `style()`, nowhere else, and refused if it makes no sense."""
+"""A course's own camera: every scene of a notebook has it, nothing else does, and nonsense is refused."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,13 @@ import pytest
 import data_gen
 from data_gen import scenes
 from labcourse import camera
+from tests import notebooks
 
 
 @pytest.fixture(autouse=True)
-def nothing_held(monkeypatch):
-    monkeypatch.setattr(scenes, "HELD", {})
+def nothing_set(monkeypatch, tmp_path):
     monkeypatch.delenv(camera.NAMED, raising=False)
+    monkeypatch.chdir(tmp_path)
 
 
 def elevation(spec) -> float:
@@ -19,23 +20,33 @@ def elevation(spec) -> float:
     return float(np.degrees(np.arcsin(-spec.camera.T_base_cam[2][2])))
 
 
-def test_the_setting_holds_for_scenes_drawn_after_it_and_keeps_their_things(tmp_path, monkeypatch):
-    before = data_gen.sample_scene(600_002, "test")
+def test_the_setting_turns_the_camera_and_keeps_the_things(tmp_path, monkeypatch):
+    others = data_gen.sample_scene(600_002, "test")
     (tmp_path / "pyproject.toml").write_text("[tool.labcourse]\ncamera = { elevation = [70, 71], fov_y = 50 }\n")
     inside = tmp_path / "lessons"
     inside.mkdir()
-    camera.hold(inside)
-    held = data_gen.sample_scene(600_002, "test")
-    assert held.objects == before.objects and 70 <= elevation(held) <= 71 and not 60 < elevation(before) < 80
-    assert held.camera.fov_y == pytest.approx(np.radians(50))
+    monkeypatch.chdir(inside)
+    ours = camera.sample_scene(600_002, "test")
+    assert ours.objects == others.objects and 70 <= elevation(ours) <= 71 and not 60 < elevation(others) < 80
+    assert ours.camera.fov_y == pytest.approx(np.radians(50))
+    assert data_gen.sample_scene(600_002, "test") == others  # what no notebook draws stays as it is
     monkeypatch.setenv(camera.NAMED, "distance = 0.9")
-    camera.hold(inside)
-    assert scenes.HELD == {"distance": (0.9, 0.9)}
+    assert camera.setting(inside) == {"distance": 0.9}
+    assert camera.sample_scene(600_002, "test") == data_gen.sample_scene(600_002, "test", {"distance": 0.9})
 
 
-def test_without_a_setting_nothing_is_held(tmp_path):
-    camera.hold(tmp_path)
-    assert scenes.HELD == {}
+def test_without_a_setting_the_scenes_are_everybodys():
+    assert camera.sample_scene(600_002, "test") == data_gen.sample_scene(600_002, "test")
+    assert camera.sample_scene(600_002) == data_gen.sample_scene(600_002)
+
+
+def test_every_scene_of_a_notebook_is_seen_by_the_courses_camera():
+    template = notebooks.ROOT / "labcourse/templates/lab.ipynb"
+    for path in (*notebooks.LESSONS, *notebooks.SOLUTIONS, template):
+        drawn = [cell.source for cell in notebooks.code(path) if "sample_scene(" in cell.source]
+        assert not any(".sample_scene" in source for source in drawn), f"{path.name} draws a scene past the camera"
+        ours = any("from labcourse.camera import sample_scene" in cell.source for cell in notebooks.code(path))
+        assert ours == bool(drawn), path.name
 
 
 @pytest.mark.parametrize(
@@ -44,17 +55,17 @@ def test_without_a_setting_nothing_is_held(tmp_path):
         ("height = 1", "camera: expected keys distance"),
         ("elevation = 100", "camera: elevation: expected a number from 5 to 89 degrees"),
         ("distance = [2, 1]", r"camera: distance: .* got \[2, 1\]"),
+        ("distance = true", "camera: distance: .* got True"),
         ("distance: 2", "LABKIT_CAMERA: expected `distance"),
     ],
 )
-def test_what_makes_no_sense_is_refused(text, said, monkeypatch, tmp_path):
+def test_what_makes_no_sense_is_refused(text, said, monkeypatch):
     monkeypatch.setenv(camera.NAMED, text)
     with pytest.raises(ValueError, match=said):
-        camera.hold(tmp_path)
+        camera.sample_scene(600_002, "test")
 
 
 def test_a_camera_that_cannot_see_the_targets_is_refused_and_does_not_search_for_ever(monkeypatch):
     monkeypatch.setattr(scenes, "MOST_TRIES", 50)
-    monkeypatch.setattr(scenes, "HELD", {"distance": (0.2, 0.2)})
-    with pytest.raises(ValueError, match="camera: expected one that sees all targets"):
-        data_gen.sample_scene(600_002, "test")
+    with pytest.raises(ValueError, match=r"camera: expected one that sees all targets, found none at 0\.2 to 0\.2 m"):
+        data_gen.sample_scene(600_002, "test", {"distance": 0.2})
