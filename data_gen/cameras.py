@@ -1,15 +1,8 @@
 """Ranges for a scene's camera in place of a config's own."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from labkit.support.validation import require
-
-if TYPE_CHECKING:
-    from data_gen.scenes import SceneConfig
 
 LIMITS = {"distance": (0.2, 5.0), "elevation": (5.0, 89.0), "roll": (0.0, 180.0), "fov_y": (5.0, 120.0)}
 Ranges = Mapping[str, object]  # by key a number, or [low, high]
@@ -37,14 +30,3 @@ def check_camera(camera: Ranges | None) -> dict[str, list[float]]:
         require(f"camera: {key}", is_range, f"a number from {low:g} to {high:g} {unit}, or [low, high]", value)
         ranges[key] = [float(end) for end in ends]
     return ranges
-
-
-def with_camera(kind: "SceneConfig", camera: Ranges | None) -> "SceneConfig":
-    """A config with the ranges of a camera in place of its own."""
-    ranges = check_camera(camera)
-    radians = {key: tuple(float(end) for end in np.radians(ends)) for key, ends in ranges.items() if key != "distance"}
-    changed = {"distance": tuple(ranges["distance"])} if "distance" in ranges else {}
-    changed |= {"elevations": (radians["elevation"],)} if "elevation" in radians else {}
-    changed |= {"roll": radians["roll"][1]} if "roll" in radians else {}
-    changed |= {"fov_y": radians["fov_y"]} if "fov_y" in radians else {}
-    return replace(kind, **changed) if changed else kind

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from data_gen import clutter
-from data_gen.cameras import Ranges, with_camera
+from data_gen.cameras import Ranges, check_camera
 from data_gen.families import FAMILIES, quaternion
 from data_gen.wide import WIDE
 from labkit.labels import OBSTACLE, TARGET
@@ -135,7 +135,7 @@ def sample_scene(seed: int, config: str = "train", camera: Ranges | None = None)
     """
     require("config", config in CONFIGS, f"one of {sorted(CONFIGS)}", repr(config))
     require("seed", isinstance(seed, (int, np.integer)) and seed >= 0, "an integer of at least 0", repr(seed))
-    kind = with_camera(CONFIGS[config], camera)
+    kind = _with_camera(CONFIGS[config], camera)
     rng = np.random.default_rng([kind.stream, int(seed)])
     if kind.crowd:
         return _crowded(rng, kind, int(seed), config)
@@ -152,6 +152,17 @@ def sample_scene(seed: int, config: str = "train", camera: Ranges | None = None)
         seed=int(seed),
         config=config,
     )
+
+
+def _with_camera(kind: SceneConfig, camera: Ranges | None) -> SceneConfig:
+    """A config with the ranges of a camera in place of its own."""
+    ranges = check_camera(camera)
+    radians = {key: tuple(float(end) for end in np.radians(ends)) for key, ends in ranges.items() if key != "distance"}
+    changed = {"distance": tuple(ranges["distance"])} if "distance" in ranges else {}
+    changed |= {"elevations": (radians["elevation"],)} if "elevation" in radians else {}
+    changed |= {"roll": radians["roll"][1]} if "roll" in radians else {}
+    changed |= {"fov_y": radians["fov_y"]} if "fov_y" in radians else {}
+    return replace(kind, **changed) if changed else kind
 
 
 def _crowded(rng: np.random.Generator, kind: SceneConfig, seed: int, config: str) -> SceneSpec:
