@@ -12,7 +12,7 @@ import copy
 import sys
 import types
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,8 @@ from labgrader.question import Question
 LONGEST_TUPLE = 16
 MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
 DEEPEST = 64  # lists in lists: NumPy has no array of so many axes
+SHORT = 48  # numbers of a case that can be done by hand
+HEAVY = 1000
 FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, np.ufunc)
 
 
@@ -45,21 +47,30 @@ class Problem:
 
 @dataclass(frozen=True)
 class Case:
-    """Arguments of one call, what the reference makes of them (as `as_numpy` gives it), and whether it is by hand."""
+    """Arguments of one call, what the reference makes of them (as `as_numpy` gives it), and where they come from.
+
+    edge: whether it stands at an end of what the statement allows.
+    """
 
     args: tuple
     expected: object
     by_hand: bool
+    edge: bool = False
 
 
 def expected_cases(question: Question, seed: int) -> list[Case]:
-    """Give the cases by hand, then the random ones that belong to the seed (any that numpy's default_rng takes)."""
-    rng = np.random.default_rng(seed)
-    drawn = question.draws(rng, question.random_cases)
-    by_hand = len(question.by_hand)
-    return [
-        Case(args, trusted(question.reference, args), i < by_hand) for i, args in enumerate((*question.by_hand, *drawn))
+    """Give the cases by hand, the random ones that belong to the seed, then the edges by hand: the telling ones first.
+
+    seed: any that numpy's default_rng takes.
+    """
+    drawn = question.draws(np.random.default_rng(seed), question.random_cases)
+    usual = max(len(question.by_hand) - question.edges, 0)
+    tried = [
+        *((args, True, False) for args in question.by_hand[:usual]),
+        *((args, False, False) for args in drawn),
+        *((args, True, True) for args in question.by_hand[usual:]),
     ]
+    return [Case(args, trusted(question.reference, args), *where) for args, *where in tried]
 
 
 @contextlib.contextmanager
@@ -85,6 +96,29 @@ def same_argument(a: object, b: object) -> bool:
     if isinstance(a, tuple | list):
         return len(a) == len(b) and all(map(same_argument, a, b))
     return bool(a == b or (a != a and b != b))
+
+
+def weight(args: tuple) -> int:
+    """How much a case has to be worked on: numbers in its arrays."""
+    return sum(np.size(a) for a in args)
+
+
+def is_heavy(args: tuple, expected: object) -> bool:
+    """Whether so many numbers go into a case, or come out, that a slow program is not tried on it a thousand times."""
+    return weight(args) + weight(parts(expected)) > HEAVY
+
+
+def told_first(cases: Sequence[Case], wrong: Sequence[bool]) -> int | None:
+    """Which wrong case a student is to see, None if none is wrong: a telling one by hand, else a random one.
+
+    An edge is shown where no other case by hand is wrong, and at most half of the random ones, or only long ones, are.
+    """
+    at = [i for i, is_wrong in enumerate(wrong) if is_wrong]
+    usual = [i for i in at if cases[i].by_hand and not cases[i].edge]
+    drawn, edges = [i for i in at if not cases[i].by_hand], [i for i in at if cases[i].edge]
+    short = [i for i in drawn if weight(cases[i].args) <= SHORT]
+    mostly = 2 * len(drawn) > sum(not case.by_hand for case in cases)
+    return next(iter(usual + (short if mostly else []) + edges + drawn), None)
 
 
 # ------------------------------------------------------------------------------------- what an output is

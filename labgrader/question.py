@@ -9,6 +9,10 @@ import numpy as np
 PUBLIC_SEED = 0  # of the random cases that a check shows
 
 
+class Untold(Exception):
+    """Raised by a wrong answer of a list where what it gives hangs on how it is written: that case tells nothing."""
+
+
 @dataclass(frozen=True)
 class Misconception:
     """A wrong answer that students really give: how it behaves, and the hint that it earns."""
@@ -39,18 +43,21 @@ class Question:
     a numpy Generator to the arguments of one random case, asymmetric so that swaps show; or several, which take turns,
     so that each edge is in some case. kinds: what the statement allows for each argument, as the course says it;
     nothing in labgrader reads it. by_hand: arguments of cases small enough to do by hand; each is always tried.
-    random_cases: how many cases are drawn. rtol, atol: which fractions count as equal; integers and truth values are
-    compared exactly. same_dtype: whether the dtype is asked for, too. points: what the blank is worth. properties: what
-    the check may say about a wrong output that nothing else explains, filled by `holds`; misconceptions, by `wrong`.
-    canonical: maps an output to the one form of those that are equally right (the sign of an axis, say). outputs: names
-    of the reference's outputs, where each is worth something without the others, so that an instructor may let it count
-    on its own. forbidden: modules that would do the work; they do not exist where answers are graded.
+    edges: how many of these, the last ones, stand at an end of what the statement allows: they are shown where all
+    others are right. random_cases: how many cases are drawn. rtol, atol: which fractions count as equal; integers and
+    truth values are compared exactly. same_dtype: whether the dtype is asked for, too. points: what the blank is worth.
+    properties: what the check may say about a wrong output that nothing else explains, filled by `holds`;
+    misconceptions, by `wrong`. canonical: maps an output to the one form of those that are equally right (the sign of
+    an axis, say). outputs: names of the reference's outputs, where each is worth something without the others, so that
+    an instructor may let it count on its own. forbidden: modules that would do the work; they do not exist where
+    answers are graded.
     """
 
     reference: Callable
     inputs: Callable[[np.random.Generator], tuple] | tuple[Callable[[np.random.Generator], tuple], ...]
     name: str = ""
     by_hand: tuple[tuple, ...] = ()
+    edges: int = 0
     random_cases: int = 4
     rtol: float = 1e-4
     atol: float = 1e-6

@@ -266,7 +266,7 @@ def secret_cases(question: Question, secret: str, student: str) -> tuple[Case, .
     """
     seed = int.from_bytes(hashlib.sha256(f"{secret}\0{question.name}\0{student}".encode()).digest(), "little")
     with reference_lock:
-        cases = expected_cases(replace(question, by_hand=(), random_cases=2 * question.random_cases), seed)
+        cases = expected_cases(replace(question, by_hand=(), edges=0, random_cases=2 * question.random_cases), seed)
     return tuple(cases)
 
 
@@ -277,7 +277,7 @@ def explained(answer: Run, verdict: Verdict) -> Diagnosis:
     if not found.needs_a_look:
         return found
     try:
-        findings, failed = answer.findings(), ""
+        findings, failed = answer.findings(verdict.case or 0), ""
     except Exception as error:  # of what a stranger wrote: it costs this answer a hint
         findings, failed = [], f"its program cannot be looked at: {type(error).__name__}"
     found = diagnosers.ask(*asked, findings)

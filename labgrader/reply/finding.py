@@ -14,6 +14,7 @@ MOST_SPANS = 6
 # What a watch shows, and what is said of it: these are no repairs, so they say what happens there.
 WATCHES = {
     "overflow": "The marked part overflows a float{exponent}. What keeps it small?",
+    "wraps": "The marked part is a whole number of a type that cannot hold it, so it wraps around. Which type can?",
     "division": "The marked part divides by 0, or takes the log of 0. When does that happen, and what is right then?",
     "no number": "The marked part is NaN (0 / 0, for example). When does that happen, and what is right then?",
     "aliased": "All rows of this list are the same list: what you write into one row appears in all of them. How "

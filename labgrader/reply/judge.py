@@ -13,15 +13,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from labgrader.comparison import Case, Problem, as_numpy, compare, expected_cases, quiet
+from labgrader.comparison import Case, Problem, as_numpy, compare, expected_cases, quiet, told_first
 from labgrader.program.live import altered, own_entry
 from labgrader.question import Question
 from labgrader.reply.finding import Finding
 from labgrader.reply.messages import shown_case
 from labgrader.reply.sentences import Sentence, at_once, diagnose
-
-# What is told first: that it does not run, then its type, its shape, its values, and what it does to its arguments.
-STAGES = ("unanswered", "exception", "time", "kind", "length", "dtype", "shape", "finite", "values", "altered")
 
 
 @dataclass(frozen=True)
@@ -88,21 +85,13 @@ def verdict(
         for case, got in zip(cases, outputs, strict=True)
     ]
     changed = tuple(f"it changes its argument {question.parameters[i]}: work on a copy" for i in sorted(altered))
-    told = [(stage(problem), i) for i, problem in enumerate(problems) if problem]
-    if not told:
+    first = told_first(cases, [problem is not None for problem in problems])
+    if first is None:
         problem = Problem("altered", f"{changed[0]}; what calls it still needs the old values") if changed else None
         return Verdict(problem, None, "all cases" if changed else "", question, (), cases, outputs)
-    _, first = min(told)
-    by_hand = sum(case.by_hand for case in cases)
-    here, number, of = ("hand-made case", first + 1, by_hand)
-    if first >= by_hand:
-        here, number, of = ("random case", first + 1 - by_hand, len(cases) - by_hand)
-    return Verdict(problems[first], first, f"{here} {number} of {of}", question, changed, cases, outputs)
-
-
-def stage(problem: Problem) -> int:
-    """How early a problem is told; any kind that STAGES does not name comes with the exceptions."""
-    return STAGES.index(problem.kind if problem.kind in STAGES else "exception")
+    alike = [i for i, case in enumerate(cases) if case.by_hand == cases[first].by_hand]
+    where = f"{'hand-made' if cases[first].by_hand else 'random'} case {alike.index(first) + 1} of {len(alike)}"
+    return Verdict(problems[first], first, where, question, changed, cases, outputs)
 
 
 # ------------------------------------------------------------------------------------------ a trusted function

@@ -1,11 +1,11 @@
 """Listed mistakes: which one gives an answer's outputs, and what each gives in each case."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from labgrader.comparison import Case, Problem, alike, parts, trusted
-from labgrader.question import Misconception, Question
+from labgrader.comparison import Case, Problem, alike, differences, parts, trusted
+from labgrader.question import Misconception, Question, Untold
 
 Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
 
@@ -18,6 +18,8 @@ def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[objec
         told, stray = [], False  # told: of each case that tells it from a right answer, whether there is an output
         for case, got in zip(cases, outputs, strict=True):
             own = output_of(misconception, case.args)
+            if own is None:
+                continue
             if alike(question, own, got):
                 if not alike(question, own, case.expected):
                     told.append(not isinstance(got, Problem))
@@ -31,10 +33,40 @@ def recognise(question: Question, cases: Sequence[Case], outputs: Sequence[objec
     return None
 
 
+def recognise_parts(
+    question: Question, cases: Sequence[Case], outputs: Sequence[object]
+) -> Iterator[tuple[int, Misconception]]:
+    """For each output of several that is wrong in two cases or more, a misconception that gives it in all of them.
+
+    Where several do, the one that has fewest of the other outputs wrong.
+    """
+    count = len(parts(cases[0].expected))
+    if count == 1 or any(isinstance(got, Problem) or len(parts(got)) != count for got in outputs):
+        return
+    theirs = [(m, [parts(output_of(m, case.args)) for case in cases]) for m in question.misconceptions]
+    theirs = [(m, given) for m, given in theirs if all(len(one) == count for one in given)]
+    expected, own = [parts(case.expected) for case in cases], [parts(got) for got in outputs]
+    for k in range(count):
+        if len(cases) - equal_parts(question, k, expected, own) < 2:
+            continue
+        gives = [(m, given) for m, given in theirs if equal_parts(question, k, given, own) == len(cases)]
+        right = [sum(equal_parts(question, j, given, expected) for j in range(count)) for _, given in gives]
+        if gives:
+            yield k, gives[int(np.argmax(right))][0]
+
+
+def equal_parts(question: Question, k: int, some: Sequence[tuple], others: Sequence[tuple]) -> int:
+    """In how many cases two outputs are equal in their part k."""
+    pairs = ((one[k], other[k]) for one, other in zip(some, others, strict=True))
+    return sum(not any(wrong.any() for wrong in differences(question, a, b)) for a, b in pairs)
+
+
 def output_of(misconception: Misconception, args: tuple) -> object:
-    """What a misconception gives, or a Problem where it raises."""
+    """What a misconception gives, a Problem where it raises, None where it tells nothing."""
     try:
         return trusted(misconception.answer, args)
+    except Untold:
+        return None
     except Exception as error:
         return Problem("exception", type(error).__name__)
 
@@ -45,7 +77,7 @@ def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
     for number, mistake in enumerate(question.misconceptions):
         for found, case in zip(told, cases, strict=True):
             output = output_of(mistake, case.args)
-            if not isinstance(output, Problem):
+            if output is not None and not isinstance(output, Problem):
                 found.setdefault(fingerprint(output), set()).add(number)
     return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
 

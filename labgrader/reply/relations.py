@@ -1,7 +1,8 @@
 """What wrong outputs have to do with the right ones, where a student sees it at once: transposed, a factor, a sign.
 
 Each relation is one small function of a `View`, which holds the expected and the returned array of every case. It gives
-one sentence, "" if it does not hold; it holds only if it does so in every case that can show it.
+one sentence, "" if it does not hold; it holds only if it does so in every case that can show it, and if chance would
+give that in less than one of a hundred answers that are wrong in some other way.
 """
 
 import itertools
@@ -14,6 +15,7 @@ from labgrader.comparison import quiet
 from labgrader.course import course
 
 Array = np.ndarray | np.generic
+BY_CHANCE = 0.01  # what is likelier by chance is no relation
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,26 @@ class View:
         return a.shape == b.shape and not self.different(a, b).any()
 
     def gives(self, change: Callable) -> bool:
-        """Whether change(expected) is what came in all cases, and shows in at least one: zeros show nothing."""
-        shows = 0
+        """Whether change(expected) is what came in all cases, and chance would not show it; zeros alone show nothing."""
+        chance = 1.0
         for e, g in zip(self.expected, self.got, strict=True):
             p = attempt(change, e)
             if not self.same(e if p is None else p, g):
                 return False
-            shows += p is not None and not self.same(e, p) and not (np.abs(np.asarray(p, float)) <= self.atol).all()
-        return shows > 0
+            if p is not None and not self.same(e, p) and (np.abs(np.asarray(p, float)) > self.atol).any():
+                shows = self.different(e, p) if e.shape == p.shape else np.ones(p.shape, bool)
+                chance *= self.by_chance(p[shows])
+        return chance < BY_CHANCE
+
+    def by_chance(self, numbers: Array) -> float:
+        """How likely another mistake gives these numbers: each is any of those that are expected, fractions of 1000.
+
+        Of false and true, both count, and of fractions each once.
+        """
+        if numbers.dtype.kind == "f":
+            return 0.001 ** len(np.unique(numbers))
+        values = len(np.unique(np.concatenate([np.ravel(e) for e in self.expected])))
+        return (1.0 / max(values, 2)) ** numbers.size
 
     @property
     def shaped(self) -> bool:
@@ -183,17 +197,13 @@ def shifted_by_one(view: View) -> str:
         inner = (slice(None),) * axis
         to, back = (slice(1, None), slice(None, -1))[::step]
         pairs = [(e[(*inner, back)], g[(*inner, to)]) for e, g in zip(view.expected, view.got, strict=True)]
-        if all(view.same(e, g) for e, g in pairs) and sum(e.size for e, _ in pairs) > 3 and varies(view, axis):
+        moved = [e[(*inner, back)][view.different(e[(*inner, back)], e[(*inner, to)])].ravel() for e in view.expected]
+        if all(view.same(e, g) for e, g in pairs) and view.by_chance(np.concatenate(moved)) < BY_CHANCE:
             where = "after" if step == 1 else "before"
             return (
                 f"Your values are right, but each stands one place {where} its own {along(axis, view)}".rstrip() + "."
             )
     return ""
-
-
-def varies(view: View, axis: int) -> bool:
-    """Whether the expected arrays change along an axis, so that a shift would show."""
-    return any(np.size(e) and not view.same(e, np.roll(e, 1, axis)) for e in view.expected)
 
 
 @relation
@@ -212,8 +222,9 @@ def one_too_few(view: View) -> str:
 
 # ------------------------------------------------------------------------------------------ number by number
 
+SIGN = "Each of your numbers has the wrong sign."
 FUNCTIONS = {
-    "Each of your numbers has the wrong sign.": np.negative,
+    SIGN: np.negative,
     "The signs are lost: yours are the absolute values.": np.abs,
     "Each of your numbers is 1 minus the right one. Whose share is asked for?": lambda e: 1.0 - e,
     "Each of your numbers is 1 over the right one. What is divided by what?": lambda e: 1.0 / e,
@@ -235,6 +246,12 @@ def function_of_the_right_value(view: View) -> str:
     if view.shaped and np.unique(view.numbers()[0]).size < 2:  # one number: any function of it would do
         return ""
     return next((says for says, function in FUNCTIONS.items() if view.gives(function)), "")
+
+
+def wrong_sign(view: View) -> str:
+    """SIGN, or "": a sign can be turned at many places of a program, all of them as good, so that none is marked."""
+    with quiet():
+        return SIGN if function_of_the_right_value(view) == SIGN else ""
 
 
 CONSTANTS = {
@@ -282,11 +299,22 @@ def only_at_a_place(view: View) -> str:
         return ""
     wrong = view.wrong()
     for name, masks in places(view):
-        inside = all(not (w & ~m).any() for w, m in zip(wrong, masks, strict=True))
-        others = all((~m).any() for w, m in zip(wrong, masks, strict=True) if w.any())
-        if inside and others:
+        pairs = list(zip(wrong, masks, strict=True))
+        shows, refutes = sum(w.any() for w, _ in pairs), sum(m.any() and not w.any() for w, m in pairs)
+        inside = all(not (w & ~m).any() for w, m in pairs)
+        if inside and refutes <= shows and np.prod([inside_by_chance(w, m) for w, m in pairs]) < BY_CHANCE:
             return f"It is wrong only {name}; all else is right."
     return ""
+
+
+def inside_by_chance(wrong: np.ndarray, mask: np.ndarray) -> float:
+    """How likely what is wrong in a case lies inside of a mask: one number or one blob does by the mask's share.
+
+    A mask that is wrong as a whole is no chance.
+    """
+    if not wrong.any():
+        return 1.0
+    return mask.mean() ** (mask.sum() if (wrong == mask).all() else 1)
 
 
 def places(view: View) -> Iterator[tuple[str, Sequence[np.ndarray]]]:

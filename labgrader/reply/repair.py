@@ -10,8 +10,9 @@ reads where to look, and is asked what belongs there.
 Of several repairs the nearest to what the student wrote is told: the one that changes the fewest nodes, of these the
 kind that stands first in `finding.REPAIRS`, of these the one that marks least.
 
-Numbers limit the search, so that all machines find the same; the clock is a safety net. Mutated programs may do
-anything: this runs in a worker (`labgrader.run`).
+Heavy cases are tried last, on what mends all others. The number of mutations limits the search, so that all machines
+find the same, and a test what a check finds; the clock is a safety net for programs of which one call takes long.
+Mutated programs may do anything: this runs in a worker (`labgrader.run`).
 """
 
 import ast
@@ -22,7 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labgrader.comparison import quiet
+from labgrader.comparison import is_heavy, quiet, weight
 from labgrader.program.live import LiveProgram, defines
 from labgrader.reply.alarm import ENDS, TimeIsUp, alarm, limited
 from labgrader.reply.finding import REPAIRS, Finding
@@ -30,11 +31,12 @@ from labgrader.reply.listed import Listed, fingerprint
 from labgrader.reply.mutation import Mutation, mutations
 
 RANK = {kind: number for number, kind in enumerate(REPAIRS)}
-MOST_MUTATIONS = 6000  # of one program
+MOST_MUTATIONS = 3000  # of one program, the smallest first: they take 1 to 3 s
 DEAREST_BESIDE = 2.0  # nodes that a mutation beside a listed mistake changes at most
 MOST_S = 4.0  # CPU seconds of the whole search: then what has been found is told, if there is something
 MOST_S_OF_ALL = 2.0  # for all cases once: of a program that takes longer, too few mutations could be tried
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
+MORE_S = 0.05  # on a case beside those on which it is searched: what takes longer there is neither right nor wrong
 MORE_COST = 0.5  # repairs that change so much more than the smallest are looked for, too
 LEFT_OUT = (
     "line too many",
@@ -54,13 +56,14 @@ class SearchIsOver(Exception):
 class Search:
     """A program, and how its outputs are judged. end: of the search, in CPU seconds of this process.
 
-    right: function (expected, got) -> bool; entries: function (expected, got) -> which of its numbers are right, None
-    for an output of another form. listed: what the question's listed mistakes give in each case, as `Listed`.
+    right: function (expected, got) -> bool; off: function (expected, got) -> how far each of its numbers is off, 0 if
+    it is right; None for an output of another form. listed: what the question's listed mistakes give in each case, as
+    `Listed`.
     """
 
     program: LiveProgram
     right: Callable[[object, object], bool]
-    entries: Callable[[object, object], np.ndarray | None]
+    off: Callable[[object, object], np.ndarray | None]
     end: float
     listed: "dict[int, Listed]"
 
@@ -84,38 +87,37 @@ class Trial:
         return Finding(self.mutation.kind, self.piece, self.mutation.spans)
 
 
-def weight(args: tuple) -> int:
-    """How much a case has to be worked on: numbers in its arrays."""
-    return sum(np.size(a) for a in args)
-
-
 def repairs(
     pieces: Sequence[tuple[str, str]],
     name: str,
     cases: Cases,
     fresh: Callable[[], Cases],
     right: Callable[[object, object], bool],
-    entries: Callable[[object, object], np.ndarray | None],
+    off: Callable[[object, object], np.ndarray | None],
     listed: Sequence[Listed] = (),
 ) -> list[Finding]:
     """Find the places of a program whose mutation makes all cases right, the best first.
 
     pieces: (label, text) of the program, as `program` cuts it; name: of its function. cases: (arguments, expected) of
-    the public cases; fresh: gives more of them, asked for once, when a mutation passes the public ones. right, entries:
-    as in `Search`; listed: one for each of the cases. Empty if there is none, or if the time is up.
+    the public cases, the one that is shown first; fresh: gives more of them, asked for once, when a mutation passes the
+    public ones. right, off: as in `Search`; listed: one for each of the cases. Empty if there is none, or if the time
+    is up.
     """
     with quiet():
         try:
             with limited(MOST_S):
                 program = LiveProgram(name, pieces)
             of_cases = {id(case): told for case, told in zip(cases, listed, strict=False)}
-            search = Search(program, right, entries, time.process_time() + MOST_S, of_cases)
-            by_use = sorted_by_use(search, cases)
+            search = Search(program, right, off, time.process_time() + MOST_S, of_cases)
+            light, heavy = ([case for case in cases if is_heavy(*case) is which] for which in (False, True))
+            by_use = sorted_by_use(search, light)
+            if not by_use or passes(search, by_use[0]):  # it is wrong in heavy ones alone
+                by_use, heavy = sorted_by_use(search, cases), []
             if time.process_time() > search.end - MOST_S + MOST_S_OF_ALL:
                 return []
             trials = [Trial(k, statement, m) for k, statement in program.functions() for m in mutations(statement)]
             trials.sort(key=lambda trial: trial.rank[:2])
-            found, with_listed = one_repair(search, trials[:MOST_MUTATIONS], by_use, LazyCases(fresh))
+            found, with_listed = one_repair(search, trials[:MOST_MUTATIONS], by_use, cases[0], LazyCases(fresh, heavy))
             return found or with_listed
         except ENDS:  # nothing can be said about such a program
             return []
@@ -133,27 +135,28 @@ def sorted_by_use(search: Search, cases: Cases) -> list[tuple[tuple, object]]:
 
 
 class LazyCases:
-    """More cases, asked for once, when they are needed."""
+    """More cases, asked for once, when they are needed: those of them that are not heavy, and some that are known."""
 
-    def __init__(self, ask: Callable[[], Cases]):
-        self.ask, self.cases = ask, None
+    def __init__(self, ask: Callable[[], Cases], known: Cases):
+        self.ask, self.known, self.cases = ask, known, None
 
     def __call__(self) -> Cases:
         if self.cases is None:
-            self.cases = list(self.ask())
+            self.cases = [*(case for case in self.ask() if not is_heavy(*case)), *self.known]
         return self.cases
 
 
 def one_repair(
-    search: Search, trials: Sequence[Trial], cases: Cases, more: LazyCases
+    search: Search, trials: Sequence[Trial], cases: Cases, shown: tuple[tuple, object], more: LazyCases
 ) -> tuple[list[Finding], list[Finding]]:
     """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs.
 
-    Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does.
+    Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does, and
+    the case that is shown is right, or closer in each of its numbers.
     """
     found: dict[Finding, tuple] = {}  # with what decides which one is told first
     with_listed: dict[Finding, tuple] = {}
-    before = rightness(search, cases)
+    before = distance(search, shown)
     with over_if(found, with_listed):
         for trial in trials:
             if found and trial.mutation.cost > min(found.values())[0] + MORE_COST:
@@ -165,7 +168,9 @@ def one_repair(
                     found[trial.finding] = trial.rank
                 elif runs and not found and trial.mutation.cost <= DEAREST_BESIDE and not leaves_out(trial.mutation):
                     number = listed_mistake(search, cases)
-                    if number is not None and rightness(search, cases) > before:  # one mistake is less than two
+                    if number is not None and is_closer(
+                        distance(search, shown), before
+                    ):  # one mistake is less than two
                         with_listed[replace(trial.finding, listed=number)] = trial.rank
     return sorted(found, key=found.get), sorted(with_listed, key=with_listed.get)[:1]
 
@@ -186,10 +191,16 @@ def listed_mistake(search: Search, cases: Cases) -> int | None:
     return min(numbers) if numbers else None
 
 
-def rightness(search: Search, cases: Cases) -> float:
-    """How many cases are right, those in part counted by their share of right numbers."""
-    entries = [search.entries(expected, outcome(search, args)[0]) for args, expected in cases]
-    return sum(float(right.mean()) for right in entries if right is not None and right.size)
+def distance(search: Search, case: tuple[tuple, object]) -> np.ndarray | None:
+    """How far off each number of a case is; None for an output of another form."""
+    return search.off(case[1], outcome(search, case[0])[0])
+
+
+def is_closer(now: np.ndarray | None, before: np.ndarray | None) -> bool:
+    """Whether all numbers are right now, or each that was wrong is closer, and none that was right is wrong."""
+    if now is None or before is None:
+        return now is not None and not now.any()
+    return bool((now <= before).all() and (now < before)[before > 0.0].all() and before.any())
 
 
 @contextlib.contextmanager
@@ -228,7 +239,7 @@ def repaired(search: Search, cases: Cases, more: LazyCases) -> bool:
     if not all(passes(search, case) for case in cases):
         return False
     for case in more():
-        output, unaltered = outcome(search, case[0])
+        output, unaltered = outcome(search, case[0], MORE_S)
         if unaltered is not None and not (unaltered and search.right(case[1], output)):
             return False
     return True
@@ -240,7 +251,7 @@ def passes(search: Search, case: tuple[tuple, object]) -> bool:
     return bool(unaltered) and search.right(case[1], output)
 
 
-def outcome(search: Search, args: tuple) -> tuple[object, bool | None]:
+def outcome(search: Search, args: tuple, seconds: float = CALL_S) -> tuple[object, bool | None]:
     """The program's output, and whether its arguments are as before; (None, False) if it raises.
 
     It is (None, None) if that takes too long, and raises SearchIsOver once the whole search does.
@@ -248,7 +259,7 @@ def outcome(search: Search, args: tuple) -> tuple[object, bool | None]:
     if alarm().now > search.end:
         raise SearchIsOver
     try:
-        with limited(CALL_S):
+        with limited(seconds):
             return search.program.call(args)
     except TimeIsUp:
         return None, None

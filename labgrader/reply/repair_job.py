@@ -56,13 +56,15 @@ class Look:
         """Whether an output is right."""
         return compare(self.question, expected, got) is None
 
-    def entries(self, expected: object, got: object) -> np.ndarray | None:
-        """Which numbers of an output are right, None for one of another form."""
+    def off(self, expected: object, got: object) -> np.ndarray | None:
+        """How far each number of an output is off, 0 where it is right; None for one of another form."""
         got = as_expected(expected, as_numpy(got))
         if isinstance(got, Problem) or [np.shape(p) for p in parts(got)] != [np.shape(p) for p in parts(expected)]:
             return None
-        wrong = differences(self.question, *canonical(self.question, expected, got))
-        return ~np.concatenate([np.ravel(part) for part in wrong])
+        pair = canonical(self.question, expected, got)
+        wrong = np.concatenate([np.ravel(part) for part in differences(self.question, *pair)])
+        e, g = (np.concatenate([np.ravel(part).astype(float) for part in parts(output)]) for output in pair)
+        return np.where(wrong, np.nan_to_num(np.abs(g - e), nan=np.inf), 0.0) if e.shape == wrong.shape else None
 
     def watch(self) -> str:
         """What instruments show, as JSON."""
@@ -70,7 +72,7 @@ class Look:
 
     def repair(self, fresh: Callable[[], Pairs]) -> str:
         """What repair finds, and what stands idle, as JSON; fresh: more cases, as `repairs` takes them."""
-        found = repairs(self.pieces, self.name, self.public, fresh, self.right, self.entries, self.listed)
+        found = repairs(self.pieces, self.name, self.public, fresh, self.right, self.off, self.listed)
         return write([*found[:MOST_REPAIRS], *idle(self.pieces, self.name)])
 
 
@@ -90,6 +92,11 @@ def fresh_cases(question: Question, seed: int = PUBLIC_SEED) -> list[Case]:
     rng = np.random.default_rng(seed + 1)
     drawn = question.draws(rng, FRESH)
     return [Case(args, trusted(question.reference, args), by_hand=False) for args in drawn]
+
+
+def first(some: Sequence, k: int) -> list:
+    """A list with its entry k before all others."""
+    return [some[k], *some[:k], *some[k + 1 :]]
 
 
 def pairs(cases: Sequence[Case]) -> list[tuple[tuple, object]]:

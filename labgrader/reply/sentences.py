@@ -1,8 +1,9 @@
 """What is said about a wrong answer: the surest sentence that is true of it, and that a student can read.
 
-`sentences` asks in this order: is it a listed misconception; does it run (what an exception means in this task); what
-do instruments and repair find in the student's own program; which relation of the outputs would a student see at once;
-what stands idle in the program; which property of right answers does it lack; and at last, which cases are wrong.
+`sentences` asks in this order: is it a listed misconception, or an output of several one; does it run (what an
+exception means in this task); is a sign wrong; what do instruments and repair find in the student's own program; which
+relation of the outputs would a student see at once; what stands idle in the program; which property of right answers
+does it lack; and at last, which cases are wrong. What is said of an exception is said of the case that is shown.
 """
 
 import copy
@@ -12,15 +13,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labgrader.comparison import Case, Problem, alike, parts
+from labgrader.comparison import Case, Problem, alike, as_expected, as_numpy, compare, parts, told_first, weight
 from labgrader.question import Property, Question
 from labgrader.reply.errors import explain
 from labgrader.reply.finding import IDLE, REPAIRS, WATCHES, Finding
-from labgrader.reply.listed import recognise
+from labgrader.reply.listed import recognise, recognise_parts
 from labgrader.reply.messages import Marked, marked, said
-from labgrader.reply.relations import View, related
+from labgrader.reply.relations import View, related, wrong_sign
 
 ENDLESS = "A loop does not end, or runs far too many iterations: what changes in each iteration, and when does it stop?"
+SLOW = (
+    "It is right in {right} smaller cases, and too slow for a case as large as this one. Which work does it repeat, "
+    "and which loop over single numbers could be one step for whole arrays?"
+)
+ASLEEP = "It waits, and computes nothing: does it sleep, or wait for something to be typed?"
 
 
 @dataclass(frozen=True)
@@ -58,15 +64,31 @@ def diagnose(
 
 
 def at_once(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Sentence | None:
-    """The sentence that needs no search: about an exception, or a listed misconception; None if there is none."""
-    found = itertools.chain(listed(question, cases, outputs), exceptions(question, cases, outputs))
-    return next(found, None)
+    """The sentence that needs no search: a listed misconception, an exception, a sign; None if there is none."""
+    return next(known_at_once(question, cases, in_form(cases, outputs)), None)
+
+
+def in_form(cases: Sequence[Case], outputs: Sequence[object]) -> list[object]:
+    """The outputs in the form that is expected, a tuple of numbers as an array; Problems as they are."""
+    return [
+        got if isinstance(got, Problem) else as_expected(case.expected, as_numpy(got))
+        for case, got in zip(cases, outputs, strict=True)
+    ]
+
+
+def known_at_once(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
+    """What `at_once` chooses from, of outputs in their form."""
+    yield from listed(question, cases, outputs)
+    yield from exceptions(question, cases, outputs, pieces)
+    for name, view in views_of(question, cases, outputs):
+        if says := wrong_sign(view):
+            yield Sentence("relation", name + says)
 
 
 def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sentence]:
     """All sentences that are true of an answer, the surest first; arguments are those of `diagnose`."""
-    yield from listed(question, cases, outputs)
-    yield from exceptions(question, cases, outputs, pieces)
+    outputs = in_form(cases, outputs)
+    yield from known_at_once(question, cases, outputs, pieces)
     pairs = wrong_ones_first(question, cases, outputs)
     values_are_right = bool(pairs) and alike(question, pairs[0][0].expected, pairs[0][1])
     yield from found_in_the_program(question, pieces, findings, values_are_right)
@@ -75,39 +97,74 @@ def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sent
     yield from outputs_exchanged(question, cases, outputs)
     for name, view in views_of(question, cases, outputs):
         yield from (Sentence("relation", name + says) for says in related(view))
+    yield from exceptions_elsewhere(question, cases, outputs, pieces)
     yield from idle_in_the_program(pieces, findings)
-    right = [alike(question, case.expected, got) for case, got in zip(cases, outputs, strict=True)]
-    yield from broken_properties(question, pairs[:1])  # that is the case that is shown, as a rule
+    right = rightness(question, cases, outputs)
+    yield from broken_properties(question, pairs[:1])  # that is the case that is shown
     for sentence in broken_properties(question, pairs[1:]):
         yield replace(sentence, says=f"In another wrong case: {sentence.says[0].lower()}{sentence.says[1:]}")
     yield which_cases(cases, right)
 
 
+def rightness(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[bool]:
+    """Which outputs are right."""
+    return [
+        not isinstance(got, Problem) and compare(question, case.expected, got) is None
+        for case, got in zip(cases, outputs, strict=True)
+    ]
+
+
 def exceptions(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
-    """That no value comes back, and why."""
-    if any(isinstance(got, Problem) and got.kind == "time" for got in outputs):
-        yield Sentence("exception", ENDLESS)
-    nothing = [isinstance(got, Problem) and "returns None" in got.says for got in outputs]
-    if any(nothing):
-        words = ("In some cases no `return` is reached", "It never reaches a `return` with a value")[all(nothing)]
-        yield Sentence("exception", f"{words}: where does it stand, and is it in a branch or a loop?")
-    raised = [i for i, got in enumerate(outputs) if isinstance(got, Problem) and got.kind == "exception"]
-    if not raised:
+    """That no value comes back in the case that is shown, and why."""
+    right = rightness(question, cases, outputs)
+    shown = told_first(cases, [not is_right for is_right in right])
+    got = None if shown is None else outputs[shown]
+    if not isinstance(got, Problem):
         return
-    first = outputs[raised[0]]
-    arguments = dict(zip(question.parameters, cases[raised[0]].args, strict=True))
-    line = first.lines[-1][1] if first.lines else ""
-    if says := explain(first.says, arguments, line, "\n".join(text for _, text in pieces)):
+    if got.kind == "time":
+        yield Sentence("exception", out_of_time(cases, right, shown, got))
+    if "returns None" in got.says:
+        never = all(isinstance(other, Problem) and "returns None" in other.says for other in outputs)
+        words = "It never reaches a `return` with a value" if never else "In some cases no `return` is reached"
+        yield Sentence("exception", f"{words}: where does it stand, and is it in a branch or a loop?")
+    if got.kind == "exception" and (says := explained(question, cases[shown], got, pieces)):
         yield Sentence("exception", says)
+
+
+def explained(question: Question, case: Case, got: Problem, pieces: Sequence[tuple[str, str]]) -> str:
+    """What an exception means in a case, "" if nobody knows."""
+    arguments = dict(zip(question.parameters, case.args, strict=True))
+    line = got.lines[-1][1] if got.lines else ""
+    return explain(got.says, arguments, line, "\n".join(text for _, text in pieces))
+
+
+def exceptions_elsewhere(question, cases, outputs, pieces) -> Iterator[Sentence]:
+    """That another case than the one shown raises, and why."""
+    for case, got in zip(cases, outputs, strict=True):
+        if isinstance(got, Problem) and got.kind == "exception":
+            if says := explained(question, case, got, pieces):
+                yield Sentence("exception", f"In another case it raises {got.says}. {says}")
+            return
+
+
+def out_of_time(cases: Sequence[Case], right: Sequence[bool], shown: int, got: Problem) -> str:
+    """Why a case is not done in time: asleep, endless, or slow for its size where all smaller ones are right."""
+    if got.says.startswith("it slept"):
+        return ASLEEP
+    size = weight(cases[shown].args)
+    smaller = [is_right for case, is_right in zip(cases[:shown], right, strict=False) if 2 * weight(case.args) <= size]
+    return SLOW.format(right=len(smaller)) if len(smaller) > 1 and all(smaller) else ENDLESS
 
 
 # ------------------------------------------------------------------------------------------ misconceptions
 
 
 def listed(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
-    """The hint of the listed misconception that gives these outputs."""
+    """The hint of the listed misconception that gives these outputs, or one of several in its place."""
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
+    for k, misconception in recognise_parts(question, cases, outputs):
+        yield Sentence("misconception", f"Output {k + 1} of {len(parts(cases[0].expected))}: {misconception.hint}")
 
 
 # ----------------------------------------------------------------------------------- the student's own program
@@ -133,7 +190,7 @@ def found_in_the_program(
             says = f"Change one of the two marked places, not both. {says}"
         if finding.listed is not None and finding.listed < len(question.misconceptions):
             one = question.misconceptions[finding.listed].hint
-            says = f"Perhaps two things are wrong. One is this: {one} And is the marked part as it should be?"
+            says = f"Two things are wrong, it seems. Is the marked part as it should be? And this: {one}"
         yield Sentence(finding.kind, says, marked([finding, *(equal if finding in repairs else [])], pieces))
 
 
@@ -191,9 +248,12 @@ def outputs_exchanged(question: Question, cases: Sequence[Case], outputs: Sequen
 
 
 def wrong_ones_first(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> list[tuple[Case, object]]:
-    """The cases that have an output, the wrong ones first."""
+    """The cases that have an output, the wrong ones first, of these the one that is shown."""
     pairs = [(case, got) for case, got in zip(cases, outputs, strict=True) if not isinstance(got, Problem)]
-    return sorted(pairs, key=lambda pair: alike(question, pair[0].expected, pair[1]))
+    right = [alike(question, case.expected, got) for case, got in pairs]
+    shown = told_first([case for case, _ in pairs], [not is_right for is_right in right])
+    order = sorted(range(len(pairs)), key=lambda i: (right[i], i != shown))
+    return [pairs[i] for i in order]
 
 
 def broken_properties(question: Question, pairs: Sequence[tuple[Case, object]]) -> Iterator[Sentence]:
@@ -220,5 +280,9 @@ def fulfilled(prop: Property, case: Case, got: object) -> bool:
 
 def which_cases(cases: Sequence[Case], right: Sequence[bool]) -> Sentence:
     """What to do with the case that is shown, and how many others are right; right: of each case."""
+    shown = told_first(cases, [not is_right for is_right in right])
+    if shown is not None and cases[shown].edge:
+        says = "What is unusual about the case above, a size, a number, a type? Which of your lines depends on it?"
+        return Sentence("case", f"All usual hand-made cases are right. {says}")
     others = f" {sum(right)} of {len(cases)} cases are right." if any(right) else ""
     return Sentence("case", f"Do the case above by hand, and print what each of your lines gives for it.{others}")

@@ -6,12 +6,13 @@ says nothing unless a wrong output hangs on it. Like `repair`, this runs in a wo
 
 import ast
 import contextlib
+import itertools
 from collections.abc import Sequence
 from types import FrameType, TracebackType
 
 import numpy as np
 
-from labgrader.comparison import quiet
+from labgrader.comparison import is_heavy, quiet
 from labgrader.program.live import LiveProgram, altered, copied, own_entry
 from labgrader.reply.alarm import ENDS, limited
 from labgrader.reply.finding import Finding, Span
@@ -20,13 +21,16 @@ MOST_S = 2.0  # CPU seconds of all watches together
 
 
 def watch(pieces: Sequence[tuple[str, str]], name: str, cases: Sequence[tuple[tuple, object]], right) -> list[Finding]:
-    """What the watches show of a wrong answer, the surest first; arguments are those of `repair.repairs`."""
+    """What the watches show of a wrong answer, the surest first; arguments are those of `repair.repairs`.
+
+    Of what overflows, divides by 0 or has no result, the first of the wrong cases is asked, which is the one shown.
+    """
     found = []
     with contextlib.suppress(*ENDS), limited(MOST_S), quiet():
         program = LiveProgram(name, pieces)
-        outputs = [outcome(program, args) for args, _ in cases]
-        wrong = [(a, e, out) for (a, e), out in zip(cases, outputs, strict=True) if not right(e, out)]
-        for look, tried in ((floating_point, wrong), (written_argument, cases)):
+        outputs = ((args, expected, outcome(program, args)) for args, expected in cases)
+        wrong = [*itertools.islice((tried for tried in outputs if not right(*tried[1:])), 1)]
+        for look, tried in ((floating_point, wrong), (written_argument, [c for c in cases if not is_heavy(*c)])):
             if reading := look(program, tried):
                 found.append(reading)
     return found
@@ -60,7 +64,10 @@ def floating_point(program: LiveProgram, wrong: Sequence[tuple[tuple, object, ob
                 return None
             piece, span, frame = where
             kind = "overflow" if "overflow" in str(error) else "division" if "divide" in str(error) else "no number"
-            return Finding(kind, piece, (span,), extreme(program.pieces[piece][1], span, frame, kind))
+            part = text_of(program.pieces[piece][1], span)
+            if kind == "overflow" and is_whole(part, frame):
+                return Finding("wraps", piece, (span,))
+            return Finding(kind, piece, (span,), extreme(part, frame, kind))
         except Exception:
             return None
     return None
@@ -93,9 +100,22 @@ def own_place(program: LiveProgram, trace: TracebackType | None) -> tuple[int, S
     return program.files.index(code.co_filename), Span(line, column, last_line, end), entry.tb_frame
 
 
-def extreme(text: str, span: Span, frame: FrameType, kind: str) -> float | None:
+def text_of(text: str, span: Span) -> str:
+    """A part of a line."""
+    return text.split("\n")[span.line - 1].encode()[span.column : span.end].decode(errors="replace")
+
+
+def is_whole(part: str, frame: FrameType) -> bool:
+    """Whether an expression is a whole number, which does not grow too large for a float."""
+    try:
+        with quiet():
+            return np.asarray(eval(part, frame.f_globals, frame.f_locals)).dtype.kind in "iu"
+    except Exception:  # no expression, as x *= 2
+        return False
+
+
+def extreme(part: str, frame: FrameType, kind: str) -> float | None:
     """The largest number that goes into an exponential, None if it cannot be told."""
-    part = text.split("\n")[span.line - 1].encode()[span.column : span.end].decode()
     try:
         node = ast.parse(part, mode="eval").body
         if kind == "overflow" and isinstance(node, ast.Call) and node.args:

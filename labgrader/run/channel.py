@@ -68,6 +68,7 @@ class Worker:
     requests, replies: its pipes; kill: ends its process and everything that it started. own: a file of what it prints,
     where it runs the code of whoever reads what comes of it; None for a stranger's. pid: of its process; None
     if it is not known: then the clock limits. memory: bytes that it may hold, where the kernel does not see to that.
+    slept_s: seconds asleep in all requests so far.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class Worker:
         memory: int | None = None,
     ):
         self.requests, self.replies, self.kill, self.own, self.pid = requests, replies, kill, own, pid
-        self.memory, self.stopped, self.closed = memory, None, False
+        self.memory, self.stopped, self.closed, self.slept_s = memory, None, False, 0.0
         self.ending = threading.Lock()
 
     def __enter__(self) -> "Worker":
@@ -89,14 +90,14 @@ class Worker:
     def __exit__(self, *exception) -> None:
         self.close()
 
-    def ask(self, request: object, limit_s: float, text: int = 0) -> object:
+    def ask(self, request: object, limit_s: float, text: int = 0, asleep_s: float | None = None) -> object:
         """Send a request and return what the reply holds; raises WorkerLost, and kills the worker, if none came.
 
-        limit_s: seconds of CPU time that it may take (`stopwatch`).
+        limit_s: seconds of CPU time that it may take (`stopwatch`); asleep_s: that it may sleep, with those before.
         text: the most bytes of a Text that may come; without it, a Text is no reply.
         """
         data = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL)
-        return self.exchange(struct.pack("<I", len(data)) + data, limit_s, text)
+        return self.exchange(struct.pack("<I", len(data)) + data, limit_s, text, asleep_s)
 
     def programs(self, cells: list, asked: list, limit_s: float) -> list[tuple[Program, list[str]]]:
         """Have programs cut out of a notebook, by a worker that has run nothing of it; each with fingerprints."""
@@ -121,10 +122,10 @@ class Worker:
         if isinstance(said, Text):
             raise WorkerLost(Problem("ended", said))
 
-    def exchange(self, data: bytes, limit_s: float, text: int = 0) -> object:
+    def exchange(self, data: bytes, limit_s: float, text: int = 0, asleep_s: float | None = None) -> object:
         """Write, then read one reply. The limit holds for both: a pipe that nobody reads gets full."""
-        done = threading.Event()
-        threading.Thread(target=self.watch, args=(Stopwatch(self.pid), limit_s, done), daemon=True).start()
+        done, stopwatch = threading.Event(), Stopwatch(self.pid)
+        threading.Thread(target=self.watch, args=(stopwatch, limit_s, asleep_s, done), daemon=True).start()
         try:
             self.requests.write(data)
             self.requests.flush()
@@ -140,6 +141,8 @@ class Worker:
             raise WorkerLost(Problem("ended", "it ended or crashed the process that it ran in")) from None
         finally:
             done.set()
+            stopwatch.used()
+            self.slept_s += max(stopwatch.slept, 0.0)
 
     def printed(self) -> str:
         """The beginning of what an own answer has printed, and one character more if that is not all."""
@@ -148,19 +151,22 @@ class Worker:
         self.own.seek(0)
         return self.own.read(4 * (MOST_PRINTED + 1)).decode(errors="replace").replace("\r\n", "\n")
 
-    def watch(self, stopwatch: Stopwatch, limit_s: float, done: threading.Event) -> None:
+    def watch(self, stopwatch: Stopwatch, limit_s: float, asleep_s: float | None, done: threading.Event) -> None:
         """Kill the worker unless it is done within its limits, which ends the reading and writing of `exchange`."""
+        may_sleep = math.inf if asleep_s is None else asleep_s - self.slept_s
         left, stopped = limit_s, None
         while left > 0.0 and stopped is None:
-            pause = max(left / 2.0, SHORTEST_LOOK_S)
+            pause = max(min(left, may_sleep - stopwatch.slept) / 2.0, SHORTEST_LOOK_S)
             if done.wait(pause if self.memory is None else min(pause, MEMORY_LOOK_S)):
                 return
             if self.memory is not None and memory_of(self.pid) > self.memory:
                 stopped = Problem("ended", f"it used more than {self.memory >> 20} MB of memory")
             left = limit_s - stopwatch.used()
+            if stopwatch.slept >= may_sleep:
+                stopped = Problem("time", f"it slept for {asleep_s:.3g} seconds")
         if done.is_set():  # its reply came while its time was looked at
             return
-        self.stopped = stopped or Problem("time", "it did not return in time: does a loop never end?")
+        self.stopped = stopped or Problem("time", "it did not return in time")
         self.end()
 
     def end(self) -> None:

@@ -9,8 +9,9 @@ class Limits:
     address space, with torch or without it.
 
     case_s: for one call; question_s: for all cases of a question; submission_s: for all answers of a notebook in one
-    run, but least_s is left for each. container: whether this machine is a container that
-    is made for one submission; then there is no bubblewrap, and answers only become another user.
+    run, but least_s is left for each. asleep_s: of the clock, for all cases of a question together, in which it neither
+    computes nor waits for a processor; None where nobody waits for it. container: whether this machine is a container
+    that is made for one submission; then there is no bubblewrap, and answers only become another user.
     """
 
     start_s: float = 120.0
@@ -18,6 +19,7 @@ class Limits:
     question_s: float = 20.0
     submission_s: float = 60.0
     least_s: float = 1.0
+    asleep_s: float | None = None
     memory_mb: int = 1024
     torch_memory_mb: int = 3072
     file_mb: int = 16

@@ -18,7 +18,7 @@ from labgrader.question import PUBLIC_SEED, Question
 from labgrader.reply.finding import MOST_FINDINGS, Finding, read_findings
 from labgrader.reply.judge import Verdict, verdict
 from labgrader.reply.listed import Listed, listed_in
-from labgrader.reply.repair_job import comparison_settings, fresh_cases, pairs
+from labgrader.reply.repair_job import comparison_settings, first, fresh_cases, pairs
 from labgrader.reply.watches import MOST_S as WATCH_S
 from labgrader.run.channel import MOST_FOUND, Changed, Worker, WorkerLost
 from labgrader.run.limits import Limits
@@ -51,8 +51,9 @@ def more_public_cases(question: Question) -> tuple[Case, ...]:
 @functools.cache
 def listed_mistakes(question: Question) -> list[Listed]:
     """What the listed mistakes give in the public cases; computed once in a process."""
+    cases = public_cases(question)
     with reference_lock:
-        return listed_in(question, public_cases(question))
+        return listed_in(question, cases)
 
 
 @dataclass
@@ -116,7 +117,7 @@ class Run:
                 self.worker.close()
                 said = f"all its cases together took more than {self.seconds:.3g} s of CPU time"
                 raise WorkerLost(Problem("time", said))
-            reply = self.worker.ask(request, limit)
+            reply = self.worker.ask(request, limit, asleep_s=self.limits.asleep_s)
         except WorkerLost as lost:
             self.used_s += max(limit, 0.0) if lost.problem.kind == "time" else 0.0
             return lost.problem
@@ -155,16 +156,14 @@ class Run:
             problem = Problem("channel", f"its outputs cannot be compared: {type(error).__name__}")
             return Verdict(problem, 0, "some case", outputs=worded), outputs
 
-    def findings(self) -> list[Finding]:
-        """What instruments and repair find in the program; they get public cases and nothing else."""
+    def findings(self, shown: int = 0) -> list[Finding]:
+        """What instruments and repair find in the program; they get public cases and nothing else.
+
+        shown: the number of the case that a student sees, which comes first.
+        """
         question, pieces = self.question, self.program.pieces
-        job = (
-            *comparison_settings(question),
-            self.name,
-            pieces,
-            pairs(public_cases(question)),
-            listed_mistakes(question),
-        )
+        cases, listed = (first(some, shown) for some in (public_cases(question), listed_mistakes(question)))
+        job = (*comparison_settings(question), self.name, pieces, pairs(cases), listed)
         found: list[Finding] = []
         with suppress(WorkerLost):
             looks = ("watch", "repair") if self.called_s <= WATCH_S else ("repair",)  # a watch calls it on all cases

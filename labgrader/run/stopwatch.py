@@ -1,6 +1,8 @@
 """How long a process has worked: its CPU time, so that a busy machine takes nothing away from an answer.
 
-Waiting for a processor is free; sleep counts a fifth: an answer that only sleeps ends after five times its limit.
+Waiting for a processor is free; sleep counts a fifth: an answer that only sleeps ends after five times its limit. A
+check, where a student waits, ends after ten seconds asleep (`limits.Limits.asleep_s`), if the system tells sleep from
+waiting.
 
 Its memory is asked for here as well, on systems whose kernel sets no limit to that.
 """
@@ -37,18 +39,21 @@ def memory_of(pid: int) -> int:
         return 0
 
 
-def waited_s(pid: int | None) -> float:
-    """Seconds in which a process could have run but had no processor; 0 where the system does not say."""
+def waited_s(pid: int | None) -> float | None:
+    """Seconds in which a process could have run but had no processor; None where the system does not say."""
     with suppress(OSError, ValueError, IndexError):
         return int(Path(f"/proc/{pid}/schedstat").read_bytes().split()[1]) / 1e9
-    return 0.0
+    return None
 
 
 class Stopwatch:
-    """Seconds that a process has used since it was made; where nobody can say its CPU time, those of the clock."""
+    """Seconds that a process has used since it was made; where nobody can say its CPU time, those of the clock.
+
+    slept: of these, those asleep at the last look; 0 where the system does not tell them from waiting.
+    """
 
     def __init__(self, pid: int | None):
-        self.pid, self.last, self.cpu = pid, 0.0, None
+        self.pid, self.last, self.cpu, self.slept = pid, 0.0, None, 0.0
         if pid is not None:
             with suppress(OSError):
                 self.cpu = cpu_s(pid)
@@ -59,7 +64,9 @@ class Stopwatch:
         if self.cpu is None:
             return time.monotonic() - self.begin
         with suppress(OSError):
-            cpu = cpu_s(self.pid) - self.cpu
-            slept = time.monotonic() - self.begin - cpu - (waited_s(self.pid) - self.waited)
-            self.last = max(cpu, slept / SLEEP)
+            cpu, waited = cpu_s(self.pid) - self.cpu, waited_s(self.pid)
+            idle = time.monotonic() - self.begin - cpu
+            if waited is not None and self.waited is not None:
+                self.slept = idle = idle - (waited - self.waited)
+            self.last = max(cpu, idle / SLEEP)
         return self.last

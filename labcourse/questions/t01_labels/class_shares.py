@@ -45,6 +45,7 @@ QUESTION = Question(
         (np.array([[[1, 255, 255], [1, 1, 0]], [[0, 0, 0], [0, 0, 0]]], np.uint8), 3),
         (np.array([[[0]]], np.uint8), 1),
     ),
+    edges=2,
     random_cases=6,
     points=1,
 )

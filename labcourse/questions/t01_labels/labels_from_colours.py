@@ -76,6 +76,7 @@ QUESTION = Question(
         (np.array([[[9, 0, 7]], [[9, 1, 7]]], np.uint8), np.array([[9, 0, 7]], np.uint8)),  # one class
         (np.array([[[1, 2, 3], [2, 3, 1]]], np.uint8), np.array([[2, 3, 1], [3, 1, 2], [1, 2, 3]], np.uint8)),
     ),
+    edges=3,
     points=3,
 )
 

@@ -70,6 +70,7 @@ QUESTION = Question(
             (np.arange(3, 1_000_003) // 3 % 4).astype(np.uint8)[:, None],
         ),
     ),
+    edges=3,
     random_cases=8,
     forbidden=("pybullet",),
 )

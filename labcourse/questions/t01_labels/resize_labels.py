@@ -69,6 +69,7 @@ QUESTION = Question(
         (np.array([[0, 1, 2], [3, 2, 1], [255, 0, 3]], np.uint8), 5, 2),
         (_LONG.T, 1, 6000),
     ),
+    edges=1,
     random_cases=8,
     points=4,
     forbidden=("cv2", "PIL", "skimage"),

@@ -40,6 +40,7 @@ QUESTION = Question(
         (np.array([[0, 0]], np.uint8), np.array([[[2.0], [-2.5]]]), np.zeros((4, 1, 2))),
         (np.array([[0]], np.uint8), np.array([[[-1.5]]]), np.zeros((4, 1, 1))),
     ),
+    edges=2,
     points=3,
 )
 

@@ -66,6 +66,7 @@ QUESTION = Question(
         (*_LONG_COLUMN, LONG - 1, 0),
         (np.array([[0, 0, 1]], np.uint8), np.array([[[0.0, 9.0], [1.0, 1.0], [9.0, 0.0]]]), _ROW, 0, 1),
     ),
+    edges=5,
     points=3,
 )
 
@@ -151,3 +152,14 @@ def no_pairs_at_the_border(y, psi, weights, v, u):
     H, W, _ = psi.shape
     inside = 0 < v < H - 1 and 0 < u < W - 1
     return icm_costs(y, psi, weights, v, u) if inside else psi[v, u].copy()
+
+
+@wrong("Each class costs its own psi, whatever the neighbours are: where does psi come into yours?")
+def without_psi(y, psi, weights, v, u):
+    return icm_costs(y, np.zeros_like(psi), weights, v, u)
+
+
+@wrong("Rows and columns begin at 0: does yours leave out a neighbour in row 0, or in column 0?")
+def neighbours_in_the_first_row_left_out(y, psi, weights, v, u):
+    own, owned = pairs_of(weights, v, u)
+    return charged(own + [(w, b, a) for w, b, a in owned if b > 0 and a > 0], y, psi, v, u)

@@ -54,6 +54,7 @@ QUESTION = Question(
         (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 1.0, 0.5004, 0.5),
         (np.array([[[7, 7, 7], [8, 7, 7]]], np.uint8), 0.0, 5.0, 1.0),
     ),
+    edges=2,
     points=3,
 )
 
@@ -188,10 +189,12 @@ def column_before_the_first(image, lam, sigma_I, sigma_p):
     return gaussian(squares(image), lam, sigma_I, sigma_p, ring=True) * kept
 
 
-@wrong("One exponential holds both terms, and lam stands before it: exp(a) + exp(b) is not exp(a + b).")
-def two_exponentials_added(image, lam, sigma_I, sigma_p):
+@wrong(
+    "One exponential holds both terms, and lam stands before it: exp(a) + exp(b) is not exp(a + b).", share=(1.0, 0.5)
+)
+def two_exponentials_added(image, lam, sigma_I, sigma_p, share):
     near = gaussian(np.zeros_like(squares(image)), lam, sigma_I, sigma_p)
-    return gaussian(squares(image), lam, sigma_I, np.inf) + near
+    return share * (gaussian(squares(image), lam, sigma_I, np.inf) + near)
 
 
 @wrong("sigma_I is a difference of colours from 0 to 255: on which scale are yours?")
@@ -248,3 +251,12 @@ def last_row_and_column_left_out(image, lam, sigma_I, sigma_p):
     weights = pair_weights(image, lam, sigma_I, sigma_p).copy()
     weights[:, -1], weights[:, :, -1] = 0.0, 0.0
     return weights
+
+
+@wrong("Outside of the image there is no neighbour: which pixel does a row or column that you clip lead to?")
+def clipped_at_the_border(image, lam, sigma_I, sigma_p):
+    """A neighbour beyond the border taken for the nearest pixel inside."""
+    (H, W, _), colours = image.shape, image.astype(float)
+    v, u = np.indices((H, W))
+    near = [colours[np.clip(v + down, 0, H - 1), np.clip(u + right, 0, W - 1)] for down, right in PAIRS]
+    return gaussian(((colours - near) ** 2).sum(axis=3), lam, sigma_I, sigma_p, ring=True)

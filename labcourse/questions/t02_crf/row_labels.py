@@ -81,6 +81,7 @@ QUESTION = Question(
         (np.array([[0.0, 9e5], [7e5, 0.0]]), np.array([8e5])),
         (np.array([[0.0, 9e-4], [3e-4, 0.0]]), np.array([4e-4])),
     ),
+    edges=9,
     random_cases=12,
     points=3,
 )

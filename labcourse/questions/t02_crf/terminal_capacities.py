@@ -54,6 +54,7 @@ QUESTION = Question(
         (np.array([[[2.0, 5.0], [1.0, -3.0]]]), np.array([[255, 0]], np.uint8), 100.0),
         (np.array([[[-2.0, -5.0], [0.0, 3.0]]]), np.array([[0, 0]], np.uint8), 1.0004),
     ),
+    edges=2,
 )
 
 
@@ -180,7 +181,7 @@ def unknown_taken_for_known(psi, known, large, label):
     return terminal_capacities(psi, np.where(known == 255, label, known), large)
 
 
-@wrong("255 says that nothing is known of the pixel, and a condition takes it for true, like 1.")
+@wrong("A pixel with 255 counts in yours as one that is known to be 1. Does a condition take 255 for true?")
 def known_as_a_condition(psi, known, large):
     return np.where(known, 0.0, large), np.where(known, large, 0.0), psi.min(axis=2).sum()
 

@@ -38,6 +38,7 @@ QUESTION = Question(
         (np.array([[4e-4, 0.0]]), np.array([0], np.uint8), 0.0),
         (np.array([[-2.0, 1.0]]), np.array([0], np.uint8), 0.0),
     ),
+    edges=3,
     random_cases=12,
     forbidden=("scipy", "torch"),
 )

@@ -90,6 +90,7 @@ QUESTION = Question(
         (*pointing((1, 301), {(0, 300): (-0.01, 0), (0, 299): (0.5, 0)}), 1, 1),
         (np.array([[0.9]]), np.array([[[0.0, -0.0004]]]), 1, 1),
     ),
+    edges=9,
     random_cases=10,
     points=4,
     forbidden=("scipy", "torch", "cv2", "skimage", "sklearn"),
@@ -245,3 +246,8 @@ def the_last_of_equal_peaks(foreground, votes, cell, least):
 @wrong("You number connected regions. Two things that touch are one region: which pixels vote for one place?")
 def regions_that_touch(foreground, votes, cell, least):
     return (foreground > 0.5).astype(int)
+
+
+@wrong("Of two cells with equal counts the first in reading order counts, row by row: in which order do you look?")
+def column_by_column(foreground, votes, cell, least):
+    return group(foreground.T, votes.transpose(1, 0, 2)[..., ::-1], cell, least).T

@@ -37,6 +37,7 @@ QUESTION = Question(
         (np.array([[[0.0, 1.0], [0.1, 0.9]]]), np.array([[[4.0, -3.0], [4.0, -3.0]]])),
         (np.array([0.5, 0.5]), np.array([1.0, 0.0])),
     ),
+    edges=1,
     points=3,
     forbidden=("scipy", "torch"),
 )
@@ -112,3 +113,9 @@ def shortcut_of_the_cross_entropy(p, g):
 @wrong("How does p[c] change with its own logit? By p[c] (1 - p[c]); you take p[c].")
 def own_logit_without_its_share(p, g):
     return softmax_backward(p, g) + p * p * g
+
+
+@wrong("Two classes are two of many: what becomes of the third one, and of a class that is alone?")
+def two_classes_alone(p, g):
+    d = p[..., :1] * p[..., 1:2] * (g[..., :1] - g[..., 1:2])
+    return np.concatenate([d, -d, 0.0 * p[..., 2:]], axis=-1)

@@ -58,6 +58,7 @@ QUESTION = Question(
         (np.array([[[-0.004, 0.003]]]), np.array([[254]], np.uint8), 0.0104),
         (np.array([[[0.003, -0.004]]]), np.array([[1]], np.uint8), 0.0104),
     ),
+    edges=3,
     random_cases=10,
     points=3,
     forbidden=("scipy", "torch"),
@@ -262,3 +263,15 @@ def square_compared_with_beta(votes, instances, beta):
         return np.where(near, square / (2.0 * beta), r - beta / 2.0), np.where(near[:, None], e / beta, unit(e))
 
     return scored(votes, instances, beta, loss_and_slope)
+
+
+@wrong("Numbers of things may have gaps, as 1, 2 and 5: where does your loop end?")
+def up_to_the_first_gap(votes, instances, beta):
+    present = np.isin(np.arange(1, 255), instances)
+    last = len(present) if present.all() else int(np.argmin(present))
+    return votes_loss(votes, np.where(instances <= last, instances, 0), beta)
+
+
+@wrong("Things have numbers up to 254, and 8 bits with a sign end at 127: what becomes of the thing 200?")
+def numbers_of_8_bits_with_a_sign(votes, instances, beta):
+    return votes_loss(votes, np.where(instances > 127, 0, instances), beta)

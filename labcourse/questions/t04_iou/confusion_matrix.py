@@ -46,17 +46,18 @@ QUESTION = Question(
     },
     inputs=(_label_pair, *(partial(_any_classes, shape=shape) for shape in ((LONG, 2), (1, LONG)))),
     by_hand=(
-        (np.array([[0]], np.uint8), np.array([[0]], np.uint8), 1, 255),
         # An array may lie in memory by columns, and be a part of another.
         (np.array([[0, 1, 1], [2, 0, 2]], np.uint8, order="F"), np.array([[0, 1, 2], [2, 0, 1]], np.uint8), 3, 255),
         (np.array([[0, 1], [2, 1]], np.uint8), np.array([[0, 2], [1, 0]], np.uint8), 3, 255),
         (np.array([[0, 0, 1]], np.uint8), np.array([[0, 1, 1]], np.uint8), 2, 255),
         (np.array([[2, 255], [2, 1], [0, 2]], np.uint8), np.array([[1, 0], [1, 1], [0, 2]], np.uint8), 3, 255),
         (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),
+        (np.array([[0]], np.uint8), np.array([[0]], np.uint8), 1, 255),
         (np.zeros((250, 280), np.uint8), np.ones((250, 280), np.uint8), 2, 255),  # more than two bytes can count
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
         (np.array([[254]], np.uint8), np.array([[253]], np.uint8), 255, 255),
     ),
+    edges=4,
     random_cases=10,
     forbidden=("sklearn", "torchmetrics"),
 )

@@ -20,6 +20,7 @@ QUESTION = Question(
     kinds={"n": replace(COUNTS, free=("-|x|", "transposed"))},
     inputs=(counts, counts_of_many_classes, counts),
     by_hand=SMALL_COUNTS,
+    edges=2,
     random_cases=6,
     forbidden=("sklearn", "torchmetrics"),
 )

@@ -45,12 +45,13 @@ QUESTION = Question(
     },
     inputs=(_counts_and_groups, _many_classes, _all_apart),
     by_hand=(
-        (np.array([[5]]), np.array([0])),
         (np.array([[5, 1, 0], [0, 3, 2], [0, 4, 6]]), np.array([0, 1, 1])),
         (np.array([[5, 1, 7], [0, 3, 2], [9, 4, 6]]), np.array([1, 0, 1])),  # groups need not be in order
         (np.array([[5, 1], [2, 3]]), np.array([0, 0])),  # everything is one class
         (np.array([[5, 1], [2, 3]]), np.array([1, 0])),
+        (np.array([[5]]), np.array([0])),
     ),
+    edges=1,
     points=3,
 )
 
@@ -119,3 +120,15 @@ def only_the_diagonal_is_summed(n, group):
     out = n[np.ix_(first, first)].copy()
     np.fill_diagonal(out, np.diagonal(merge_classes(n, group)))
     return out
+
+
+@wrong("An index array chooses rows and columns, and adds nothing up: what is the sum over the classes of one group?")
+def chosen_and_cut(n, group):
+    G = group.max() + 1
+    return n[np.ix_(group, group)][:G, :G]
+
+
+@wrong("The classes of a group need not be neighbours: 0 and 2 may be one, with 1 between them.")
+def runs_as_they_come(n, group):
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    return np.add.reduceat(np.add.reduceat(n, starts, axis=0), starts, axis=1)

@@ -69,12 +69,13 @@ QUESTION = Question(
         *(partial(_any_pixels, shape=shape, C=C) for shape, C in SHAPES),
     ),
     by_hand=(
-        (np.array([3.0]), np.array(0, np.uint8), np.ones(1), 1.0),
         (np.zeros((1, 2)), np.array([1], np.uint8), np.array([0.9, 0.1]), 1.0),  # the softmax is the shares
         (TOY, np.array([1], np.uint8), np.array([0.7, 0.1, 0.2]), 0.0),  # tau 0: the plain gradient
         (SURE, np.array([0, 2], np.uint8), np.array([0.7, 0.1, 0.2]), 2.0),  # one maximum for both is not enough
+        (np.array([3.0]), np.array(0, np.uint8), np.ones(1), 1.0),
         (TOY, np.array([0], np.uint8), np.array([0.4, 0.4, 0.2]), 2000.0),  # all shifts are far below all logits
     ),
+    edges=2,
     random_cases=12,
     atol=5e-5,
     points=3,

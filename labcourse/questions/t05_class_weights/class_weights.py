@@ -42,12 +42,13 @@ QUESTION = Question(
     },
     inputs=(draw_counts, _any_power, _two_classes),
     by_hand=(
-        (np.array([7]), 3.0),
         (np.array([900, 100, 0]), 1.0),
         (np.array([900, 100, 25]), 0.5),
         (np.array([1, 255, 0]), 0.5),
         (np.array([3, 40]), 0.0),
+        (np.array([7]), 3.0),
     ),
+    edges=1,
     atol=1e-30,  # weights are small where a power is high; float32 has none much smaller
     random_cases=6,
     forbidden=("sklearn",),

@@ -63,8 +63,6 @@ QUESTION = Question(
     },
     inputs=(_network, _slow, *(partial(_any_network, shape=shape, C=C) for shape, C in SHAPES)),
     by_hand=(
-        (np.array([3.0]), np.array([2.0]), np.ones(1), 2),
-        (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), MOST_ROUNDS),
         (-_THREE, np.ones(2), np.array([0.9, 0.1]), 1),
         (np.array([[0.0, 0.0]]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), 1),  # weights alone
         (_THREE, np.ones(2), np.array([0.5, 0.5]), 1),  # a mean of probabilities
@@ -73,7 +71,10 @@ QUESTION = Question(
         (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), 3),
         (_THREE + 1000.0, np.array([1.0, 4.0]), np.array([0.8, 0.2]), 1),  # exp overflows
         (SURE, np.array([0.5, 4.0, 1.0]), np.array([0.6, 0.1, 0.3]), 2),  # with one maximum for both, exp gives 0
+        (np.array([3.0]), np.array([2.0]), np.ones(1), 2),
+        (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), MOST_ROUNDS),
     ),
+    edges=2,
     random_cases=8,
     points=4,
     forbidden=("scipy", "torch"),

@@ -41,13 +41,14 @@ QUESTION = Question(
     inputs=(_probabilities_and_costs, *(partial(_any_costs, shape=q[:-1], C=q[-1], sizes=sizes) for q, sizes in ANY)),
     random_cases=10,
     by_hand=(
-        (np.array([0.4999, 0.5001]), np.array([[0.0, 16.0], [16.0, 0.0]])),  # nearly a tie
         (np.array([0.6, 0.4]), np.array([[3.0, 1.0], [1.0, 2.0]])),  # 2.2 for saying 0, 1.4 for saying 1
-        (np.ones(1), np.array([[3.0]])),
         (np.array([0.8, 0.2]), np.array([[0.0, 1.0], [10.0, 0.0]])),  # 2 for saying 0, 0.8 for saying 1
         (np.array([[0.5, 0.4, 0.1], [0.1, 0.4, 0.5]]), np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 9.0, 1.0]])),
         (np.array([[0.5, 0.4, 0.1]]), np.array([[0.0, 4.0, 1.0], [1.0, 0.0, 2.0], [8.0, 1.0, 0.0]])),
+        (np.array([0.4999, 0.5001]), np.array([[0.0, 16.0], [16.0, 0.0]])),  # nearly a tie
+        (np.ones(1), np.array([[3.0]])),
     ),
+    edges=2,
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

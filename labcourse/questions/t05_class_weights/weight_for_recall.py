@@ -53,15 +53,16 @@ QUESTION = Question(
     },
     inputs=(_pixels, partial(_many_pixels, least=0.012, most=0.016), partial(_many_pixels, least=0.3, most=1.0)),
     by_hand=(
-        (np.array([0.4]), np.array([True]), 0.5),
-        (np.array([SURE, 0.5]), np.array([True, True]), 1.0),  # weight 999,999,999
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
         (np.array([1e-6, 0.2]), np.array([True, False]), 1.0),  # weight 999,999
         # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
+        (np.array([0.4]), np.array([True]), 0.5),
+        (np.array([SURE, 0.5]), np.array([True, True]), 1.0),  # weight 999,999,999
     ),
+    edges=2,
     random_cases=12,
     atol=0.0,
     rtol=1e-5,  # weights tried one after the other come near, and not to the answer
@@ -155,3 +156,16 @@ def rounded_to_the_nearest(q1, y, recall):
 def equal_ones_counted_once(q1, y, recall):
     once = np.unique(q1[y])
     return weight_for_recall(once, np.ones(len(once), bool), recall)
+
+
+@wrong("You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
+def largest_pixel_with_precision(q1, y, recall):
+    """The least sure pixel down to which enough of those that are called class 1 are."""
+    last = [q for q in np.sort(q1) if y[q1 >= q].mean() >= recall]
+    return float((1.0 - last[0]) / last[0]) if last else 1.0
+
+
+@wrong("Accuracy counts the pixels of class 0, too. Recall is a share of the pixels that truly are of class 1.")
+def weight_for_accuracy(q1, y, recall):
+    odds = np.sort((1.0 - q1) / q1)
+    return float(next((w for w in odds if np.mean((w * q1 >= 1.0 - q1) == y) >= recall), odds[-1]))

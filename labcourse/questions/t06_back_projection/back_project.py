@@ -53,6 +53,7 @@ QUESTION = Question(
         (np.array([[0.05, 0.0], [0.004, 30.0]]), K_SMALL, False),  # near, nothing, nearer, far
         (np.array([[1e-4, 80.0]]), K_SMALL, False),
     ),
+    edges=1,
     random_cases=10,
 )
 

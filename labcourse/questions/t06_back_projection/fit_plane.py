@@ -54,6 +54,7 @@ QUESTION = Question(
         (np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 4e-4]]), np.array([1e-4, 2e-4, 2e-4, 2e-4])),
         (np.array([[-4.0, 5, 0], [0, 5, 0], [-4, 8, 0], [0, 8, -2]]), np.array([0.5003, 0.5, 0.5, 0.5])),
     ),
+    edges=3,
     random_cases=6,
     atol=1e-5,
     points=3,

@@ -64,6 +64,7 @@ QUESTION = Question(
         (0.0, 1000.4004, 0.5, K_of(2.0, 4.0, 1.0, 1000.0), _LOOKS_LEVEL, 0.0, 0.01, 0.0),
         (2.0, 1.0, 0.0124, K_SMALL, _LOOKS_LEVEL, 0.0126, 0.0, 0.0),
     ),
+    edges=4,
     atol=1e-9,
     points=3,
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from labcourse.kinds import LONG, array, intrinsics
 from labcourse.questions.t06_back_projection import K_SMALL, K_of, camera
-from labgrader.question import Question, holds, wrong
+from labgrader.question import Question, Untold, holds, wrong
 
 
 def undistort(pixels, K, k):
@@ -54,6 +54,7 @@ QUESTION = Question(
     },
     inputs=(_seen_pixels, partial(_seen_pixels, many=LONG)),
     by_hand=(
+        (np.array([[2.1, 0.0]]), K_SMALL, np.array([0.4, 0.0])),
         # 0.5 (1 + 0.4 / 4 + 0.05 / 16) = 0.5515625; another root, a complex one, has a smaller real part
         (np.array([[2.103125, 0.0], [1.0, 0.0]]), K_SMALL, np.array([0.4, 0.05])),
         # 0.9 (1 - 0.3 * 0.81) = 0.6813 and 0.7 (1 - 0.3 * 0.49) = 0.5971; k2 is 0, guesses come near slowly, and beyond
@@ -75,8 +76,8 @@ QUESTION = Question(
             K_of(3000.0, 4000.0, 1000.00046, 700.0),
             np.array([-0.3, 0.0]),
         ),
-        (np.array([[2.1, 0.0]]), K_SMALL, np.array([0.4, 0.0])),
     ),
+    edges=1,
     random_cases=12,
     rtol=0.0,
     atol=1e-3,  # a thousandth of a pixel, as the lab promises
@@ -98,13 +99,23 @@ def distorted_again_they_are_what_was_seen(pixels, K, k, straight):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-def divided_again(pixels, K, factor, rounds=100):
-    """The seen pixels, divided again and again by a lens's factor of the radius that they had in the last round."""
+def divided_again(pixels, K, factor, rounds=100, radius=1.0):
+    """The seen pixels, divided again and again by a lens's factor of the radius that they had in the last round.
+
+    radius: what x and y are multiplied by for it. Raises Untold where a hundred rounds come to no end.
+    """
     f, c = np.diagonal(K)[:2], K[:2, 2]
-    seen = ideal = (pixels - c) / f
+    seen = ideal = before = (pixels - c) / f
     for _ in range(rounds):
-        ideal = seen / factor(np.linalg.norm(ideal, axis=1, keepdims=True))
+        before, ideal = ideal, seen / factor(np.linalg.norm(radius * ideal, axis=1, keepdims=True))
+    if rounds == 100 and not np.allclose(f * before, f * ideal, rtol=0.0, atol=1e-6):
+        raise Untold
     return c + f * ideal
+
+
+def lens(k):
+    """The factor of a radius."""
+    return lambda r: 1.0 + k[0] * r**2 + k[1] * r**4
 
 
 @wrong("You bent the pixels a second time: the lens did it once, and you are to take it back.")
@@ -138,9 +149,19 @@ def normalised(pixels, K, k):
 
 
 @wrong("x is divided by fx and y by fy: by what do you divide each of them before you square it?")
-def radius_in_pixels(pixels, K, k):
+def one_focal_length_for_the_radius(pixels, K, k):
     f = np.sqrt(K[0, 0] * K[1, 1])
-    return undistort(pixels, K_of(f, f, *K[:2, 2]), k)
+    return divided_again(pixels, K_of(f, f, *K[:2, 2]), lens(k))
+
+
+@wrong("r is a radius without a unit, at depth 1: are your x and y still pixels where you square them?")
+def radius_in_pixels(pixels, K, k):
+    return divided_again(pixels, K, lens(k), radius=np.diagonal(K)[:2])
+
+
+@wrong("The lens has two terms: r to the fourth bends, too, by k2. Where does it come into yours?")
+def without_k2(pixels, K, k):
+    return divided_again(pixels, K, lens((k[0], 0.0)))
 
 
 @wrong("k1 stands beside r squared and k2 beside r to the fourth.")
@@ -165,7 +186,7 @@ def k2_beside_r_squared(pixels, K, k):
 
 @wrong("Rows have a focal length of their own: v = fy y_d + cy, and fy is the middle entry of K.")
 def one_focal_length(pixels, K, k):
-    return undistort(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), k)
+    return divided_again(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), lens(k))
 
 
 @wrong("A series is right for small r alone: put your pixels into the lens, do the given ones come out?")

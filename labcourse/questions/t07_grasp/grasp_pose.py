@@ -47,6 +47,7 @@ QUESTION = Question(
         (np.array([9.0, -8.0, -7.0]), np.array([1e6, -4e5, 1e6]), np.array([-1e6, 1e6, 3e4])),  # the largest numbers
         (np.array([0.4, -0.1, 0.2]), np.array([0.0, -0.5, 0.0]), np.array([-0.25, 0.25, 0.0])),  # level
     ),
+    edges=4,
     random_cases=10,
     atol=1e-5,
     points=4,

@@ -75,6 +75,7 @@ QUESTION = Question(
         (np.array([[1.5, 1.123415, 0.5], [2.0, 1.0, 0.5]]), FACING_X, 0.12342),  # few digits do not hold these
         (np.tile(_L, (60, 1)), FACING_X, 0.25),
     ),
+    edges=7,
     random_cases=14,
     points=4,
     forbidden=("scipy", "cv2"),

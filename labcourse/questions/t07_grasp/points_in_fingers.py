@@ -93,6 +93,7 @@ QUESTION = Question(
         (moved(_FAR, _HIGH_UP).T, _HIGH_UP, 1.0, 1.0, 1.0, 1.0),  # the largest numbers
         *((moved(_CLOSE, _HALF_OFF).T, _HALF_OFF, *boxes) for boxes in _FINE),  # few digits do not hold these
     ),
+    edges=11,
     random_cases=12,
     points=3,
 )

@@ -35,6 +35,7 @@ QUESTION = Question(
         (transform(np.diag([-1.0, 1.0, -1.0]), [8.0, -9.0, 7.0]), np.array([0.0, 9.0, -7.0])),
         (FROM_BELOW, np.array([-0.47, 0.31, -1.06])),  # off by (0.03, 0.06, -0.06)
     ),
+    edges=3,
     random_cases=6,
     atol=1e-4,
     forbidden=("scipy",),

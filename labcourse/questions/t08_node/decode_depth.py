@@ -53,6 +53,7 @@ QUESTION = Question(
         (np.array([0, 2], np.uint8), 1, 1, 2, 1),
         *(_counted(*shape) for shape in ((1, 4000), (4000, 1))),  # no count of these fits into a byte
     ),
+    edges=4,
     random_cases=6,
     rtol=1e-5,
     points=3,

@@ -48,6 +48,7 @@ QUESTION = Question(
         (np.zeros((0, 3)),),
         (np.arange(-450.0, 450.0).reshape(300, 3),),  # as many as no byte counts, and no hole
     ),
+    edges=5,
 )
 
 

@@ -59,12 +59,13 @@ QUESTION = Question(
         (np.array([10, 20]), np.array([], int), 5),
         (np.array([0, 33, 66]), np.array([36, 70]), 40),
         (np.array([0, 33, 66]), np.array([0, 34, 66]), 0),  # only what is equal
-        (1000 * np.arange(1, 301), 1000 * np.arange(301) + 400, 400),  # as many as no byte counts
         (np.array([0, 33, 66]), np.array([36, 70]), 40),  # 0 has lost its partner, and 36 is another's
         (np.array([10, 20, 60]), np.array([15, 61]), 9),  # 15 is as near to 10 as to 20
+        (1000 * np.arange(1, 301), 1000 * np.arange(301) + 400, 400),  # as many as no byte counts
         (np.array([_NOW]), np.array([_NOW - 2**32 - 2]), 3),  # four seconds, which 32 bits do not see
         (np.array([_NOW, _NOW + 40]), np.array([_NOW - 70, _NOW - 3, _NOW + 41]), 3),
     ),
+    edges=3,
     random_cases=8,
     points=3,
 )

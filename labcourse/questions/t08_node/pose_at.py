@@ -92,9 +92,9 @@ QUESTION = Question(
         (_STAMPS, _PLACES, _TURNS, 39),
         (_STAMPS, _PLACES, _FURTHER, 90),  # from 170 to 190 degrees: as far from the first
         (_STAMPS, _PLACES, _HARDLY, 150),  # a small turn, but not none
-        (_STAMPS + 1_700_000_000_000_000_000, _PLACES, _TURNS, 1_700_000_000_000_000_050),  # one float64 holds both
         (np.array([0, 40]), np.array([[0.0, 0.0, 0.0], [0.8, 0.0, 0.0]]), _QUARTER, 10),
         (_STAMPS - 40, _PLACES, _TURNS, 0),
+        (_STAMPS + 1_700_000_000_000_000_000, _PLACES, _TURNS, 1_700_000_000_000_000_050),  # one float64 holds both
         (_STAMPS[:3], 125.0 * _PLACES[:3], -_FULL_CIRCLE[100::70], 60),
         (
             40 * np.arange(300),
@@ -103,6 +103,7 @@ QUESTION = Question(
             11_930,
         ),  # no byte counts it
     ),
+    edges=3,
     random_cases=56,
     atol=1e-5,
     points=4,

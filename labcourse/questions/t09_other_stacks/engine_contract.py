@@ -83,6 +83,7 @@ QUESTION = Question(
         (_DIGITS, _DIGITS.copy(), 1e-6),
         *(_engines_of(*shape) for shape in ((255, 1, 1), (2, LONG, 1), (2, 1, LONG), (3, 3, 2))),
     ),
+    edges=9,
     random_cases=24,
     points=3,
     outputs=("kept", "labels that changed", "labels that may change"),

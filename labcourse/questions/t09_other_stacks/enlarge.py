@@ -38,14 +38,15 @@ QUESTION = Question(
         (np.arange(22)[None], (11, 1)),  # 7.5 / 11 * 22 is less than 15 in floating point
         (np.array([[5], [9]]), (1, 11)),  # steps of 2 / 11, added up, are 1 too late
         (np.arange(14)[:, None], (1, 9)),  # in floats 4.5 / (9 / 14) is not 7
+        (np.arange(100, dtype=np.uint8).reshape(10, 10), (20, 20)),  # and 19.5 * 10 * 2 is no byte
         (np.arange(6000)[:, None], (1, 4129)),  # in float32 3419.5 * 6000 / 4129 is off
         (np.array([[300, 2]]), (4, 1)),  # labels need not be bytes
         (np.array([[-(2**31), 2**31 - 1], [-1, 255], [0, 70_000]]), (3, 4)),
         (np.arange(5) + np.arange(LONG)[:, None] % 7, (1, 1)),
         ((np.arange(LONG) % 11)[None], (10_000, 1)),
         (np.array([[0, 1, 2], [1, 2, 0]], np.uint8), (1, 9000)),
-        (np.arange(100, dtype=np.uint8).reshape(10, 10), (20, 20)),  # and 19.5 * 10 * 2 is no byte
     ),
+    edges=6,
     random_cases=8,
     forbidden=("cv2", "PIL"),
 )

@@ -98,6 +98,7 @@ QUESTION = Question(
         ),
         *((_all_hues(shape), np.array([160, 0, 9], np.uint8), np.array([20, 255, 99], np.uint8)) for shape in _LONG),
     ),
+    edges=5,
     random_cases=24,
     forbidden=("cv2",),
 )

@@ -80,6 +80,7 @@ QUESTION = Question(
         _by_hand([[-7]], C=1, W=1, block=1),  # one pixel, and one class
         *(_any_floats(np.random.default_rng(1), **edge) for edge in _EDGES),
     ),
+    edges=7,
     random_cases=12,
     points=3,
 )
@@ -270,7 +271,10 @@ def scores_of_the_best(buffer, C, H, W, block, step):
     return read(buffer, right_places(C, H, W, block, step)).max(axis=0)
 
 
-@wrong("Two bytes, but of which type? Yours is a whole number: where do the negative scores go?", kind=("<i2", "<u2"))
+@wrong(
+    "Two bytes, but of which type? As whole numbers they give what yours gives: where do the negative scores go?",
+    kind=("<i2", "<u2"),
+)
 def whole_numbers(buffer, C, H, W, block, step, kind):
     return read(buffer, right_places(C, H, W, block, step), kind).argmax(axis=0)
 

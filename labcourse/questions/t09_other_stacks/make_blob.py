@@ -36,6 +36,7 @@ QUESTION = Question(
         (_SIX // 255, 4),  # bytes of 0 and 1: what the largest is does not count
         *(((np.arange(3 * LONG) % 256).astype(np.uint8).reshape(*shape, 3), 64) for shape in ((LONG, 1), (1, LONG))),
     ),
+    edges=2,
     random_cases=10,
     rtol=1e-6,
     atol=1e-7,

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from labgrader.comparison import Problem, as_numpy, compare, expected_cases
-from labgrader.question import Misconception, Property, Question, wrong
+from labgrader.question import Misconception, Property, Question, Untold, wrong
 from labgrader.reply.judge import judge, outputs_of, verdict
 from labgrader.reply.sentences import Sentence, recognise
 
@@ -220,6 +220,22 @@ def test_the_first_problem_is_told_with_its_case():
     assert (only_random.case, only_random.where) == (1, "random case 1 of 4")
 
 
+def test_a_telling_case_is_shown_before_an_edge_and_before_whatever_fails_worse():
+    """The last case by hand is an edge: three classes, of which one never occurs; random cases have three classes."""
+    edge = replace(QUESTION, edges=1, misconceptions=[], properties=[])
+
+    def shown(answer):
+        found = judge(edge, answer, seed=3)
+        return found.where, found.sentence.says
+
+    everywhere, _ = shown(lambda n: recall(n) if len(n) == 2 else n[9])  # an exception does not come first
+    assert everywhere == "hand-made case 1 of 2"
+    mostly, _ = shown(lambda n: iou(n) if len(n) == 2 else n[9])
+    assert mostly == "random case 1 of 4"
+    where, says = shown(lambda n: np.nan_to_num(iou(n)))  # only where a class never occurs
+    assert where == "hand-made case 2 of 2" and says.startswith("All usual hand-made cases are right. What is unusual")
+
+
 def test_a_problem_never_holds_an_expected_value():
     """Whatever an answer does, no number of the expected outputs is in what is said."""
     number = 0.7312684519
@@ -245,6 +261,40 @@ def test_one_that_behaves_so_on_some_cases_only_earns_none():
     for answer in (mixed, lambda n: n[7]):
         cases = expected_cases(QUESTION, 3)
         assert recognise(QUESTION, cases, outputs_of(answer, [case.args for case in cases])[0]) is None
+
+
+def test_a_mistake_in_one_of_several_outputs_is_recognised_beside_the_others():
+    both = Question(
+        name="00_test.both", reference=lambda n: (n.sum(), n.mean()), inputs=lambda rng: (rng.integers(1, 99, (2, 3)),)
+    )
+    wrong_both = Misconception(lambda n: (n.max(), n.max()), "the largest is no sum")
+    wrong_second = Misconception(lambda n: (n.sum(), n.max()), "the largest is no mean")
+    both = replace(both, misconceptions=[wrong_both, wrong_second])
+    assert judge(both, lambda n: (n.max(), n.mean()), seed=3).hint == "Output 1 of 2: the largest is no sum"
+    assert judge(both, lambda n: (n.min(), n.max()), seed=3).hint == "Output 2 of 2: the largest is no mean"
+    assert judge(both, lambda n: (n.sum(), n.max()), seed=3).hint == "the largest is no mean"
+    assert "largest" not in judge(both, lambda n: (n.min(), n.mean()), seed=3).hint
+
+
+def test_a_case_in_which_a_listed_mistake_tells_nothing_is_left_out():
+    def some(n):
+        if len(n) == 3:
+            raise Untold
+        return 2 * iou(n)
+
+    listed = replace(PLAIN, misconceptions=[Misconception(some, "twice")])
+    assert judge(listed, lambda n: (2 if len(n) == 2 else 7) * iou(n), seed=3).hint == "twice"
+    assert judge(listed, lambda n: 7 * iou(n), seed=3).hint != "twice"
+
+
+def test_right_cases_are_counted_in_whatever_form_they_come():
+    says = judge(PLAIN, lambda n: tuple(iou(n) * (1 if len(n) == 2 else 9)), seed=3).hint
+    assert says.endswith("1 of 6 cases are right.")
+
+
+def test_a_wrong_sign_is_told_without_a_look_at_the_program():
+    found = judge(PLAIN, lambda n: -iou(n), seed=3)
+    assert not found.needs_a_look and found.hint == "Each of your numbers has the wrong sign."
 
 
 def test_a_misconception_may_raise_where_the_answer_does():

@@ -18,19 +18,19 @@ FRESH = [(np.array([-3.0, 2.0]), np.array([0.25, -8.0]))]
 def found(reference, source, shown=CASES, fresh=FRESH):
     """What repair finds in a program, with the parts that it marks."""
 
-    def entries(expected, got):
+    def off(expected, got):
         same = np.shape(expected) == np.shape(got)
-        return np.isclose(expected, got).ravel() if same else None
+        return np.where(np.isclose(expected, got), 0.0, np.abs(expected - got)).ravel() if same else None
 
     def right(expected, got):
-        return entries(expected, got) is not None and entries(expected, got).all()
+        return off(expected, got) is not None and not off(expected, got).any()
 
     cases, more = ([(args, reference(*args)) for args in some] for some in (shown, fresh))
     pieces = ("quiet", "import numpy as np"), ("f", source)
     lines = source.split("\n")
     return [
         (f.kind, [lines[s.line - 1][s.column : s.end].strip() for s in f.spans])
-        for f in repairs(pieces, "f", cases, lambda: more, right, entries)
+        for f in repairs(pieces, "f", cases, lambda: more, right, off)
     ]
 
 
@@ -51,6 +51,23 @@ def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
     assert found(np.multiply, source)
     monkeypatch.setattr(repair, "MOST_S_OF_ALL", 0.0)
     assert found(np.multiply, source) == []
+
+
+@pytest.mark.parametrize(
+    "now, before, closer",
+    [
+        ([0.0, 0.0], [1.0, 0.0], True),
+        ([0.5, 1.0], [1.0, 2.0], True),
+        ([0.0, 2.0], [1.0, 2.0], False),  # one is right, and the other as wrong as before
+        ([0.0, 0.1], [1.0, 0.0], False),  # one was right
+        ([0.0], None, True),  # of another form before
+        ([0.3], None, False),
+        (None, [1.0], False),
+    ],
+)
+def test_a_mark_beside_a_listed_mistake_brings_each_number_of_the_case_closer(now, before, closer):
+    arrays = [None if numbers is None else np.array(numbers) for numbers in (now, before)]
+    assert repair.is_closer(*arrays) is closer
 
 
 def test_what_no_single_change_mends_is_not_found():

@@ -172,7 +172,7 @@ def test_a_question_is_complete(name):
     titles = [m.name for m in question.misconceptions]
     assert len(set(titles)) == len(titles)
     assert len(set(alternatives(question))) >= 2
-    assert question.by_hand and question.random_cases >= 3 and question.points > 0
+    assert 0 <= question.edges < len(question.by_hand) and question.random_cases >= 3 and question.points > 0
     for misconception in question.misconceptions:
         assert 20 <= len(misconception.hint) <= 200 and "\n" not in misconception.hint
         assert misconception.hint[-1] in ".?!:", misconception.hint

@@ -51,6 +51,14 @@ def edge(y):
     return ~np.pad(np.ones((y.shape[0] - 2, y.shape[1] - 2), bool), 1)
 
 
+FEW = Question(name="00_test.few", reference=lambda a: a > 0.5, inputs=lambda rng: (rng.random(2),), random_cases=3)
+
+
+def last_of_one(d):
+    """True at one place of the last row, in some images."""
+    return (np.arange(30).reshape(5, 6) == 26) & (d[0, 0] > 0.6)
+
+
 HOLDS = [
     (TABLE, lambda a, k: table(a, k).T, "rows and columns are exchanged"),
     (BLOCK, lambda a: 2 * a.transpose(1, 2, 0), "the axes stand in another order"),
@@ -75,7 +83,7 @@ HOLDS = [
     (IMAGE, lambda y, d: np.where(y == 255, 0.0, d + y), "only where y is 255"),
     (IMAGE, lambda y, d: without(d, y, edge(y), 7.0), "only at the border"),
     (IMAGE, lambda y, d: without(d, y, np.arange(6) == 0, 7.0), "only in the first column"),
-    (BOTH, lambda a: (a.min(), a.max(), a.sum()), "Outputs 1 and 2 are exchanged"),
+    (BOTH, lambda a: (a.min(), a.max(), a.sum()), "Outputs 1 and 2 are swapped"),
     (BOTH, lambda a: a.min(), "You return only output 2 of 3"),
     (BOTH, lambda a: (a.max(), -a.min(), a.sum()), "Output 2 of 3: Each of your numbers has the wrong sign"),
     (BLOCK, lambda a: (a, 2 * a), "Number 2 of what you return is right"),
@@ -101,6 +109,9 @@ NEARLY = [
     (FLAGS, lambda a: (a <= 0.5) | (a > 0.9)),
     (IMAGE, lambda y, d: without(d, y, edge(y), 7.0) + (np.arange(30).reshape(5, 6) == 14)),
     (BOTH, lambda a: (a.min(), a.max(), a.sum() + 1)),
+    (IMAGE, lambda y, d: without(d, y, last_of_one(d), 7.0)),  # wrong in one place of two cases
+    (FEW, lambda a: (a > 0.5)[::-1]),  # of two truth values one in four is the other way round
+    (FEW, lambda a: ~(a > 0.5)),
     (Question(name="00_test.one", reference=lambda a: 2.0, inputs=lambda rng: (rng.random(3),)), lambda a: 4.0),
 ]  # fmt: skip
 
@@ -115,6 +126,19 @@ def test_an_endless_loop_is_told_what_to_look_at():
     cases = expected_cases(TABLE, 1)
     never = [Problem("time", "it did not return in time")] * len(cases)
     assert "does not end" in next(sentences(TABLE, cases, never)).says
+
+
+def test_what_is_right_but_slow_is_told_that_it_is_slow():
+    sizes = iter([2, 3, 40])
+    rows = Question(
+        name="00_test.row", reference=np.sort, inputs=lambda rng: (rng.random(next(sizes)),), random_cases=3
+    )
+    cases, late = expected_cases(rows, 1), Problem("time", "it did not return in time")
+    right = [case.expected for case in cases]
+    assert "too slow for a case as large as this one" in next(sentences(rows, cases, [*right[:2], late])).says
+    assert "does not end" in next(sentences(rows, cases, [right[0], late, late])).says, "no case is much larger"
+    asleep = Problem("time", "it slept for 10 seconds")
+    assert "computes nothing" in next(sentences(rows, cases, [*right[:2], asleep])).says
 
 
 def test_a_right_answer_is_told_nothing():

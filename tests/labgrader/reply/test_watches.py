@@ -26,12 +26,18 @@ def right(expected, got):
     return np.shape(expected) == np.shape(got) and np.allclose(expected, got, equal_nan=True)
 
 
+def near(x):
+    return np.exp(-(x.astype(float) ** 2).sum())
+
+
+BYTES = (np.array([0, 3], np.uint8),)
 Z = (np.array([1.0, 2.0]), np.array([3.0, 1000.0]))
 N = (np.array([3.0, 1.0]), np.zeros(2))
 # A reference, arguments, an answer, and what is found with its marked part.
 FOUND = [
     (softmax, Z, "def f(z):\n    e = np.exp(z)\n    return e / e.sum()", [("overflow", "np.exp(z)")]),
     (softmax, Z, "e = lambda z: np.exp(z)\ndef f(z): return e(z) / e(z).sum()", [("overflow", "np.exp(z)")]),
+    (near, BYTES, "def f(x):\n    d = (x * x).sum()\n    return np.exp(-d)", [("wraps", "-d")]),
     (softmax, Z, "def f(z):\n    return np.log(z - 5)", [("no number", "np.log(z - 5)")]),
     (shares, N, "def f(n):\n    s = n.sum()\n    return n * (1 / s)", [("division", "1 / s")]),
     (shares, N, "def f(n):\n    n /= max(n.sum(), 1)\n    return n", [("writes", "n /= max(n.sum(), 1)")]),
@@ -42,6 +48,7 @@ SILENT = [
     (mean_or_nan, (np.ones(3), np.zeros(0)), "def f(n):\n    return n.sum() / np.float64(n.size) + (n.size > 0)"),
     (softmax, Z, "def f(z):\n    np.exp(z)\n    return 0 * z"),  # overflows, and nothing that is wrong hangs on it
     (softmax, Z[:1], "def f(z):\n    return np.exp(z)"),  # wrong, and nothing overflows
+    (softmax, Z, "def f(z):\n    return np.exp(z) / 7"),  # what overflows is not the case that is shown
     (shares, N, "def f(n):\n    return undefined"),
     (shares, N, "def f(n:\n"),
     (shares, N, "def g(n):\n    return n"),

@@ -19,6 +19,7 @@ from labgrader.program.slice import Program
 from labgrader.reply.finding import Span
 from labgrader.run import subprocess_worker
 from labgrader.run.run import Budget, Limits, Run, public_cases
+from labgrader.run.stopwatch import Stopwatch, waited_s
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 IOU = find("04_iou.iou")
@@ -116,12 +117,12 @@ PROBLEMS = [
     ("def iou(n):\n" + RIGHT + "raise ValueError", None, ""),
     ("import os\ndef iou(n): os._exit(3)", "ended", "it ended or crashed the process that it ran in"),
     ("x = bytearray(8 << 30)\ndef iou(n): return n", "exception", "MemoryError"),
-    ("import time\ndef iou(n): time.sleep(9)", "time", "it did not return in time: does a loop never end?"),
-    ("def iou(n):\n    while True: pass", "time", "it did not return in time: does a loop never end?"),
+    ("import time\ndef iou(n): time.sleep(9)", "time", "it did not return in time"),
+    ("def iou(n):\n    while True: pass", "time", "it did not return in time"),
     ("def iou(n):\n    while True:\n        try:\n            while True: pass\n        except BaseException: pass",
-     "time", "it did not return in time: does a loop never end?"),
+     "time", "it did not return in time"),
     (SLOW.format(0.1) + RIGHT, "time", ""),
-    ("while True: pass\ndef iou(n): return 0", "time", "it did not return in time: does a loop never end?"),
+    ("while True: pass\ndef iou(n): return 0", "time", "it did not return in time"),
 ]  # fmt: skip
 
 
@@ -131,6 +132,36 @@ def test_each_kind_of_problem_is_said_and_costs_nothing_else(source, kind, says)
     assert getattr(verdict.problem, "kind", None) == kind
     assert kind is None or (says in verdict.problem.says and len(verdict.problem.says) < 250)
     assert not (found and kind == "time")
+
+
+def test_an_answer_that_sleeps_ends_a_check_soon_and_one_that_works_does_not():
+    limits = Limits(case_s=8.0, asleep_s=0.4)
+    verdict, _, _ = judged("import time\ndef iou(n):\n    time.sleep(0.15)\n" + RIGHT, limits=limits)
+    assert (verdict.problem.says, verdict.case) == ("it slept for 0.4 seconds", 2), "all cases together"
+    assert verdict.hint.startswith("It waits, and computes nothing")
+    assert judged(SLOW.format(0.1) + RIGHT, limits=limits)[0].passed
+
+
+SPIN = "import os\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\nprint(flush=True)\nwhile True: pass"
+
+
+@pytest.mark.skipif(waited_s(os.getpid()) is None, reason="the system does not tell sleep from waiting")
+def test_what_waits_for_a_processor_does_not_sleep():
+    """Two processes on one processor: neither of them sleeps, and one of them is idle for half of the time."""
+    both = [subprocess.Popen([sys.executable, "-c", SPIN], stdout=subprocess.PIPE) for _ in range(2)]
+    sleeper = subprocess.Popen([sys.executable, "-c", "import time; print(flush=True); time.sleep(60)"],
+                               stdout=subprocess.PIPE)  # fmt: skip
+    try:
+        for process in (*both, sleeper):
+            process.stdout.readline()
+        watches = [Stopwatch(process.pid) for process in (*both, sleeper)]
+        time.sleep(0.6)
+        spun, also, slept = ((watch.used(), watch.slept) for watch in watches)
+        assert spun[0] + also[0] < 0.9 and spun[1] < 0.1 and also[1] < 0.1 and slept[1] > 0.4
+    finally:
+        for process in (*both, sleeper):
+            process.kill()
+            process.communicate()
 
 
 def test_time_in_which_it_cannot_run_is_not_an_answers():
