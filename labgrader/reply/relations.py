@@ -47,7 +47,7 @@ class View:
         return a.shape == b.shape and not self.different(a, b).any()
 
     def gives(self, change: Callable) -> bool:
-        """Whether change(expected) is what came in all cases, and chance would not show it; zeros alone show nothing."""
+        """Whether change(expected) is what came in all cases, not by chance; zeros alone show nothing."""
         chance = 1.0
         for e, g in zip(self.expected, self.got, strict=True):
             p = attempt(change, e)

@@ -100,7 +100,7 @@ CASES = [
            "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
     (nine_more, "✘ share: 2 of 2 values are wrong\n" + HERE +
            "      returns   [[10, 12]]\n      expected  [[0.98127, 1.4813]]\n"
-           "  Hint: This holds of every right answer, and not of yours: shares are not over two."),
+           "  Hint: Every right answer has this property, and yours does not: shares are not over two."),
     (flags, "✘ share: expected real numbers, got dtype bool: write .astype(float) or .astype(int)\n" + HERE +
            "      returns   [[True, True]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
@@ -247,7 +247,7 @@ def test_the_counterexample_comes_at_once_and_the_marked_line_joins_it(tmp_path)
     label = "Look at line 3:  "
     line = f"  {label}return i / (n.sum(0) - n.sum(1) - i)"
     text = shown.data["text/plain"]
-    assert f"{line}\n{' ' * line.index('-')}^\n  Hint: Another operator belongs at the marked place." in text
+    assert f"{line}\n{' ' * line.index('-')}^\n  Hint: The marked place needs another operator." in text
     assert f"{label}<code>return i / (n.sum(0) <mark>-</mark> n.sum(1) - i)</code>" in shown.data["text/html"]
     assert checking.LOOKING not in text
 
@@ -277,7 +277,7 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
     assert "IndexError" in shown[5][0] and "line 2:  return n[99]" in shown[5][0]
     assert "did not return in time" in shown[7][0]
     assert shown[9][0].startswith("✔ iou is right") and outputs[9][-1].text == "True\n"
-    assert shown[10][0].startswith("✘ iou cannot be graded") and "another function than iou of your" in shown[10][0]
+    assert shown[10][0].startswith("✘ iou cannot be graded") and "not the iou of your notebook" in shown[10][0]
     assert outputs[10][-1].text == "False\n"  # not the notebook's, which is right: it was not asked about
     assert "text/html" in outputs[9][0].data
     assert not [o for cell in outputs for o in cell if o.output_type == "stream" and o.name == "stderr"]
