@@ -13,7 +13,7 @@ from labcli.pictures import Shot, read_frame, read_numbers  # noqa: F401, labs l
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import Plane, Table, back_project, base_on_table, find_tables, invert_transform
 from labkit.geometry.depth_units import LIKELY
-from labkit.geometry.tables import height_of, table_at
+from labkit.geometry.tables import height_of, planes_beside, table_at
 from labkit.grasp import Gripper
 from labkit.labels import CLASSES, IGNORE, TARGET
 from labkit.notices import notices
@@ -54,14 +54,14 @@ def read_workspace(text: str) -> tuple[tuple[float, float], ...]:
     return tuple(zip(numbers[::2], numbers[1::2], strict=True))
 
 
-def read_pixel(text: str) -> tuple[float, float]:
+def read_pixel(text: str, name: str = "at") -> tuple[float, float]:
     """Read "u,v", a pixel's column and row; raises ValueError for other words than two numbers.
 
     >>> read_pixel("320, 200")
     (320.0, 200.0)
     """
     numbers = numbers_of(text)
-    require("at", len(numbers) == 2, 'two numbers "u,v", column and row of a pixel', repr(text))
+    require(name, len(numbers) == 2, 'two numbers "u,v", column and row of a pixel', repr(text))
     return tuple(numbers)
 
 
@@ -148,13 +148,20 @@ class Seen:
 
 
 def perceive(
-    frame: RGBDFrame, pipeline: Pipeline, labels=None, instances=None, T_base_cam=None, table_z: float = 0.0, at=None
+    frame: RGBDFrame,
+    pipeline: Pipeline,
+    labels=None,
+    instances=None,
+    T_base_cam=None,
+    table_z: float = 0.0,
+    at=None,
+    not_at=None,
 ) -> Seen:
     """Run the chain on a frame that is given in the camera's own frame.
 
     labels: somebody else's, and the `instances` among them if known; else the pipeline perceives. T_base_cam: the
     camera's pose, with the table at height `table_z`; without it the table is found in the depth picture, and the base
-    frame laid under it so that the table is at that height. at: as in `Pipeline.run`. Raises ValueError if no plane can
+    frame laid under it so that the table is at that height. at, not_at: as in `Pipeline.run`. Raises ValueError if no plane can
     be found, or for an argument that does not fit. Topics 06 and 07.
     """
     plane = None
@@ -163,12 +170,12 @@ def perceive(
     else:
         frame = replace(frame, T_base_cam=T_base_cam, table_z=table_z)
     if labels is None:
-        perception = pipeline.run(frame, at)
+        perception = pipeline.run(frame, at, not_at)
     else:
-        perception = pipeline.locate(frame, labels, instances=instances, at=at)
+        perception = pipeline.locate(frame, labels, instances=instances, at=at, not_at=not_at)
     tables = perception.tables or find_tables(perception.points, frame.T_base_cam[:3, 3], up=(0.0, 0.0, 1.0))
     table = table_at(tables, table_z)
-    others = tuple(other for other in tables if other is not table)
+    others = tuple(planes_beside(tables, table))
     return Seen(frame, perception, notices(frame, perception), plane, pipeline.gripper, others)
 
 

@@ -65,11 +65,11 @@ class Shot:
             image = cv2.resize(image, self.frame.size, interpolation=cv2.INTER_NEAREST_EXACT)
         return rectify(image, self.camera, outside=outside)
 
-    def pixel(self, u: float, v: float) -> tuple[float, float]:
+    def pixel(self, u: float, v: float, name: str = "at") -> tuple[float, float]:
         """Where a pixel of the colour file lies in the frame; raises ValueError for one outside of it."""
         (w, h), (W, H) = self.file_size, self.frame.size
         require(
-            "at", -0.5 <= u < w - 0.5 and -0.5 <= v < h - 0.5, f"a pixel (u, v) of the picture of {w} x {h}", (u, v)
+            name, -0.5 <= u < w - 0.5 and -0.5 <= v < h - 0.5, f"a pixel (u, v) of the picture of {w} x {h}", (u, v)
         )
         place = np.array([(u + 0.5) * W / w - 0.5, (v + 0.5) * H / h - 0.5])
         if self.camera.lens is not None:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Integer, UInt8
+from jaxtyping import Bool, Float, Integer, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import Plane, back_project_to_base, find_tables, fit_plane
+from labkit.geometry.depth_units import FACTORS
 from labkit.geometry.tables import THICK, height_of, table_at
 from labkit.labels import CLASSES, SURFACE, TARGET
 
@@ -146,14 +147,11 @@ def _not_the_likeliest(chosen, tables) -> str:
     return f"things stand on another plane, {rise:+.2f} m from the one at the table's height: is it the table?"
 
 
-UNITS = (0.001, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 1000.0)  # by which depth is often wrong
-
-
 def _nothing_near(points: Float[np.ndarray, "N 3"], camera: Float[np.ndarray, "3"], table_z: float, share) -> str:
     """Say how little is near the table's height, and by which usual factor depth is wrong if most then lies there."""
     said = f"only {share:.0%} of the picture has depth within {NEAR} m of the table's height"
     z = points[np.isfinite(points[:, 2]), 2]
-    for factor in UNITS:
+    for factor in FACTORS:
         if len(z) and np.mean(np.abs(camera[2] + factor * (z - camera[2]) - table_z) < RISE) > 0.5:
             return f"{said}; of depth times {factor:g} most lies on the table: is depth_scale wrong?"
     return said
@@ -216,38 +214,101 @@ REACH = 20  # pixels within which a shift is looked for
 JUMP = 0.12  # of the Sobel filter on the logarithm of depth: more is the edge of a thing
 HOLE = 12  # pixels that a thing's shadow, where a camera reads no depth, is wide at most
 PEAK, SURE = 4.0, 1.5  # a shift fits that much better: than usual ones, in standard deviations; than none, as a factor
+SCALES = tuple(np.arange(0.84, 1.19, 0.02).round(2).tolist())  # of depth, to what it would be in the colour camera
+SAME_SCALE = 0.03  # scales that are no further from 1 go unnoticed
+BETTER, STRONG = 1.15, 0.12  # a scale fits that much better than none, and edges under jumps are that strong, of 1
+SPREAD = 0.1  # of the width: how far jumps stray from their middle, at least
 
 
 def _shifted(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"]) -> str:
-    """Look for the shift at which jumps of depth lie on edges of colour that run the same way."""
+    """Look for the shift at which jumps of depth lie on edges of colour that run the same way, and for a scale."""
     step = max(1, round(rgb.shape[1] / 640))
-    smooth = cv2.GaussianBlur(rgb, (0, 0), float(step)).astype(np.float32)[::step, ::step]
-    if min(smooth.shape[:2]) < 4 * REACH:  # too small to shift about in
+    fit = _fits(rgb, depth, step, REACH)
+    if fit is None:
         return ""
-    filled, around = np.ascontiguousarray(np.nan_to_num(depth[::step, ::step])), np.ones((3, 3), np.uint8)
-    if min(filled.shape) <= 4 * REACH:
-        return ""  # too small to tell a shift from anything else
-    for _ in range(HOLE):  # what is hidden is behind: it is as far as the farthest that is seen close by
-        filled = np.where(filled > 0.0, filled, cv2.dilate(filled, around))
-    filled = np.log(np.where(filled > 0.0, filled, filled.max()))
-    score, count = 0.0, 0
-    for way in ((1, 0), (0, 1)):
-        colour = np.sqrt((cv2.Sobel(smooth, cv2.CV_32F, *way) ** 2).sum(axis=2))
-        colour = np.minimum(colour, np.percentile(colour, 97))
-        colour -= cv2.blur(colour, (2 * REACH + 1, 2 * REACH + 1))  # edges, not textures
-        jumps = (np.abs(cv2.Sobel(filled, cv2.CV_32F, *way)) > JUMP).astype(np.float32)[REACH:-REACH, REACH:-REACH]
-        count += jumps.sum()
-        score = score + cv2.matchTemplate(colour, jumps, cv2.TM_CCORR)  # [REACH, REACH] is no shift
-    if count < 100:
-        return ""
-    score -= np.median(score)
+    score = fit - np.median(fit)
     dy, dx = np.array(np.unravel_index(score.argmax(), score.shape)) - REACH
+    here = score[REACH - 2 : REACH + 3, REACH - 2 : REACH + 3].max()
+    if score.max() < SURE * here:
+        return ""
+    scaled = _scaled(rgb, depth, 2 * step, REACH)
+    if scaled:
+        return scaled
     if max(abs(dx), abs(dy)) == REACH or score.max() < PEAK * score.std():  # a slope, or noise, and no peak
         return ""
-    here = score[REACH - 2 : REACH + 3, REACH - 2 : REACH + 3].max()
-    if max(abs(dx), abs(dy)) * step <= SHIFT or score.max() < SURE * here:
+    if max(abs(dx), abs(dy)) * step <= SHIFT:
         return ""
     return f"depth lies ({-dx * step}, {-dy * step}) pixels off the colours: is it aligned to colour, of one moment?"
+
+
+def _scaled(rgb: UInt8[np.ndarray, "H W 3"], depth: Float[np.ndarray, "H W"], step: int, reach: int) -> str:
+    """Look for a scale about the picture's middle, as of a depth camera of another focal length, beside a shift.
+
+    A scale tells only where jumps are spread over the picture: those of one thing can be laid on many edges.
+    """
+    fits = {scale: _fits(rgb, depth, step, reach, scale) for scale in SCALES}
+    fits = {scale: fit for scale, fit in fits.items() if fit is not None}
+    if 1.0 not in fits:
+        return ""
+    best = max(fits, key=lambda scale: fits[scale].max())
+    if abs(best - 1.0) <= SAME_SCALE or fits[best].max() < max(BETTER * fits[1.0].max(), STRONG):
+        return ""
+    jumps = np.argwhere(_jumps(_far_filled(depth[::step, ::step]))[0])
+    if jumps.std(axis=0).min() < SPREAD * rgb.shape[1] / step:
+        return ""
+    dy, dx = np.array(np.unravel_index(fits[best].argmax(), fits[best].shape)) - reach
+    return (
+        f"depth is {1.0 / best:.2f} times as large as the colours and lies ({-dx * step}, {-dy * step}) pixels off "
+        "them: is it as the depth camera sees it, of another focal length, and not aligned to colour?"
+    )
+
+
+def _fits(rgb, depth, step: int, reach: int, scale: float = 1.0) -> Float[np.ndarray, "R R"] | None:
+    """How well jumps of depth, scaled, lie on edges of colour at each shift up to `reach`, [reach, reach] is none.
+
+    Every `step`-th pixel counts. The mean over the jumps of the strength of colour's edge under each, less what is
+    usual around it; None for a picture that is too small, or for less than a hundred jumps.
+    """
+    smooth = cv2.GaussianBlur(rgb, (0, 0), float(step)).astype(np.float32)[::step, ::step]
+    if min(smooth.shape[:2]) <= 4 * reach:  # too small to tell a shift from anything else
+        return None
+    score, count, strongest = 0.0, 0, 1e-6
+    filled = _far_filled(depth[::step, ::step])
+    if scale != 1.0:
+        middle = (np.array(filled.shape[::-1]) - 1.0) / 2.0
+        to = np.column_stack([scale * np.eye(2), (1.0 - scale) * middle])
+        filled = cv2.warpAffine(filled, to, filled.shape[::-1], flags=cv2.INTER_NEAREST)
+    for way, jumps in zip(WAYS_OF_EDGES, _jumps(filled), strict=True):
+        colour = np.sqrt((cv2.Sobel(smooth, cv2.CV_32F, *way) ** 2).sum(axis=2))
+        most = float(np.percentile(colour, 97))
+        strongest = max(strongest, most)
+        colour = np.minimum(colour, most)
+        colour -= cv2.blur(colour, (2 * reach + 1, 2 * reach + 1))  # edges, not textures
+        jumps = jumps.astype(np.float32)[reach:-reach, reach:-reach]
+        count += jumps.sum()
+        score = score + cv2.matchTemplate(colour, jumps, cv2.TM_CCORR)
+    return score / (count * strongest) if count >= 100 else None
+
+
+WAYS_OF_EDGES = (1, 0), (0, 1)
+
+
+def _far_filled(depth: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    """Depth with its holes filled: what is hidden is behind, as far as the farthest that is seen close by; else 0."""
+    filled, around = np.ascontiguousarray(np.nan_to_num(depth), np.float32), np.ones((3, 3), np.uint8)
+    for _ in range(HOLE):
+        filled = np.where(filled > 0.0, filled, cv2.dilate(filled, around))
+    return filled
+
+
+def _jumps(filled: Float[np.ndarray, "h w"]) -> list[Bool[np.ndarray, "h w"]]:
+    """Where depth jumps along the columns and along the rows, between two readings.
+
+    Where depth ends, and nothing is known beyond, is no edge of a thing: filling has moved it outwards.
+    """
+    known = cv2.erode((filled > 0.0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    depth = np.log(np.where(filled > 0.0, filled, 1.0))
+    return [known & (np.abs(cv2.Sobel(depth, cv2.CV_32F, *way)) > JUMP) for way in WAYS_OF_EDGES]
 
 
 def _blind(frame: RGBDFrame, perception) -> str:

@@ -18,9 +18,10 @@ from labkit.learning.engines import class_number, open_engine
 from labkit.learning.inference import Engine, FunctionEngine, check_probabilities
 from labkit.learning.things import predicts_instances, segment_instances
 from labkit.notices import notices
-from labkit.support.validation import check_height, check_pixel, check_rgb, check_whole, require
+from labkit.support.validation import check_height, check_rgb, check_whole, require
 from labkit.targets import (
     WORKSPACE,
+    Clicks,
     Segmentation,
     TargetFinder,
     certainty_in,
@@ -94,6 +95,8 @@ class Pipeline:
     back_project: a function (depth, K, T_base_cam) -> (H, W, 3), in place of the kit's.
     split: a function of the target's points (N, 3) to a list of index arrays, one for each object.
     grasp: a function (clouds, scene, table_z, camera_position) -> GraspPlan, in place of the kit's planner.
+    unit_known: True if the unit of depth is certain. Otherwise nothing is grasped where the targets' distance and sizes
+        fit another unit and not this one; the plan's reason says so (`labkit.geometry.depth_units.other_unit`).
 
     Raises ValueError for an argument that does not fit. Topics 03, 06 and 07.
 
@@ -121,6 +124,7 @@ class Pipeline:
         back_project: Callable = back_project_to_base,
         split: Callable[[np.ndarray], Sequence[np.ndarray]] = separate_objects,
         grasp: Callable[..., GraspPlan] | None = None,
+        unit_known: bool = False,
     ):
         require("find_objects", model is None or find_objects is None, "none beside a model", "both")
         require("gripper", grasp is None or gripper is None, "none beside `grasp`, which plans for its own", "both")
@@ -134,23 +138,25 @@ class Pipeline:
         self.flip_tta = sees_view if flip_tta is None else flip_tta
         crf = not isinstance(self.model, FunctionEngine) if crf is None else crf
         self.crf = refine_labels if crf is True else crf
-        self.targets = TargetFinder(workspace, split)
+        self.targets = TargetFinder(workspace, split, unit_known)
         self.back_project = back_project
         self.gripper = gripper or Gripper()
         self.grasp = grasp
 
-    def run(self, frame: RGBDFrame, at: Sequence | None = None) -> Perception:
+    def run(self, frame: RGBDFrame, at: Sequence | None = None, not_at: Sequence | None = None) -> Perception:
         """From a frame to grasps: `perceive`, then `locate`.
 
         at: a pixel (u, v), column and row: the thing there is the only target, whatever its class and wherever in the
         workspace it stands; if there is none, the plan's reason says what is there. A network that tells things apart,
-        or `find_objects`, says which pixels it has; of a network of classes alone those that hang together. Raises
-        ValueError for a pixel outside the picture.
+        or `find_objects`, says which pixels it has; of a network of classes alone those that hang together. not_at: a
+        pixel of that thing that is none of it, such as of the can on which a can stands: an exact cut on colour and
+        depth parts them (`labkit.crf.clicks`, topic 02). Either may be several pixels. Raises ValueError for a pixel
+        outside the picture, one that is both, or `not_at` alone.
         """
         frame, seconds = self._with_table_z(frame), {}
-        at = None if at is None else check_pixel("at", at, frame.size)
-        seen = self._perceive(frame, seconds, at is not None)
-        return self._locate(frame, seen, seconds, at)
+        clicks = Clicks.of(frame, at, not_at)
+        seen = self._perceive(frame, seconds, bool(clicks.at))
+        return self._locate(frame, seen, seconds, clicks)
 
     def perceive(self, frame: RGBDFrame) -> tuple[UInt8[np.ndarray, "H W"], Float[np.ndarray, "H W C"] | None]:
         """Label every pixel: labels, and the class probabilities that they were chosen by.
@@ -168,12 +174,13 @@ class Pipeline:
         probabilities: Float[np.ndarray, "H W C"] | None = None,
         instances: Integer[np.ndarray, "H W"] | None = None,
         at: Sequence | None = None,
+        not_at: Sequence | None = None,
     ) -> Perception:
         """Find the labelled targets in space, and grasps for them.
 
         labels: of this pipeline's `perceive`, true ones, or anybody's: any classes, 255 for "unknown". probabilities:
         what they were chosen by, if anything. instances: numbers of objects, 0 for none, in place of `split`: of the
-        pixels labelled target, those of one number are one target. at: as in `run`. Raises ValueError naming the
+        pixels labelled target, those of one number are one target. at, not_at: as in `run`. Raises ValueError naming the
         argument that does not fit.
         """
         labels, target = labels_in(frame, labels), self.target_class
@@ -181,8 +188,8 @@ class Pipeline:
             target = self._target_in(check_probabilities(probabilities, labels.shape))
         if instances is not None:
             instances = instances_in(frame, instances)
-        at = None if at is None else check_pixel("at", at, frame.size)
-        return self._locate(self._with_table_z(frame), Segmentation(labels, target, probabilities, instances), {}, at)
+        seen = Segmentation(labels, target, probabilities, instances)
+        return self._locate(self._with_table_z(frame), seen, {}, Clicks.of(frame, at, not_at))
 
     def _with_table_z(self, frame: RGBDFrame) -> RGBDFrame:
         """The frame with the height of the table that counts: this pipeline's, or else its own, or else 0."""
@@ -218,11 +225,11 @@ class Pipeline:
             labels = self.crf(probabilities, frame) if self.crf else most_probable(probabilities)
         return Segmentation(labels_in(frame, labels), target, probabilities, instances, certainty)
 
-    def _locate(self, frame: RGBDFrame, seen: Segmentation, seconds: dict[str, float], at=None) -> Perception:
+    def _locate(self, frame: RGBDFrame, seen: Segmentation, seconds: dict[str, float], clicks: Clicks) -> Perception:
         with timed(seconds, "back_projection"):
             points = self.back_project(frame.depth, frame.K, frame.T_base_cam)
         with timed(seconds, "clouds"):
-            found = self.targets.find(seen, points, frame, at)
+            found = self.targets.find(seen, points, frame, clicks)
         with timed(seconds, "grasps"):
             plan = self.plan(found.clouds, found.scene, frame, found.certainty, found.why_none)
         return Perception(
@@ -242,8 +249,8 @@ class Pipeline:
         )
 
     def plan(self, clouds, scene: Float[np.ndarray, "M 3"], frame: RGBDFrame, certainty, why_none: str) -> GraspPlan:
-        """Plan grasps of the clouds among the scene; without any cloud the plan says why there is none."""
-        if not clouds:
+        """Plan grasps of the clouds among the scene; without any cloud, or with a reason, the plan says why not."""
+        if why_none or not clouds:
             return GraspPlan(reason=why_none)
         camera_position = frame.T_base_cam[:3, 3]
         if self.grasp is not None:

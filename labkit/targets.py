@@ -13,14 +13,17 @@ from jaxtyping import Float, Integer, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.geometry import Table, cluster_indices, find_tables, inlier_indices
-from labkit.geometry.tables import reasons_against, table_at
+from labkit.geometry.depth_units import other_unit
+from labkit.geometry.standing import reasons_against
+from labkit.geometry.tables import table_at
 from labkit.labels import IGNORE, OBSTACLE
-from labkit.support.validation import check_finite, check_labels, check_shape, require
+from labkit.support.validation import check_finite, check_labels, check_pixel, check_shape, require
 
 # What the Panda can reach and meet, in front of it: x, y from its base, z from the table; metres.
 WORKSPACE = ((0.15, 1.0), (-0.7, 0.7), (-0.02, 0.5))
 # Where nobody knows it: what was seen over the table, and a little under it for the noise.
 EVERYWHERE = ((-20.0, 20.0), (-20.0, 20.0), (-0.02, 0.5))
+FEW = 30  # points: of fewer, no length is told
 NO_TARGET = "no target points"  # as the planner says
 ON_TABLE = 0.01  # metres over or under the table's height: what is there is the table
 
@@ -45,7 +48,7 @@ class Segmentation:
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What was found: the fields of a `labkit.pipeline.Perception`, and why there is no target where there is none."""
+    """What was found: the fields of a `labkit.pipeline.Perception`, and why nothing is to be grasped, if so."""
 
     labels: UInt8[np.ndarray, "H W"]
     pixels: list[Integer[np.ndarray, "_"]]
@@ -57,11 +60,38 @@ class Targets:
     why_none: str
 
 
-class TargetFinder:
-    """Finds targets as a `Pipeline` of the same arguments does: workspace and split."""
+@dataclass(frozen=True)
+class Clicks:
+    """Pixels (u, v): `at` lie on the thing that is asked for, `not_at` on what is no part of it."""
 
-    def __init__(self, workspace: Sequence[Sequence[float]] | str, split: Callable):
-        self.split = split
+    at: tuple[tuple[int, int], ...] = ()
+    not_at: tuple[tuple[int, int], ...] = ()
+
+    @classmethod
+    def of(cls, frame: RGBDFrame, at: Sequence | None, not_at: Sequence | None) -> "Clicks":
+        """Clicks on a frame, each a pixel, several or None; raises ValueError naming the one that does not fit.
+
+        >>> frame = RGBDFrame(np.zeros((6, 8, 3), np.uint8), np.ones((6, 8), np.float32), np.eye(3), np.eye(4))
+        >>> Clicks.of(frame, (3, 4), [(5, 2), (6.0, 2.2)])
+        Clicks(at=((3, 4),), not_at=((5, 2), (6, 2)))
+        """
+        given = {name: () if many is None else many for name, many in (("at", at), ("not_at", not_at))}
+        alone = {name: (many,) if len(many) and np.ndim(many[0]) == 0 else many for name, many in given.items()}
+        at, not_at = (tuple(check_pixel(name, one, frame.size) for one in many) for name, many in alone.items())
+        require("not_at", at or not not_at, "a pixel `at` the thing beside it", not_at)
+        twice = [pixel for pixel in not_at if pixel in at]
+        require("not_at", not twice, "other pixels than `at`", lambda: f"{twice[0]} in both")
+        return cls(at, not_at)
+
+
+NO_CLICK = Clicks()
+
+
+class TargetFinder:
+    """Finds targets as a `Pipeline` of the same arguments does: workspace, split and unit_known."""
+
+    def __init__(self, workspace: Sequence[Sequence[float]] | str, split: Callable, unit_known: bool = False):
+        self.split, self.unit_known = split, unit_known
         self.only_on_table = isinstance(workspace, str)
         if self.only_on_table:
             require("workspace", workspace == "table", '((x, x), (y, y), (z, z)) or "table"', repr(workspace))
@@ -70,20 +100,24 @@ class TargetFinder:
         in_order = (self.workspace[:, 0] < self.workspace[:, 1]).all()
         require("workspace", in_order, "from < to for each of x, y and z", self.workspace.tolist)
 
-    def find(self, seen: Segmentation, points: Float[np.ndarray, "H W 3"], frame: RGBDFrame, at=None) -> Targets:
-        """Find the targets of a frame. points: of the base frame, metres, NaN without depth. at: as `Pipeline.run`."""
-        if at is not None:
-            seen = self._only_at(at, seen, points, frame.table_z)
+    def find(
+        self, seen: Segmentation, points: Float[np.ndarray, "H W 3"], frame: RGBDFrame, clicks: Clicks = NO_CLICK
+    ) -> Targets:
+        """Find the targets of a frame. points: of the base frame, metres, NaN without depth."""
+        if clicks.at:
+            seen = self._only_at(clicks, seen, points, frame)
         flat = points.reshape(-1, 3)
         pixels, inside = self._pixels(seen, flat, frame.table_z)
         tables, left_out = (), ()
-        if self.only_on_table and at is None:
+        if self.only_on_table and not clicks.at:
             tables, pixels, left_out = _those_on_the_table(points, pixels, frame)
         scene = flat.compress(inside, axis=0)
         if not len(scene):
             why_none = "nothing that the camera saw lies in the workspace"
         else:
             why_none = "" if pixels else seen.why_no_target or "; ".join(left_out) or self._why_none(seen, flat, frame)
+        unit = "" if self.unit_known else self._other_unit(seen, flat, pixels, frame)
+        why_none = "; ".join(filter(None, (why_none, unit)))
         clouds, certainty = [flat[chosen] for chosen in pixels], self._certainty(seen, pixels)
         return Targets(seen.labels, pixels, clouds, scene, certainty, left_out, tables, why_none)
 
@@ -110,12 +144,11 @@ class TargetFinder:
         of_target = seen.probabilities[..., seen.target_class].reshape(-1)
         return tuple(float(of_target[chosen].mean(dtype=np.float64)) for chosen in pixels)
 
-    def _only_at(self, at: tuple[int, int], seen: Segmentation, points, table_z: float) -> Segmentation:
-        """Make the thing at a pixel (u, v) the only target; what else was one is an obstacle.
+    def _only_at(self, clicks: Clicks, seen: Segmentation, points, frame: RGBDFrame) -> Segmentation:
+        """Make the thing that was clicked the only target; what else was one is an obstacle.
 
         Its certainty is its own, or that it is target or obstacle rather than anything else: it counts in any class.
         """
-        u, v = at
         numbers, removed = seen.instances, seen.outliers_removed
         if numbers is None:
             removed = True  # as `split` does
@@ -124,14 +157,12 @@ class TargetFinder:
             for number, group in enumerate(self.split(points.reshape(-1, 3)[pixels]), start=1):
                 numbers.ravel()[pixels[group]] = number
         labels = np.where(seen.labels == seen.target_class, OBSTACLE, seen.labels).astype(np.uint8)
-        number, height = int(numbers[v, u]), float(points[v, u, 2]) - table_z
-        if number == 0:
-            said = f"no thing was found at ({u}, {v}): the pixel shows {_shown_at(height)}"
-            return replace(seen, labels=labels, instances=np.zeros_like(numbers), why_no_target=said)
-        chosen = numbers == number
+        why_none, chosen = clicked(clicks, numbers, points, frame)
+        if why_none:
+            return replace(seen, labels=labels, instances=np.zeros_like(numbers), why_no_target=why_none)
         labels[chosen] = seen.target_class
         if seen.certainty is not None:
-            certainty = seen.certainty[number - 1]
+            certainty = min(seen.certainty[number - 1] for number in np.unique(numbers[chosen]).tolist())
         elif seen.probabilities is not None:
             of_classes = seen.probabilities[chosen].mean(axis=0, dtype=np.float64)
             certainty = float(sum(of_classes[c] for c in {seen.target_class, OBSTACLE} if c < len(of_classes)))
@@ -139,6 +170,19 @@ class TargetFinder:
             certainty = 1.0
         seen = replace(seen, labels=labels, outliers_removed=removed)
         return replace(seen, instances=chosen.astype(np.int32), certainty=(certainty,))
+
+    def _other_unit(self, seen: Segmentation, points: Float[np.ndarray, "N 3"], pixels, frame: RGBDFrame) -> str:
+        """What `other_unit` says of the targets, or of what would be some if it were in the workspace."""
+        if not pixels:
+            labelled = np.flatnonzero((seen.labels.ravel() == seen.target_class) & np.isfinite(points[:, 2]))
+            numbers = np.ones(len(labelled), int) if seen.instances is None else seen.instances.ravel()[labelled]
+            pixels = [labelled[numbers == number] for number in np.unique(numbers[numbers > 0])]
+        clouds = [points[chosen].astype(np.float64) for chosen in pixels if len(chosen) >= FEW]
+        if not clouds:
+            return ""
+        away = [np.linalg.norm(np.median(P, axis=0) - frame.T_base_cam[:3, 3]) for P in clouds]
+        lengths = [np.ptp(np.percentile(P, [2, 98], axis=0), axis=0).max() for P in clouds]
+        return other_unit(float(np.median(away)), float(np.median(lengths)))
 
     def _why_none(self, seen: Segmentation, points: Float[np.ndarray, "N 3"], frame: RGBDFrame) -> str:
         """Say why no pixel that is labelled target became part of one."""
@@ -158,6 +202,28 @@ class TargetFinder:
             span = " ".join(f"{x:g}" for x in self.workspace.ravel())
             return f"{NO_TARGET}: {count} of the {len(P)} labelled target lie {where} the workspace, {span}"
         return f"{NO_TARGET} that hang together: {len(P)} pixels are labelled target, {len(known)} of them have depth"
+
+
+def clicked(clicks: Clicks, numbers: Integer[np.ndarray, "H W"], points, frame: RGBDFrame):
+    """The pixels of the thing at the clicks, parted from what it must not be; and why there is none, "" if there is."""
+    known = np.isfinite(points[..., 2])
+    for u, v in clicks.at:
+        if numbers[v, u] == 0:
+            shown = _shown_at(float(points[v, u, 2]) - frame.table_z)
+            return f"no thing was found at ({u}, {v}): the pixel shows {shown}", None
+    chosen = np.isin(numbers, [numbers[v, u] for u, v in clicks.at])
+    if not clicks.not_at:
+        return "", chosen
+    for u, v in clicks.not_at:
+        if not chosen[v, u]:
+            first = clicks.at[0]
+            return f"({u}, {v}) is not on the thing at {first}, which it is to be parted from: leave that click out", None
+    for u, v in (*clicks.at, *clicks.not_at):
+        if not known[v, u]:
+            return f"there is no depth at ({u}, {v}), where the thing is to be parted: click beside it", None
+    from labkit.crf.clicks import cut_between  # numba: loaded only where it is wanted
+
+    return "", cut_between(chosen, frame.rgb, points, clicks.at, clicks.not_at)
 
 
 def _shown_at(height: float) -> str:

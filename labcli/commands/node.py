@@ -52,7 +52,12 @@ class Settings:
     ] = None
     base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link"
     slop: Annotated[float, typer.Option(help="How far apart the stamps of a frame may be, seconds.")] = 0.02
-    depth_scale: Annotated[float, typer.Option(help="Metres per unit of 16-bit depth.")] = 0.001
+    depth_scale: Annotated[
+        float | None,
+        typer.Option(
+            help="Metres per unit of 16-bit depth; else 0.001, and no grasps where things then fit another unit."
+        ),
+    ] = None
     topic: Annotated[
         list[str] | None, typer.Option(help="Rename a topic: rgb=/my/image/compressed, mask=/my/mask ...")
     ] = None
@@ -78,7 +83,7 @@ class Settings:
         model = path if path.suffix == ".onnx" else load_model(path)
         height = table_z if self.table_z is None else self.table_z
         planning = {"workspace": read_workspace(self.workspace)} if self.workspace else {}
-        planning["gripper"] = read_gripper(self.gripper)
+        planning |= {"gripper": read_gripper(self.gripper), "unit_known": self.depth_scale is not None}
         if self.anything:
             return Pipeline(
                 None,
@@ -111,7 +116,7 @@ class Settings:
         T_base_cam, said = read_pose(self.camera_pose).in_base() if self.camera_pose else (None, ())
         for sentence in said:
             typer.echo(sentence, err=True)
-        given = {"base_frame": self.base_frame, "slop": self.slop, "depth_scale": self.depth_scale}
+        given = {"base_frame": self.base_frame, "slop": self.slop, "depth_scale": self.depth_scale or 0.001}
         return given | {"T_base_cam": T_base_cam, "topics": topics}
 
 

@@ -40,8 +40,17 @@ def perceive(
         bool, typer.Option("--anything", help="Every object on the table is a target, whatever its class.")
     ] = False,
     at: Annotated[
-        str, typer.Option(help='A pixel "U,V", column and row: the thing there is the target, whatever its class.')
-    ] = "",
+        list[str] | None,
+        typer.Option(
+            help='A pixel "U,V", column and row: the thing there is the target, whatever its class; several: all of it.'
+        ),
+    ] = None,
+    not_at: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--not", help='A pixel "U,V" that --at took with it and that is another thing: they are parted between.'
+        ),
+    ] = None,
     target: Annotated[
         int | None,
         typer.Option(help="The class to grasp, 2 by default; with --mask, the value that means target."),
@@ -86,9 +95,14 @@ def perceive(
     T_base_cam, said_of_pose = (None, ()) if pose is None else pose.in_base(shot.frame)
     for sentence in (*shot.said, *said_of_pose):
         typer.echo(sentence)
-    planning = {"gripper": own.read_gripper(gripper)}
+    planning = {"gripper": own.read_gripper(gripper), "unit_known": depth_scale is not None}
     planning["workspace"] = own.read_workspace(workspace) if workspace else "table"
-    pixel = shot.pixel(*own.read_pixel(at)) if at else None
+    at, not_at = (
+        [shot.pixel(*own.read_pixel(text, name), name) for text in texts or ()]
+        for name, texts in (("at", at), ("not", not_at))
+    )
+    if not_at and not at:
+        raise ValueError("not: expected --at U,V beside it: the thing that is to be parted")
     labels, numbers, said = None, None, ""
     if mask is not None:
         pipeline = Pipeline(**planning)
@@ -99,7 +113,7 @@ def perceive(
         pipeline = Pipeline(
             load_model(weights_path(model)), target_class=TARGET if target is None else target, **planning
         )
-    seen = own.perceive(shot.frame, pipeline, labels, numbers, T_base_cam, table_z, pixel)
+    seen = own.perceive(shot.frame, pipeline, labels, numbers, T_base_cam, table_z, at, not_at)
     seen = replace(seen, notices=(said, *seen.notices)) if said else seen
     typer.echo(own.describe(seen))
     for path in save(seen, out):

@@ -60,19 +60,23 @@ def pick_a_thing(frame: RGBDFrame, pipeline: Pipeline, at: tuple[int, int] | Non
 
     pipeline: `Pipeline(find_objects=...)` or one with a network. at: the pixel (u, v) to begin with, the middle of the
     picture if none. Each state runs the pipeline on the frame, as `run(frame, at=(u, v))` does. A picture of ipywidgets
-    alone does not tell where it is clicked, so the pixel is chosen with sliders.
+    alone does not tell where it is clicked, so the pixel is chosen with sliders. With `part`, a second pair of sliders
+    says which pixel is another thing, and the two are parted, as `run(frame, at=..., not_at=...)` does.
     """
     width, height = frame.size
     u0, v0 = (width // 2, height // 2) if at is None else at
 
-    def draw(figure: Figure, u: int, v: int) -> None:
-        seen = pipeline.run(frame, at=(u, v))
+    def draw(figure: Figure, u: int, v: int, part: bool, not_u: int, not_v: int) -> None:
+        apart = part and (not_u, not_v) != (u, v)
+        seen = pipeline.run(frame, at=(u, v), not_at=(not_u, not_v) if apart else None)
         mask = np.where(seen.labels == seen.target_class, seen.labels, 0)
         axes = figure.subplots()
         best = seen.plan.grasps[0] if seen.plan.grasps else None
         score = f"no grasp: {seen.plan.reason}" if best is None else f"best grasp {1000.0 * best.width:.0f} mm wide"
         show(axes, overlay(frame.rgb, mask.astype(np.uint8), 0.6), f"{np.count_nonzero(mask)} pixels; {score}")
         axes.plot(u, v, "w+", markersize=14, markeredgewidth=2)
+        if apart:
+            axes.plot(not_u, not_v, "wx", markersize=12, markeredgewidth=2)
         for corners in () if best is None else fingers(best.T_base_grasp, best.width, pipeline.gripper):
             P_cam = transform_points(invert_transform(frame.T_base_cam), corners)
             uv = np.stack(project(P_cam, frame.K), axis=1)
@@ -80,8 +84,10 @@ def pick_a_thing(frame: RGBDFrame, pipeline: Pipeline, at: tuple[int, int] | Non
                 hull = cv2.convexHull(uv.astype(np.float32))[:, 0]
                 axes.add_patch(Polygon(hull, fill=False, edgecolor="#1e6eff", linewidth=2))
 
-    controls = {
-        "u": ipywidgets.IntSlider(u0, min=0, max=width - 1, description="u", continuous_update=False),
-        "v": ipywidgets.IntSlider(v0, min=0, max=height - 1, description="v", continuous_update=False),
-    }
+    def slider(value: int, size: int, name: str) -> ipywidgets.IntSlider:
+        return ipywidgets.IntSlider(value, min=0, max=size - 1, description=name, continuous_update=False)
+
+    controls = {"u": slider(u0, width, "u"), "v": slider(v0, height, "v")}
+    controls["part"] = ipywidgets.Checkbox(False, description="part")
+    controls |= {"not_u": slider(u0, width, "not u"), "not_v": slider(v0, height, "not v")}
     return Explorer(draw, controls, size=(6.0, 4.6), stills=({"u": u0, "v": v0},))

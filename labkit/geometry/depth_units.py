@@ -12,6 +12,8 @@ from labkit.support.validation import check_depth, check_K, check_shape, require
 POSSIBLE = (0.05, 20.0)  # metres: what a depth camera's median can be
 LIKELY = (0.15, 4.0)  # metres: of a picture of things on a table
 UNITS = (1.0, 0.01, 0.001, 0.0001)  # metres that files count in, the usual ones
+FACTORS = (0.001, 0.1, 0.2, 0.25, 0.5, 2.0, 4.0, 5.0, 10.0, 1000.0)  # from one usual unit to another, of metres too
+AWAY, LENGTHS = (0.2, 1.8), (0.015, 0.35)  # metres: from a camera to what a hand grasps, and how long that is
 OPTION = "--depth-scale says how many metres a unit is"
 MEANINGS = {  # what a camera's file may mean by a number, as metres per unit
     "metres per unit": lambda number: number,
@@ -83,7 +85,7 @@ def _as_stated(middle: float, stated: float) -> tuple[float, str]:
 
 
 def _possible(metres: float) -> bool:
-    return POSSIBLE[0] <= metres <= POSSIBLE[1]
+    return within(metres, POSSIBLE)
 
 
 def _depth_of(unit: float, middle: float) -> str:
@@ -99,7 +101,35 @@ def fitting_units(middle: float) -> list[float]:
     >>> fitting_units(7800.0), fitting_units(2600.0)
     ([0.0001], [0.001, 0.0001])
     """
-    return [unit for unit in UNITS if LIKELY[0] <= unit * middle <= LIKELY[1]]
+    return [unit for unit in UNITS if within(unit * middle, LIKELY)]
+
+
+def other_unit(away: float, length: float) -> str:
+    """Say that depth is in another unit, if things fit one and not this one; "" if they may be as they are.
+
+    away: metres from the camera to the things; length: of one of them. Either alone may be unusual: a camera may stand
+    three metres off, or a thing be half a metre long. Both, and both usual by one factor, is a wrong unit.
+
+    >>> other_unit(1.7, 0.1), other_unit(3.4, 0.1), other_unit(0.7, 0.5)
+    ('', '', '')
+    >>> other_unit(3.4, 0.5)
+    'depth seems to be in another unit: things lie 3.4 m away and are 50 cm long; of depth times 0.1, 0.2, 0.25 or 0.5 they fit a hand; --depth-scale says how many metres a unit is'
+    """
+    here = within(away, AWAY), within(length, LENGTHS)
+    fitting = [f"{f:g}" for f in FACTORS if within(f * away, AWAY) and within(f * length, LENGTHS)]
+    if any(here) or not fitting:
+        return ""
+    size = f"{100.0 * length:.0f} cm" if length >= 0.01 else f"{1000.0 * length:.2g} mm"
+    factors = f"{', '.join(fitting[:-1])} or {fitting[-1]}" if fitting[1:] else fitting[0]
+    return (
+        f"depth seems to be in another unit: things lie {away:.2g} m away and are {size} long; of depth times {factors} "
+        f"they fit a hand; {OPTION}"
+    )
+
+
+def within(value: float, ends: tuple[float, float]) -> bool:
+    """Whether a value lies in a range."""
+    return ends[0] <= value <= ends[1]
 
 
 def whole_units(depth: Float[np.ndarray, "H W"], unit: float) -> UInt16[np.ndarray, "H W"]:

@@ -13,22 +13,20 @@ from labkit.support.validation import check_shape
 
 SAMPLE = 15_000  # points of a picture that planes are looked for in
 PLANES, LEAST = 8, 0.03  # planes that are looked at, the largest first; the share of the points that a table has
-THICK = 0.012  # metres over or under a plane where no second one is looked for
+THICK = 0.012  # metres over or under a plane where no second one is looked for, at up to a metre (`slack`)
+CURVED = 0.03  # metres, at up to a metre: how far a depth camera bends a table
+GROWS = 5  # times that a bent table is followed beyond where it was found
 NARROW = 0.08  # metres: a plane whose outline is narrower is the face of a thing
 REACH = 1.6  # metres from the camera to the nearest tenth of a plane: further off nothing is grasped
 FLAT = 0.2  # sine of the angle between a plane and the sight, at least: of flatter ones little is seen
 SAME_HEIGHT = 0.03  # metres: two planes that are less far apart, and parallel, are one surface
 PARALLEL = 0.9  # cosine of the angle between two planes, at least
+BENT = 0.985  # cosine of the angle between two pieces of one bent surface, at least
 STANDING = 0.012, 0.35  # metres over a table from which, and up to which, points belong to what stands on it
 LEVEL = 0.9  # cosine of the angle between a table and the horizon, if that is known
 CELL = 0.02  # metres: the grid on which a table's points hang together, over up to four cells that things hide
 STATED = 0.05  # metres that a table may lie off its stated height
-HIGH, BORDER = 0.1, 0.01  # metres over the table, at that share of the picture from its border: what is there hangs in
-GAP = 0.02  # metres of empty space between two things, at least
-SHELF = 0.25  # metres: a wider plane over the table is no top of a thing
-HANGS = "hang into the picture from its border, as a robot does"
-BESIDE = "do not stand on the table, but beside it"
-ABOVE = "stand well over the table, as on a shelf"
+HIGH = 0.1  # metres between a table and another plane that is well over it
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +36,9 @@ class Table:
     plane: its normal points to the camera. T_table_frame: (4, 4), maps points of the frame that it was found in to the
     table's own, where z is the height over it (`base_on_table`). outline: convex, (M, 2), x and y of that frame: where
     the table was seen. things: the share of all points that belong to what stands on it. distance: metres from the
-    camera to its nearest tenth. sine: of the angle between it and the line of sight.
+    camera to its nearest tenth. sine: of the angle between it and the line of sight. viewer: where the camera stands.
+    bend: how high a depth camera shows its surface over the plane, as a polynomial of x and y (`surface`): what is flat
+    is not quite so to a camera, which errs with the square of distance.
     """
 
     plane: Plane
@@ -47,6 +47,8 @@ class Table:
     things: float
     distance: float
     sine: float
+    viewer: Float[np.ndarray, "3"]
+    bend: Float[np.ndarray, "6"]
 
     @property
     def score(self) -> float:
@@ -57,9 +59,22 @@ class Table:
         return self.things * self.plane.inliers.mean() * self.sine
 
     def over(self, P: Float[np.ndarray, "N 3"]) -> tuple[Bool[np.ndarray, "N"], Float[np.ndarray, "N"]]:
-        """Which points lie over or under the outline, and all points' heights over the plane, metres."""
+        """Which points lie over or under the outline, and all points' heights over the table as it shows, metres."""
         Q = transform_points(self.T_table_frame, P)
-        return in_convex_outline(self.outline, Q[:, :2]), Q[:, 2]
+        return in_convex_outline(self.outline, Q[:, :2]), Q[:, 2] - self.surface(Q[:, :2])
+
+    def surface(self, xy: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N"]:
+        """How high over the plane the table shows at (x, y), metres; beside its outline as at the nearest end."""
+        return _powers(np.clip(xy, self.outline.min(axis=0), self.outline.max(axis=0))) @ self.bend
+
+    def slack(self, P: Float[np.ndarray, "N 3"], metres: float) -> Float[np.ndarray, "N"]:
+        """A tolerance at each point: so many metres up to a metre from the camera, growing with the square beyond."""
+        return slack(metres, np.linalg.norm(P - self.viewer, axis=1))
+
+    @property
+    def area(self) -> float:
+        """Area of the outline, square metres."""
+        return cv2.contourArea(self.outline.astype(np.float32))
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -103,6 +118,10 @@ def find_tables(
         plane = replace(plane, inliers=height[seen] < THICK)
         solid = _without_specks(height < min(THICK, 3.0 * plane.residual + 0.001))
         table = _table(plane, some, solid, np.asarray(viewer, np.float64), least)
+        if table is not None:
+            table = _grown(table, some, least)
+            inside, over = table.over(P)
+            left &= ~(inside & (np.abs(over) < table.slack(P, THICK)))
         level = up is None or plane.normal @ np.asarray(up) > LEVEL
         if table is not None and level and not any(_same(table, other) for other in tables):
             tables.append(table)
@@ -132,6 +151,15 @@ def base_on_table(plane: Plane) -> Float[np.ndarray, "4 4"]:
     return T
 
 
+def slack(metres: float, distance: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
+    """A tolerance for points so far from a depth camera, whose errors grow with the square of distance (topic 06).
+
+    >>> slack(0.01, np.array([0.5, 1.0, 2.0])).tolist()
+    [0.01, 0.01, 0.04]
+    """
+    return metres * np.maximum(1.0, distance**2)
+
+
 def in_convex_outline(outline: Float[np.ndarray, "M 2"], xy: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
     """Which places lie in a convex outline, or on it.
 
@@ -150,17 +178,25 @@ def _without_specks(mask: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
 
 
-def _table(plane: Plane, points, solid: Bool[np.ndarray, "h w"], viewer, least: float) -> Table | None:
+def _powers(xy: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 6"]:
+    x, y = xy.T
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+
+
+def _table(
+    plane: Plane, points, solid: Bool[np.ndarray, "h w"], viewer, least: float, bend=(0.0,) * 6
+) -> Table | None:
     """A plane as a table: the largest piece of it that hangs together; None if that is too small or seen too flatly.
 
     Where the camera sees through the plane, to something that lies under it, there is no table, nor close by: what
     crosses the plane there is a thing behind the table's edge.
     """
-    T = base_on_table(plane)
+    T, bend = base_on_table(plane), np.asarray(bend)
     seen = points[np.isfinite(points[..., 2])]
     height = seen @ plane.normal + plane.offset
     over = viewer @ plane.normal + plane.offset
-    under = height < -max(THICK, 4.0 * plane.residual)
+    # Not at the bent surface: far off, a polynomial says nothing.
+    under = height < -slack(max(THICK, 4.0 * plane.residual), np.linalg.norm(seen - viewer, axis=1)) - CURVED * bend.any()
     crossed = viewer + (seen[under] - viewer) * (over / (over - height[under]))[:, None]
     P = points[solid]
     if len(P) < least:
@@ -185,25 +221,58 @@ def _table(plane: Plane, points, solid: Bool[np.ndarray, "h w"], viewer, least: 
     outline = cv2.convexHull(transform_points(T, P)[:, :2].astype(np.float32))[:, 0].astype(np.float64)
     away = np.linalg.norm(P - viewer, axis=1)
     sine = over / np.median(away)
-    table = Table(plane, T, outline, 0.0, float(np.percentile(away, 10)), float(sine))
+    table = Table(plane, T, outline, 0.0, float(np.percentile(away, 10)), float(sine), viewer, bend)
     return table if sine > FLAT and table.sides[1] > NARROW else None
 
 
+def _grown(table: Table, points, least: float) -> Table:
+    """Follow a table beyond where it was found, as far as it bends away from its plane no more than cameras do."""
+    seen = np.isfinite(points).all(axis=-1)
+    P = points[seen]
+    Q, curved = transform_points(table.T_table_frame, P), table.slack(P, CURVED)
+    powers = _powers(Q[:, :2])
+    for _ in range(GROWS):
+        inside, height = table.over(P)
+        on = inside & (np.abs(height) < table.slack(P, THICK))
+        bend = np.linalg.lstsq(powers[on], Q[on, 2], rcond=None)[0]
+        shown = powers @ bend
+        off = np.abs(Q[:, 2] - shown)
+        thick = min(THICK, 3.0 * float(np.sqrt(np.mean(off[on] ** 2))) + 0.001)
+        solid = np.zeros(seen.shape, bool)
+        solid[seen] = (off < table.slack(P, thick)) & (np.abs(shown) < curved)
+        larger = _table(table.plane, points, _without_specks(solid), table.viewer, least, bend)
+        if larger is None or larger.area < 0.97 * table.area:
+            break
+        grown, table = larger.area > 1.01 * table.area, larger
+        if not grown:
+            break
+    return table
+
+
 def _same(a: Table, b: Table) -> bool:
-    """Whether two planes are one surface, of which one was fitted to what is not quite flat of it."""
-    between = abs(_middle(b) @ a.plane.normal + a.plane.offset)
-    return bool(between < SAME_HEIGHT and a.plane.normal @ b.plane.normal > PARALLEL)
+    """Whether two planes are one surface, of which one was fitted to what is not quite flat of it.
+
+    One of them then goes through the other's middle: of two steps neither does.
+    """
+    level = a.plane.normal @ b.plane.normal
+    between, back = (abs(_middle(y) @ x.plane.normal + x.plane.offset) for x, y in ((a, b), (b, a)))
+    return bool((between < SAME_HEIGHT and level > PARALLEL) or (back < SAME_HEIGHT and level > BENT))
 
 
 def _standing(table: Table, others: list[Table], P: Float[np.ndarray, "N 3"]) -> float:
     """The share of the points that belong to what stands on a table, and on no other table well over it."""
     inside, height = table.over(P)
-    stands = inside & (height > STANDING[0]) & (height < STANDING[1])
+    stands = inside & (height > table.slack(P, STANDING[0])) & (height < STANDING[1])
     for other in others:
-        if _well_over(other, table):
+        if well_over(other, table):
             over, above = other.over(P)
             stands &= ~(over & (above > -THICK))
     return float(np.mean(stands))
+
+
+def planes_beside(tables: Sequence[Table], table: Table | None) -> list[Table]:
+    """Of tables found in the base frame, those at another height than one of them: not its own pieces and slopes."""
+    return [other for other in tables if table is None or abs(height_of(other) - height_of(table)) > SAME_HEIGHT]
 
 
 def table_at(tables: Sequence[Table], z: float) -> Table | None:
@@ -216,39 +285,7 @@ def height_of(table: Table) -> float:
     return float(_middle(table)[2])
 
 
-def reasons_against(
-    table: Table,
-    tables: Sequence[Table],
-    points: Float[np.ndarray, "H W 3"],
-    things: Sequence[Integer[np.ndarray, "_"]],
-) -> list[str]:
-    """Say of each thing in a picture why it does not stand on a table; "" if it does.
-
-    tables: all that were found, the table among them. things: the pixels of each, v * W + u. Three things speak against
-    one: it hangs together with something that comes in from the picture's border high over the table, as a robot does;
-    two fifths of it lie beside the table's outline; or it stands on another plane over the table, such as a shelf, or
-    begins more than 35 cm over it.
-    """
-    hanging = _hanging(table, points).ravel()
-    flat = points.reshape(-1, 3)
-    shelves = [other for other in tables if _well_over(other, table) and other.sides[1] > SHELF]
-    reasons = []
-    for pixels in things:
-        P = flat[pixels].astype(np.float64)
-        inside, height = table.over(P)
-        on_shelf = [np.mean(over & (above > -THICK)) for over, above in (shelf.over(P) for shelf in shelves)]
-        if np.mean(hanging[pixels]) > 0.3:
-            reasons.append(HANGS)
-        elif np.mean(inside) < 0.6:
-            reasons.append(BESIDE)
-        elif any(share > 0.5 for share in on_shelf) or np.percentile(height, 2) > STANDING[1]:
-            reasons.append(ABOVE)
-        else:
-            reasons.append("")
-    return reasons
-
-
-def _well_over(other: Table, table: Table) -> bool:
+def well_over(other: Table, table: Table) -> bool:
     """Whether another plane is parallel to a table, and high above it."""
     parallel = other is not table and other.plane.normal @ table.plane.normal > PARALLEL
     return bool(parallel and _middle(other) @ table.plane.normal + table.plane.offset > HIGH)
@@ -257,25 +294,3 @@ def _well_over(other: Table, table: Table) -> bool:
 def _middle(table: Table) -> Float[np.ndarray, "3"]:
     """The middle of a table's outline, in the frame that the table was found in."""
     return (np.linalg.inv(table.T_table_frame) @ (*table.outline.mean(axis=0), 0.0, 1.0))[:3]
-
-
-def _hanging(table: Table, points: Float[np.ndarray, "H W 3"]) -> Bool[np.ndarray, "H W"]:
-    """Pixels of what hangs together with something that is high over the table at the picture's border.
-
-    Only what is half as high links: the walls of a bin come in from the border, too, and go down to what lies in it.
-    """
-    H, W = points.shape[:2]
-    step = max(1, round(np.sqrt(H * W / 40_000)))
-    some = points[::step, ::step].astype(np.float64)
-    height = np.full(some.shape[:2], -np.inf)
-    seen = np.isfinite(some).all(axis=-1)
-    height[seen] = table.over(some[seen])[1]
-    rising = np.argwhere(height > HIGH / 2.0)
-    border = (np.minimum(rising, np.array(height.shape) - 1 - rising) < BORDER * max(height.shape)).any(axis=1)
-    high = height[tuple(rising.T)] > HIGH
-    hanging = np.zeros(height.shape, bool)
-    for group in cluster_indices(some[tuple(rising.T)], GAP):
-        if np.count_nonzero((border & high)[group]) > 5:
-            hanging[tuple(rising[group].T)] = True
-    wide = cv2.dilate(hanging.astype(np.uint8), np.ones((3, 3), np.uint8))
-    return np.kron(wide, np.ones((step, step), np.uint8))[:H, :W] > 0

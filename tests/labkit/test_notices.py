@@ -108,6 +108,48 @@ def test_noise_has_no_edges_that_could_be_shifted(frame):
         assert notices(replace(frame, rgb=rgb)) == ()
 
 
+def as_the_depth_camera_sees_it(frame: RGBDFrame, scale: float = 585 / 525, aside: float = 0.025) -> RGBDFrame:
+    """Depth of a camera of a longer focal length, so many metres beside the colour camera, not brought into it."""
+    (v, u), z, K = np.indices(frame.depth.shape), frame.depth.astype(float), frame.K
+    x, y = (u - K[0, 2]) / K[0, 0] * z - aside, (v - K[1, 2]) / K[1, 1] * z
+    at = [np.rint(scale * K[i, i] * side / z + K[i, 2]).astype(int) for i, side in enumerate((x, y))]
+    inside = (at[0] >= 0) & (at[0] < z.shape[1]) & (at[1] >= 0) & (at[1] < z.shape[0])
+    seen = np.full(z.shape, np.inf)
+    np.minimum.at(seen, (at[1][inside], at[0][inside]), z[inside])
+    seen = np.where(np.isfinite(seen), seen, 0.0).astype(np.float32)
+    return replace(frame, depth=np.where(seen > 0.0, seen, cv2.dilate(seen, np.ones((3, 3)))))  # a finer grid has gaps
+
+
+@pytest.fixture(scope="module")
+def crowd() -> RGBDFrame:
+    """Seven boxes all over a table, 640x480."""
+    places = [(0.4, -0.25), (0.42, 0.02), (0.45, 0.26), (0.55, -0.12), (0.6, 0.14), (0.7, -0.28), (0.72, 0.3)]
+    things = [box(f"box{k}", x, y, (0.05, 0.06, 0.05 + 0.02 * (k % 3))) for k, (x, y) in enumerate(places)]
+    with World(scene(*things)) as world:
+        return world.render((640, 480))
+
+
+def test_depth_as_the_depth_camera_sees_it_is_told_by_its_scale(crowd):
+    aligned = DepthSensor().apply(crowd, np.random.default_rng(0))
+    assert notices(aligned) == ()
+    (said,) = [sentence for sentence in notices(as_the_depth_camera_sees_it(aligned)) if "depth is" in sentence]
+    scale, dx = map(float, re.search(r"depth is (\d\.\d+) times as large .* lies \((-?\d+), -?\d+\) pixels", said).groups())
+    assert scale == pytest.approx(585 / 525, abs=0.03)
+    near, far = 0.025 * crowd.K[0, 0] * scale / np.percentile(crowd.depth, [2, 80])
+    assert far < -dx < near, "25 mm, at the distance of the table and its things"
+    assert any("pixels off the colours" in sentence for sentence in notices(shifted(aligned, 8, 0)))
+
+
+def test_where_depth_ends_is_no_edge_of_a_thing():
+    """One thing at half a metre, nothing around it with depth; what is drawn about it lies where filling ends."""
+    rgb, depth = np.full((240, 320, 3), 120, np.uint8), np.zeros((240, 320), np.float32)
+    depth[90:150, 130:190] = np.linspace(0.3, 0.5, 60)[:, None]
+    rgb[90:150, 130:190] = 130
+    rgb[67:151, 106:190] -= 60  # a shadow, a sheet: 84 pixels wide, (-12, -11) off the middle
+    alone = RGBDFrame(rgb, depth, np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]]), np.eye(4))
+    assert not any("pixels off" in sentence for sentence in notices(alone))
+
+
 def test_noise_is_no_table(frame):
     rng = np.random.default_rng(0)
     noise = replace(frame, depth=(frame.depth + rng.uniform(-0.15, 0.15, frame.depth.shape)).astype(np.float32))

@@ -1,13 +1,16 @@
 """The table among planes, and what stands on it: scenes made of rectangles whose places are known."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from labcli.perceive import on_table
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project, find_tables
-from labkit.geometry.tables import BESIDE, HANGS, height_of, table_at
+from labkit.geometry.standing import BESIDE, HANGS
+from labkit.geometry.tables import height_of, planes_beside, table_at
 from labkit.labels import TARGET
 from labkit.pipeline import Pipeline
 from labkit.sim.spec import Camera
@@ -86,6 +89,85 @@ def test_what_does_not_stand_on_the_table_is_no_target_without_a_workspace(boxes
     assert not alone.plan.grasps and why in alone.plan.reason
 
 
+def bent(frame, by: float = 0.12, seed: int = 0):
+    """Depth of a camera that is right in its middle: off by `by` (z r)^2, r = 1 at 45 degrees; noise grows as z^2."""
+    z, (v, u) = frame.depth.astype(float), np.indices(frame.depth.shape)
+    r2 = ((u - K[0, 2]) / K[0, 0]) ** 2 + ((v - K[1, 2]) / K[1, 1]) ** 2
+    noisy = z + z**2 * (by * r2 + 0.0014 * np.random.default_rng(seed).standard_normal(z.shape))
+    return replace(frame, depth=np.where(z > 0.0, noisy, 0.0).astype(np.float32))
+
+
+def large(things):
+    """The things of which 60 pixels are seen."""
+    return np.where(np.bincount(things.ravel())[things] < 60, 0, things)
+
+
+def kept(frame, things, **of_pipeline):
+    """The numbers of the things that are targets, and the perception."""
+    p = Pipeline(workspace="table", **of_pipeline).locate(frame, np.where(things > 0, TARGET, 0), instances=things)
+    return {int(things.ravel()[pixels[0]]) for pixels in p.pixels}, p
+
+
+LOW = np.array(Camera.looking_at((0.5, 0.0, 0.0), 1.0, np.pi, 0.5).T_base_cam)
+ALONG = [(x, y) for x in (0.1, 0.56, 1.02) for y in (-0.4, 0.0, 0.4)]
+AT_THE_EDGES = [((x, y - 0.03, 0.0), (x + 0.06, y + 0.03, 0.07)) for x, y in ALONG]
+SQUARE_TABLE = ((0.09, -0.45, -0.02), (1.09, 0.45, 0.0))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_things_at_the_edges_of_a_table_that_the_camera_bends_stand_on_it(seed):
+    """Its ends lie off the plane of the rest, twice as far as off the surface; nothing of it is another plane."""
+    frame, number = seen(FLOOR, SQUARE_TABLE, *AT_THE_EDGES, T=LOW)
+    frame = bent(frame, seed=seed)
+    things = large(np.maximum(number - 2, 0))
+    found = on_table(replace(frame, T_base_cam=np.eye(4)))[0]
+    stands, p = kept(found, things)
+    assert stands == set(np.unique(things[things > 0])), p.left_out
+    table = table_at(p.tables, 0.0)
+    P = p.points[number == 2].astype(float)
+    off_plane, off_surface = P @ table.plane.normal + table.plane.offset, table.over(P)[1]
+    assert np.percentile(np.abs(off_plane), 95) > 0.007 > 2.0 * np.percentile(np.abs(off_surface), 95)
+    beside = planes_beside(p.tables, table)
+    assert all(height_of(other) < -0.3 for other in beside), beside
+
+
+CARTON = ((0.35, 0.3, 0.0), (0.5, 0.36, 0.24))  # leaves the picture at its left
+HAND = ((0.45, 0.02, 0.1), (0.5, 0.07, 0.16))  # of the robot, over the thing
+FINGERS = ((0.46, -0.02, 0.07), (0.5, 0.06, 0.12))  # that touch the thing
+
+
+def test_what_the_border_cuts_off_stands_and_a_robot_that_touches_a_thing_does_not():
+    frame, number = seen(WIDE_TABLE, THING, CARTON)
+    assert (number[:, 0] == 3).any(), "the carton is cut off"
+    stands, p = kept(bent(frame), np.maximum(number - 1, 0))
+    assert stands == {1, 2} and not p.left_out
+    which = [int(number.ravel()[pixels[0]]) for pixels in p.pixels].index(3) + 1
+    assert f"target {which} touches the picture's border: a part of it is unseen" in p.notices
+    for arm in ((ROBOT,), (ROBOT, FINGERS)):
+        frame, number = seen(WIDE_TABLE, THING, *arm)
+        robot = np.where(number >= 3, 2, np.maximum(number - 1, 0))
+        assert kept(bent(frame), robot)[0] == {1}, "the whole robot"
+
+
+def crate(rows: int = 3):
+    """Blocks side by side in two layers within walls that leave the picture."""
+    walls = [((0.2, y, 0.0), (0.8, y + 0.02, 0.2)) for y in (-0.28, 0.26)]
+    walls += [((x, -0.28, 0.0), (x + 0.02, 0.28, 0.2)) for x in (0.18, 0.8)]
+    low = [((0.24 + 0.14 * i, -0.2 + 0.14 * j, 0.0), (0.33 + 0.14 * i, -0.12 + 0.14 * j, 0.08)) for i in range(4) for j in range(rows)]
+    high = [((0.25 + 0.14 * i, -0.19, 0.08), (0.32 + 0.14 * i, -0.13, 0.14)) for i in range(3)]
+    return walls, low + high
+
+
+def test_the_things_of_a_full_crate_stand_in_it_although_its_walls_leave_the_picture():
+    walls, blocks = crate()
+    T = np.array(Camera.looking_at((0.5, 0.0, 0.0), 0.62, np.pi, 1.1).T_base_cam)
+    frame, number = seen(WIDE_TABLE, *walls, *blocks, T=T)
+    things = np.maximum(number - 5, 0)
+    things = large(things)
+    stands, p = kept(bent(frame), things)
+    assert stands == set(np.unique(things[things > 0])), p.left_out
+
+
 def test_a_thing_is_chosen_by_its_pixel_whatever_its_class():
     second = ((0.45, 0.1, 0.0), (0.5, 0.15, 0.06))
     frame, number = seen(WIDE_TABLE, THING, second)
@@ -119,7 +201,7 @@ def test_a_mask_outside_the_workspace_says_where_it_lies():
 def test_a_real_floor_that_fills_the_picture_is_not_the_table(name, desk, floor):
     """Pixels (u, v) of the bare desk and of the floor, chosen in the picture by eye."""
     from labcli.cameras import read_intrinsics
-    from labcli.perceive import on_table, read_frame
+    from labcli.perceive import read_frame
 
     folder = REAL / "tabletop"
     camera = read_intrinsics(str(folder / "camera.json"))
