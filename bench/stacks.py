@@ -69,7 +69,7 @@ def _standing(rng, body: Body, name: str, shrink: float, table):
     turned = Rotation.from_euler("z", rng.uniform(-np.pi, np.pi)) * Rotation.from_quat(quaternion(*UPRIGHT))
     thing = ObjectSpec(
         name=name,
-        family=name.split("_")[0],
+        family=name.split("_", maxsplit=1)[0],
         class_id=OBSTACLE,
         position=(0.0, 0.0, 0.0),
         orientation=tuple(turned.as_quat().tolist()),

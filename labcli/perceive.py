@@ -161,8 +161,8 @@ def perceive(
 
     labels: somebody else's, and the `instances` among them if known; else the pipeline perceives. T_base_cam: the
     camera's pose, with the table at height `table_z`; without it the table is found in the depth picture, and the base
-    frame laid under it so that the table is at that height. at, not_at: as in `Pipeline.run`. Raises ValueError if no plane can
-    be found, or for an argument that does not fit. Topics 06 and 07.
+    frame laid under it so that the table is at that height. at, not_at: as in `Pipeline.run`. Raises ValueError if no
+    plane can be found, or for an argument that does not fit. Topics 06 and 07.
     """
     plane = None
     if T_base_cam is None:

@@ -180,8 +180,8 @@ class Pipeline:
 
         labels: of this pipeline's `perceive`, true ones, or anybody's: any classes, 255 for "unknown". probabilities:
         what they were chosen by, if anything. instances: numbers of objects, 0 for none, in place of `split`: of the
-        pixels labelled target, those of one number are one target. at, not_at: as in `run`. Raises ValueError naming the
-        argument that does not fit.
+        pixels labelled target, those of one number are one target. at, not_at: as in `run`. Raises ValueError naming
+        the argument that does not fit.
         """
         labels, target = labels_in(frame, labels), self.target_class
         if probabilities is not None:

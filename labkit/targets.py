@@ -217,7 +217,10 @@ def clicked(clicks: Clicks, numbers: Integer[np.ndarray, "H W"], points, frame: 
     for u, v in clicks.not_at:
         if not chosen[v, u]:
             first = clicks.at[0]
-            return f"({u}, {v}) is not on the thing at {first}, which it is to be parted from: leave that click out", None
+            return (
+                f"({u}, {v}) is not on the thing at {first}, which it is to be parted from: leave that click out",
+                None,
+            )
     for u, v in (*clicks.at, *clicks.not_at):
         if not known[v, u]:
             return f"there is no depth at ({u}, {v}), where the thing is to be parted: click beside it", None

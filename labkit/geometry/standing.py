@@ -55,7 +55,9 @@ def reasons_against(
         elif np.mean(hanging[pixels]) > 0.3:
             reasons.append("" if body.rests_on(body.foot()) else HANGS)
         else:
-            reasons.append("" if np.mean(inside) > 0.6 or body.rests_on(body.foot() & body.touching(ground)) else BESIDE)
+            reasons.append(
+                "" if np.mean(inside) > 0.6 or body.rests_on(body.foot() & body.touching(ground)) else BESIDE
+            )
     return _unless_on_others(bodies, reasons)
 
 

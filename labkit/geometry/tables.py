@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Integer
+from jaxtyping import Bool, Float
 
-from labkit.geometry.clouds import Plane, cluster_indices, fit_plane
+from labkit.geometry.clouds import Plane, fit_plane
 from labkit.geometry.projection import transform_points
 from labkit.support.validation import check_shape
 
@@ -183,9 +183,7 @@ def _powers(xy: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 6"]:
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 
-def _table(
-    plane: Plane, points, solid: Bool[np.ndarray, "h w"], viewer, least: float, bend=(0.0,) * 6
-) -> Table | None:
+def _table(plane: Plane, points, solid: Bool[np.ndarray, "h w"], viewer, least: float, bend=(0.0,) * 6) -> Table | None:
     """A plane as a table: the largest piece of it that hangs together; None if that is too small or seen too flatly.
 
     Where the camera sees through the plane, to something that lies under it, there is no table, nor close by: what
@@ -196,7 +194,9 @@ def _table(
     height = seen @ plane.normal + plane.offset
     over = viewer @ plane.normal + plane.offset
     # Not at the bent surface: far off, a polynomial says nothing.
-    under = height < -slack(max(THICK, 4.0 * plane.residual), np.linalg.norm(seen - viewer, axis=1)) - CURVED * bend.any()
+    under = (
+        height < -slack(max(THICK, 4.0 * plane.residual), np.linalg.norm(seen - viewer, axis=1)) - CURVED * bend.any()
+    )
     crossed = viewer + (seen[under] - viewer) * (over / (over - height[under]))[:, None]
     P = points[solid]
     if len(P) < least:

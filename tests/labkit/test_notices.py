@@ -133,7 +133,9 @@ def test_depth_as_the_depth_camera_sees_it_is_told_by_its_scale(crowd):
     aligned = DepthSensor().apply(crowd, np.random.default_rng(0))
     assert notices(aligned) == ()
     (said,) = [sentence for sentence in notices(as_the_depth_camera_sees_it(aligned)) if "depth is" in sentence]
-    scale, dx = map(float, re.search(r"depth is (\d\.\d+) times as large .* lies \((-?\d+), -?\d+\) pixels", said).groups())
+    scale, dx = map(
+        float, re.search(r"depth is (\d\.\d+) times as large .* lies \((-?\d+), -?\d+\) pixels", said).groups()
+    )
     assert scale == pytest.approx(585 / 525, abs=0.03)
     near, far = 0.025 * crowd.K[0, 0] * scale / np.percentile(crowd.depth, [2, 80])
     assert far < -dx < near, "25 mm, at the distance of the table and its things"

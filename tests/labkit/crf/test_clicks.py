@@ -1,5 +1,7 @@
 """Clicks part what is one thing: where colour or the surface changes, and as the least cut there is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,7 +77,9 @@ def test_the_pipeline_takes_the_part_and_the_rest_is_an_obstacle():
 
 def test_two_clicks_of_one_thing_that_was_found_as_two_join_it():
     frame, mask, upper = stack()
-    pipeline = Pipeline(find_objects=lambda _: mask.astype(int) + upper, workspace=((-9.0, 9.0), (-9.0, 9.0), (-9.0, 9.0)))
+    pipeline = Pipeline(
+        find_objects=lambda _: mask.astype(int) + upper, workspace=((-9.0, 9.0), (-9.0, 9.0), (-9.0, 9.0))
+    )
     assert (pipeline.run(frame, at=(80, 40)).labels == TARGET).sum() == upper.sum()
     assert (pipeline.run(frame, at=[(80, 40), (80, 80)]).labels == TARGET).sum() == mask.sum()
 
@@ -91,8 +95,9 @@ def test_clicks_that_part_nothing_get_a_sentence():
     off = clicked((80, 40), (3, 3))
     assert not off.clouds and "(3, 3) is not on the thing at (80, 40)" in off.plan.reason
     frame, _, _ = stack()
-    frame.depth[80, 80] = 0.0
-    blind = clicked((80, 40), (80, 80), frame)
+    depth = frame.depth.copy()
+    depth[80, 80] = 0.0
+    blind = clicked((80, 40), (80, 80), replace(frame, depth=depth))
     assert not blind.clouds and "there is no depth at (80, 80)" in blind.plan.reason
     with pytest.raises(ValueError, match=r"inside: expected pixels of the mask"):
         cut_between(np.eye(4, dtype=bool), np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4, 3)), [(0, 1)], [(2, 2)])

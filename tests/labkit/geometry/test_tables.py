@@ -153,7 +153,11 @@ def crate(rows: int = 3):
     """Blocks side by side in two layers within walls that leave the picture."""
     walls = [((0.2, y, 0.0), (0.8, y + 0.02, 0.2)) for y in (-0.28, 0.26)]
     walls += [((x, -0.28, 0.0), (x + 0.02, 0.28, 0.2)) for x in (0.18, 0.8)]
-    low = [((0.24 + 0.14 * i, -0.2 + 0.14 * j, 0.0), (0.33 + 0.14 * i, -0.12 + 0.14 * j, 0.08)) for i in range(4) for j in range(rows)]
+    low = [
+        ((0.24 + 0.14 * i, -0.2 + 0.14 * j, 0.0), (0.33 + 0.14 * i, -0.12 + 0.14 * j, 0.08))
+        for i in range(4)
+        for j in range(rows)
+    ]
     high = [((0.25 + 0.14 * i, -0.19, 0.08), (0.32 + 0.14 * i, -0.13, 0.14)) for i in range(3)]
     return walls, low + high
 
