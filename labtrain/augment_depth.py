@@ -232,7 +232,7 @@ def augment_frames(
         if rng.random() < 0.5:
             images = [mirrored(image) for image in images]
         for batch, image in zip((rgb, geometry, y, instances), images, strict=True):
-            batch.append(torch.from_numpy(image).permute(2, 0, 1))
+            batch.append(torch.tensor(image).permute(2, 0, 1))  # a copy: a frame cannot be written to
     draws = Draws(generator, whole or len(frames), first, len(frames))
     x = random_colour(torch.stack(rgb).float().div_(255.0), draws)
     x = random_hue(random_noise(random_sharpness(x, draws), draws), draws).clamp_(0.0, 1.0)

@@ -29,6 +29,7 @@ class Camera:
     depth: "32FC1" for metres, "16UC1" for millimetres, in which what is further than 65.535 m is no reading. frame_id
     names the optical frame (x right, y down, z forward).
 
+    >>> import numpy as np
     >>> from labkit.node.bus import Bus
     >>> bus, seen = Bus(), []
     >>> bus.subscribe("/camera/rgb/image_raw", object, seen.append)
