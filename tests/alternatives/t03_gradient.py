@@ -69,15 +69,14 @@ def group__loops(foreground, votes, cell, least):
     numbers, number = np.zeros((H, W), np.int32), 0
     while True:
         best, peak = 0, None
-        for r in range(rows):
-            for c in range(columns):
-                score = sum(
-                    (2 - abs(i)) * (2 - abs(j)) * len(voters.get((r + i, c + j), ()))
-                    for i in (-1, 0, 1)
-                    for j in (-1, 0, 1)
-                )
-                if score > best:
-                    best, peak = score, (r, c)
+        scores = {}
+        for (r, c), pixels in voters.items():
+            for i in (-1, 0, 1):
+                for j in (-1, 0, 1):
+                    scores[r + i, c + j] = scores.get((r + i, c + j), 0) + (2 - abs(i)) * (2 - abs(j)) * len(pixels)
+        for place in sorted(scores):
+            if scores[place] > best and 0 <= place[0] < rows and 0 <= place[1] < columns:
+                best, peak = scores[place], place
         if peak is None:
             return numbers
         around = [(peak[0] + i, peak[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
