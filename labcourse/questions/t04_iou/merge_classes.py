@@ -9,8 +9,9 @@ from labgrader.question import Question, wrong
 
 def merge_classes(n, group):
     """Give the confusion matrix that the pixels would have if class c were called group[c], in truth and prediction."""
-    member = (np.arange(group.max() + 1)[:, None] == group).astype(np.int64)
-    return member @ n @ member.T
+    merged = np.zeros((group.max() + 1, group.max() + 1), np.int64)
+    np.add.at(merged, (group[:, None], group), n)
+    return merged
 
 
 def _counts_and_groups(rng):
