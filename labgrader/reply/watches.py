@@ -17,7 +17,7 @@ from labgrader.program.live import LiveProgram, altered, copied, own_entry
 from labgrader.reply.alarm import ENDS, limited
 from labgrader.reply.finding import Finding, Span
 
-MOST_S = 2.0  # CPU seconds of all watches together
+MOST_S = 1.0  # CPU seconds of all watches together
 
 
 def watch(pieces: Sequence[tuple[str, str]], name: str, cases: Sequence[tuple[tuple, object]], right) -> list[Finding]:

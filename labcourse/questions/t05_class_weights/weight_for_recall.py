@@ -133,6 +133,13 @@ def searched_up_to_a(q1, y, recall, limit):
     return min(weight_for_recall(q1, y, recall), limit)
 
 
+@wrong(
+    "For a pixel of q1 = 0.000001 the weight is 999,999: where does your search end?", limit=(100.0, 1000.0, 10_000.0)
+)
+def searched_between(q1, y, recall, limit):
+    return float(np.clip(weight_for_recall(q1, y, recall), 1.0 / limit, limit))
+
+
 @wrong("Recall is a share of the pixels that truly are of class 1: which of q1 do you sort?")
 def as_many_of_all_pixels(q1, y, recall):
     last = np.sort(q1)[::-1][int(np.ceil(recall * y.sum())) - 1]
