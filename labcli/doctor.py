@@ -18,7 +18,7 @@ CLONE = PACKAGE.with_name("constraints.txt")  # not there if labkit was installe
 NEEDED_GB = 2.0  # free disk for a data set to train on, checkpoints and pictures
 NEEDED_RENDER_MM = 0.1
 
-# Who needs the packages of an extra; `make bench`, `make hub` and `make site` have environments of their own.
+# Who needs the packages of an extra; `make bench`, `hub`, `site` and `test-models` have environments of their own.
 USERS = {
     "course": "`make lab` needs",
     "instructor": "`labkit release` and `labkit grade` need",

@@ -50,7 +50,7 @@ def test_a_missing_package_is_wrong_unless_only_an_extra_needs_it(tmp_path, monk
 
 def test_this_environment_is_whole_and_a_version_that_does_not_fit_is_named(toy, tmp_path, monkeypatch):
     extras = set(packages.metadata.metadata(doctor.KIT).get_all("Provides-Extra"))
-    assert doctor.USERS.keys() == extras - {"bench", "hub", "site"}
+    assert doctor.USERS.keys() == extras - {"bench", "hub", "models", "site"}
     findings = {finding.name: finding for finding in doctor.check_packages()}
     assert findings["packages"].state == findings["[test]"].state == findings["versions"].state == OK, findings
     write_package(tmp_path, "toy_d", "1.0", "toy_b<2")
