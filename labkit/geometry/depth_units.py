@@ -112,7 +112,7 @@ def other_unit(away: float, length: float) -> str:
 
     >>> other_unit(1.7, 0.1), other_unit(3.4, 0.1), other_unit(0.7, 0.5)
     ('', '', '')
-    >>> print(other_unit(3.4, 0.5)[:76])
+    >>> print(other_unit(3.4, 0.5)[:75])
     depth seems to be in another unit: things lie 3.4 m away and are 50 cm long
     """
     here = within(away, AWAY), within(length, LENGTHS)

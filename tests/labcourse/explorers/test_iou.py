@@ -15,7 +15,7 @@ def painted(image, outcome):
 
 
 def labels(seed):
-    return random_frame(seed).labels
+    return random_frame(seed).labels.copy()
 
 
 def test_the_error_image_paints_as_many_pixels_as_the_matrix_counts():
