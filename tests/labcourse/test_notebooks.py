@@ -117,7 +117,10 @@ def test_each_blank_is_followed_by_its_own_check(path):
 
 
 def test_labs_say_in_one_wording_what_comes_and_what_may_go_back():
-    said = {path.stem: re.findall(r"^\*\*What comes, .*\n.*$", prose(path), re.MULTILINE) for path in SOLUTIONS}
+    said = {
+        path.stem: re.findall(r"^\*\*Inputs and return values\..*\n.*$", prose(path), re.MULTILINE)
+        for path in SOLUTIONS
+    }
     wordings = {tuple(said[path.stem]) for path in SOLUTIONS if asked(path.stem)}
     assert len(wordings) == 1 and len(*wordings) == 1
 
