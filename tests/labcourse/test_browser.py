@@ -100,7 +100,7 @@ def test_a_wrong_answer_gets_its_case_at_once_and_its_marked_line_after(jupyterl
     marked = output.locator("mark")
     marked.wait_for()
     assert marked.text_content() == "-"
-    assert "Another operator belongs" in output.text_content() and "returns" in output.text_content()
+    assert "needs another operator" in output.text_content() and "returns" in output.text_content()
     assert output.filter(has_text="Looking for the place").count() == 0
     page.screenshot(path=tmp_path / "hint.png")
     answered(page, "def iou(n):\n    while True:\n        n = n + 0").filter(has_text="A loop does not end").wait_for()
