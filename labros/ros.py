@@ -61,11 +61,12 @@ def run(
 
 def log_to_terminal() -> None:
     """Write the kit's messages to standard error; rospy has taken over the root logger by now."""
-    kit = logging.getLogger("labkit")
-    kit.setLevel(logging.INFO)
-    kit.propagate = False
-    if not kit.handlers:
-        kit.addHandler(logging.StreamHandler())
+    for room in ("labkit", "labros"):
+        kit = logging.getLogger(room)
+        kit.setLevel(logging.INFO)
+        kit.propagate = False
+        if not kit.handlers:
+            kit.addHandler(logging.StreamHandler())
 
 
 def run_ros_node(
