@@ -55,5 +55,9 @@ def test_notebook_file_and_page_say_the_same(answer, tmp_path, capsys, monkeypat
     result = Grading(lab, read_submission(tmp_path / "submitted" / "ada", lab), unsafe=True).draft(question.function)
     on_page = [*result.shown.splitlines(), f"Hint: {result.hint}"]
     assert in_notebook == in_file
-    own = [line for line in in_file[1:] if not line.startswith(("In case ", "In random case ", "line ", "Note: "))]
+    own = [
+        line
+        for line in in_file[1:]
+        if not line.startswith(("In hand-made case ", "In random case ", "line ", "Note: "))
+    ]
     assert own == [line.strip() for line in on_page if line.strip()] and not result.flag
