@@ -20,9 +20,9 @@ EXCEPTIONS = [
     (lambda: np.zeros(3)[3], "one past the end: the last one along axis 0 (as long as that of R) is 2"),
     (lambda: np.zeros((3, 2))[0, 4], "an index up to 4 fits axis 0 of P: are two axes swapped?"),
     (lambda: np.zeros(2)[4], "An index of 4 into an axis of 2"),  # P's first axis is no other one
-    (lambda: np.zeros(3)[1.5], "whole numbers or truth values"),
-    (lambda: np.zeros(3)[np.ones(4, bool)], "A mask of 4 entries"),
-    (lambda: np.zeros(3)[0, 1], "2 indices for an array of 1 axes"),
+    (lambda: np.zeros(3)[1.5], "must be integers or booleans"),
+    (lambda: np.zeros(3)[np.ones(4, bool)], "A mask with 4 entries along axis 0"),
+    (lambda: np.zeros(3)[0, 1], "2 indices for an array with 1 axes"),
     (lambda: np.float64(3)[0], "single number"),
     (lambda: np.zeros((5, 3)) + np.zeros((3, 5)), "(the shape of P)"),
     (lambda: np.eye(3) @ np.zeros((5, 3)), "other axes than you meant"),
@@ -44,7 +44,7 @@ EXCEPTIONS = [
     (lambda: __import__("math").exp(np.ones(2)), "math.exp"),
     (lambda: np.zeros(2)(0), "Round brackets"),
     (lambda: raised(1, 2), "y, P, R"),
-    (lambda: np.zeros(2.0), "// a whole number"),
+    (lambda: np.zeros(2.0), "// an integer"),
     (lambda: np.max(1.0, 2.0), "takes b for an axis"),
     (lambda: np.max(1.0, 2.0, 3.0), "np.max([a, b, c])"),
     (lambda: undefined_name, "No cell that counts here defines undefined_name"),
@@ -65,8 +65,8 @@ def test_an_exception_is_explained_by_what_raised_it(number):
 
 def test_comparisons_without_brackets_are_seen_in_the_line():
     text = raised(lambda: np.ones(2) > 0 & np.ones(2))
-    assert "bind closer" in explain(text, {}, "return a > 0 & b")
-    assert "bind closer" not in explain(text, {}, "return f(a)")
+    assert "bind more tightly" in explain(text, {}, "return a > 0 & b")
+    assert "bind more tightly" not in explain(text, {}, "return f(a)")
 
 
 def mask_of_one(y):
@@ -76,16 +76,16 @@ def mask_of_one(y):
 # What raises, the student's line, and what is said.
 OF_A_LINE = [
     (lambda: 1 if np.zeros(2) <= np.ones(2) <= np.ones(2) else 2, "if a <= b <= c:", "write (a <= b) & (b <= c)"),
-    (lambda: np.ones(2) > 0 & np.ones(2) < 3, "return a > 0 & b < 3", "bind closer"),
+    (lambda: np.ones(2) > 0 & np.ones(2) < 3, "return a > 0 & b < 3", "bind more tightly"),
     (lambda: mask_of_one(), "return mask_of_one()", "Your call of mask_of_one lacks y"),
     (lambda: mask_of_one(1, 2), "return mask_of_one(1, 2)", "too many arguments"),
     (lambda: mask_of_one(), "", "The check calls it with these arguments: y, P, R"),
     (lambda: np.eye(4) @ np.zeros((3, 5)), "T @ P.T", "T[:3, :3]"),
     (lambda: np.diag(np.eye(3)) @ np.zeros((5, 3)), "np.diag(p) @ g", "np.diag of a matrix takes its diagonal"),
     (lambda: int(np.float64(np.nan)), "int(u.mean())", "The mean of nothing is NaN"),
-    (lambda: np.stack([np.zeros(256), np.zeros(4)]), "n = np.stack([np.bincount(i) for i in y])", "with 255 in it 256"),
+    (lambda: np.stack([np.zeros(256), np.zeros(4)]), "n = np.stack([np.bincount(i) for i in y])", "so 256 with a 255 in it"),
     (lambda: np.zeros(7) == np.zeros((5, 3)) + np.zeros(7)[:7], "a == b", "mask both alike"),
-    (lambda: np.ones((1, 3)) + np.ones(4), "n = n[:k] + n[k + 1 :]", "+ joins lists. Of arrays it adds the numbers"),
+    (lambda: np.ones((1, 3)) + np.ones(4), "n = n[:k] + n[k + 1 :]", "+ concatenates lists. With arrays it adds the numbers"),
     (lambda: np.zeros((5, 3)) + np.zeros((4, 3)), "a + b", "one has 5 entries where the other has 4"),
 ]
 
