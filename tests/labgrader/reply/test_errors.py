@@ -83,7 +83,7 @@ OF_A_LINE = [
     (lambda: np.eye(4) @ np.zeros((3, 5)), "T @ P.T", "T[:3, :3]"),
     (lambda: np.diag(np.eye(3)) @ np.zeros((5, 3)), "np.diag(p) @ g", "np.diag of a matrix takes its diagonal"),
     (lambda: int(np.float64(np.nan)), "int(u.mean())", "The mean of nothing is NaN"),
-    (lambda: np.stack([np.zeros(256), np.zeros(4)]), "n = np.stack([np.bincount(i) for i in y])", "256 with a 255 in it"),
+    (lambda: np.stack([np.zeros(256), np.zeros(4)]), "n = np.stack([np.bincount(i) for i in y])", "with a 255 in it"),
     (lambda: np.zeros(7) == np.zeros((5, 3)) + np.zeros(7)[:7], "a == b", "mask both alike"),
     (lambda: np.ones((1, 3)) + np.ones(4), "n = n[:k] + n[k + 1 :]", "+ concatenates lists. With arrays"),
     (lambda: np.zeros((5, 3)) + np.zeros((4, 3)), "a + b", "one has 5 entries where the other has 4"),
