@@ -15,6 +15,7 @@ SAMPLE = 15_000  # points of a picture that planes are looked for in
 PLANES, LEAST = 8, 0.03  # planes that are looked at, the largest first; the share of the points that a table has
 THICK = 0.012  # metres over or under a plane where no second one is looked for, at up to a metre (`slack`)
 CURVED = 0.03  # metres, at up to a metre: how far a depth camera bends a table
+STEEP, ACROSS = 0.5, 2  # sine of a slope that no table has, measured over so many pixels of the sample to both sides
 GROWS = 5  # times that a bent table is followed beyond where it was found
 NARROW = 0.08  # metres: a plane whose outline is narrower is the face of a thing
 REACH = 1.6  # metres from the camera to the nearest tenth of a plane: further off nothing is grasped
@@ -231,6 +232,7 @@ def _grown(table: Table, points, least: float) -> Table:
     P = points[seen]
     Q, curved = transform_points(table.T_table_frame, P), table.slack(P, CURVED)
     powers = _powers(Q[:, :2])
+    level = ~_upright(table, points)[seen]
     for _ in range(GROWS):
         inside, height = table.over(P)
         on = inside & (np.abs(height) < table.slack(P, THICK))
@@ -239,7 +241,7 @@ def _grown(table: Table, points, least: float) -> Table:
         off = np.abs(Q[:, 2] - shown)
         thick = min(THICK, 3.0 * float(np.sqrt(np.mean(off[on] ** 2))) + 0.001)
         solid = np.zeros(seen.shape, bool)
-        solid[seen] = (off < table.slack(P, thick)) & (np.abs(shown) < curved)
+        solid[seen] = (off < table.slack(P, thick)) & (np.abs(shown) < curved) & level
         larger = _table(table.plane, points, _without_specks(solid), table.viewer, least, bend)
         if larger is None or larger.area < 0.97 * table.area:
             break
@@ -247,6 +249,18 @@ def _grown(table: Table, points, least: float) -> Table:
         if not grown:
             break
     return table
+
+
+def _upright(table: Table, points) -> Bool[np.ndarray, "h w"]:
+    """Where a surface is steep: the face of a thing beside a table crosses its height, and is no piece of it."""
+    height = table.over(points.reshape(-1, 3))[1].reshape(points.shape[:2])
+    upright = np.zeros(height.shape, bool)
+    for axis, length in enumerate(height.shape):
+        back, ahead = (np.clip(np.arange(length) + by, 0, length - 1) for by in (-ACROSS, ACROSS))
+        rise = np.abs(height.take(ahead, axis) - height.take(back, axis))
+        run = np.linalg.norm(points.take(ahead, axis) - points.take(back, axis), axis=-1)
+        upright |= (rise > STEEP * run) & (run < NARROW)  # beyond a wide gap begins another surface
+    return upright
 
 
 def _same(a: Table, b: Table) -> bool:

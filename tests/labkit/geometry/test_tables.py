@@ -18,6 +18,7 @@ from labkit.sim.spec import Camera
 K = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
 CAMERA = np.array(Camera.looking_at((0.5, 0.0, 0.0), 0.9, np.pi, 0.8).T_base_cam)
 REAL = Path(__file__).resolve().parents[4] / "shared" / "real"
+needs_photographs = pytest.mark.skipif(not REAL.is_dir(), reason="needs ../shared/real")
 
 
 def seen(*boxes, T=CAMERA):
@@ -41,6 +42,7 @@ WIDE_TABLE = ((0.0, -0.8, -0.02), (1.2, 0.8, 0.0))
 SHELF = ((0.6, -0.5, 0.18), (0.9, 0.5, 0.2))
 THING = ((0.45, -0.05, 0.0), (0.51, 0.01, 0.08))
 BEHIND = ((0.78, -0.05, -0.4), (0.88, 0.05, 0.08))  # on the floor behind the small table, and higher than it
+CLOSE_BEHIND = ((0.72, -0.1, -0.4), (0.8, 0.1, 0.08))  # its face crosses the table's height two centimetres beside it
 ROBOT = ((0.45, 0.1, 0.12), (0.55, 1.5, 0.25))  # comes in from the picture's left border
 EVERYTHING = ((-9.0, 9.0), (-9.0, 9.0), (-0.02, 0.5))
 
@@ -72,8 +74,12 @@ def _points(frame, K=K):
 
 @pytest.mark.parametrize(
     ("boxes", "why"),
-    [((FLOOR, SMALL_TABLE, THING, BEHIND), BESIDE), ((WIDE_TABLE, FLOOR, THING, ROBOT), HANGS)],
-    ids=["behind the table", "robot"],
+    [
+        ((FLOOR, SMALL_TABLE, THING, BEHIND), BESIDE),
+        ((FLOOR, SMALL_TABLE, THING, CLOSE_BEHIND), BESIDE),
+        ((WIDE_TABLE, FLOOR, THING, ROBOT), HANGS),
+    ],
+    ids=["behind the table", "close behind it", "robot"],
 )
 def test_what_does_not_stand_on_the_table_is_no_target_without_a_workspace(boxes, why):
     frame, number = seen(*boxes)
@@ -200,16 +206,33 @@ def test_a_mask_outside_the_workspace_says_where_it_lies():
     )
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="needs ../shared/real")
+@needs_photographs
 @pytest.mark.parametrize(("name", "desk", "floor"), [("3", (302, 408), (90, 150)), ("4", (468, 321), (75, 125))])
 def test_a_real_floor_that_fills_the_picture_is_not_the_table(name, desk, floor):
     """Pixels (u, v) of the bare desk and of the floor, chosen in the picture by eye."""
+    frame, K = real(name)
+    points = _points(on_table(frame)[0], K)
+    z = [np.nanmedian(points[v - 5 : v + 6, u - 5 : u + 6, 2]) for u, v in (desk, floor)]
+    assert abs(z[0]) < 0.01 and z[1] < -0.5
+
+
+def real(name: str):
+    """A tabletop frame of a real camera, and its intrinsics."""
     from labcli.cameras import read_intrinsics
     from labcli.perceive import read_frame
 
     folder = REAL / "tabletop"
     camera = read_intrinsics(str(folder / "camera.json"))
-    frame = read_frame(folder / "color" / f"{name}.png", folder / "depth" / f"{name}.png", camera)
-    points = _points(on_table(frame)[0], camera.K)
-    z = [np.nanmedian(points[v - 5 : v + 6, u - 5 : u + 6, 2]) for u, v in (desk, floor)]
-    assert abs(z[0]) < 0.01 and z[1] < -0.5
+    return read_frame(folder / "color" / f"{name}.png", folder / "depth" / f"{name}.png", camera), camera.K
+
+
+@needs_photographs
+def test_a_real_thing_behind_the_tables_corner_is_no_piece_of_it_although_its_face_crosses_the_height():
+    """A black thing on the desk behind, at (16, 212), beside the board's far left corner."""
+    frame, K = real("1")
+    frame = on_table(frame)[0]
+    points = _points(frame, K)
+    table = table_at(find_tables(points, frame.T_base_cam[:3, 3], up=(0.0, 0.0, 1.0)), 0.0)
+    inside, height = table.over(points[[212, 250, 300], [16, 10, 10]].astype(float))
+    assert inside.tolist() == [False, False, True]
+    assert abs(height[1]) < 0.012, "the face at the table's height"
