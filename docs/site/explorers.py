@@ -54,6 +54,8 @@ CHOSEN = {
     },
     "name_that_bug": {"bug": {"none": {}} | {name: {bug: True} for bug, name in BUGS.items()}},
     "depth_noise": {"u": [0, 160, 300], "d": [0.5, 1.0, 2.0], "sigma_pixel": [0.0, 0.5, 2.0], "sigma_depth": [0, 10]},
+    "tilt_the_sheet": {"tilt": [3, 5, 8, 10, 11, 12, 15, 20, 30, 45], "count": [3, 6, 12], "noise": [0.1, 0.3]},
+    "try_a_height": {"height": range(-20, 161, 10)},
     "jaws_at_a_yaw": {"yaw": sorted({*range(0, 181, 4), 66, 94, 122})},
     "sync_explorer": {
         "slop": [0, 2, 4, 6, 8, 10, 12, 14, 20, 27, 33, 35, 40, 50, 60],

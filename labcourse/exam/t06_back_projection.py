@@ -4,6 +4,7 @@ import numpy as np
 
 from labcourse.exam.paper import Paper, again, names, question
 from labcourse.questions.t06_back_projection.cropped_intrinsics import cropped_intrinsics
+from labcourse.questions.t06_back_projection.pose_from_homography import pose_from_homography
 from labkit.geometry.projection import back_project, back_projection_noise, invert_transform, project, transform_points
 
 FOCAL = (200, 250, 400, 500, 600, 800, 1000)
@@ -181,4 +182,50 @@ def ray_length(rng):
         {"z": round(depth, 6), "x": round(depth * du / f, 6)},
         f"At z = 1 the ray is {far}/{near} long ({near}, {side}, {far}), so z = {length:g} · {near}/{far}.",
         {"took the length for depth": length},
+    )
+
+
+@question(points=4, minutes=6)
+def over_the_sheet(rng):
+    """Read a camera's place off a homography."""
+    fx, fy, cx, cy, K = camera(rng)
+    a, b = [(1, 0), (-1, 0), (0, 1), (0, -1)][rng.integers(4)]
+    t = np.append(rng.choice(np.r_[-9:0, 1:10], 2, replace=False) / 10, int(rng.choice([5, 6, 8, 10, 12, 15])) / 10)
+    factor = float(rng.choice([2.0, 4.0, 0.5, 5.0]))
+    H = -factor * K @ np.column_stack([(a, b, 0.0), (b, -a, 0.0), t])
+    place = pose_from_homography(H, K)[:3, 3].round(9)
+    return Paper(
+        {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "t": t},
+        f"<p>A camera has {in_words(fx, fy, cx, cy)}. It looks straight down at a printed sheet, which it sees by the "
+        f"homography H: H (x, y, 1) is (u, v, 1) times a number, with x and y in metres.</p>{names(H.round(6) + 0.0)}"
+        "<p>Where is the camera in the frame of the sheet, whose z points up?</p>",
+        {"camera": place},
+        f"K<sup>−1</sup> H = s [r<sub>1</sub> r<sub>2</sub> t], and r<sub>1</sub> has length 1: s = −{factor:g}, "
+        "negative since t<sub>z</sub> &gt; 0. The camera is at −Rᵀ t, its first two numbers −r<sub>1</sub>·t and "
+        "−r<sub>2</sub>·t.",
+        {
+            "left the sign of s open": place * (1, 1, -1),
+            "gave the place of the sheet in the camera's frame": t,
+            "left the factor in t": factor * place,
+        },
+    )
+
+
+@question(points=3, minutes=4)
+def disparity(rng):
+    """Tell a depth, and its error, from two photographs."""
+    f, b = int(rng.choice(FOCAL)), int(rng.choice([4, 5, 6, 8, 10, 12, 15, 16, 20])) / 100
+    z = int(rng.choice([4, 5, 6, 8, 12, 15, 16, 20, 24])) / 10
+    shift, u = f * b / z, int(rng.integers(300, 600))
+    mm = 1000 * z**2 / (b * f)
+    again(abs(shift - round(shift)) > 1e-9 or abs(1000 * mm - round(1000 * mm)) > 1e-6)
+    return Paper(
+        {"f": f, "b": b, "u": u, "shift": round(shift)},
+        f"<p>Two cameras look the same way, the second {100 * b:g} cm to the right of the first; f = {f} pixels. A "
+        f"point is seen in column {u} of the first picture and in column {u - round(shift)} of the second, in one row. "
+        "How far away is it (z, in metres)? By how many millimetres is that off, to first order, if one of the columns "
+        "is off by a pixel?</p>",
+        {"z": round(z, 9), "mm": round(mm, 6)},
+        f"z = f b / δ with δ = {round(shift)}; z² / (b f) per pixel.",
+        {"took u for the disparity": f * b / u, "forgot the square": {"mm": 1000 * z / (b * f)}},
     )

@@ -264,6 +264,20 @@ def ray_length(g, text):
     return {"z": z, "x": math.sqrt(g["length"] ** 2 - z * z)}
 
 
+def over_the_sheet(g, text):
+    # Where no point of the sheet and no point above it has a pixel: the camera itself, at [r1 r2 r3 t] (X, 1) = 0.
+    H = np.reshape(numbers(text.split("<table")[1].split("</table")[0])[-9:], (3, 3))
+    A = np.linalg.solve([[g["fx"], 0, g["cx"]], [0, g["fy"], g["cy"]], [0, 0, 1]], H)
+    A /= math.copysign(math.hypot(*A[:, 0]), A[2, 2])
+    return {"camera": np.linalg.solve(np.column_stack([A[:, 0], A[:, 1], np.cross(A[:, 0], A[:, 1])]), -A[:, 2])}
+
+
+def disparity(g, text):
+    first, second = (int(n) for n in re.findall(r"column (\d+)", text))
+    depth = [g["f"] * g["b"] / (first - second + off) for off in (-1e-4, 0.0, 1e-4)]
+    return {"z": depth[1], "mm": 1000 * (depth[0] - depth[2]) / 2e-4}
+
+
 def covariance(g, text):
     x, y = (list(map(int, column)) for column in g["xy"].T)
     mean = [Fraction(sum(x), 4), Fraction(sum(y), 4)]
