@@ -297,7 +297,8 @@ def wrong_dtype(expected, got) -> Problem | None:
         return Problem("dtype", f"expected bool, got dtype {got.dtype}: write a comparison, or .astype(bool)")
     if wanted != "b" and came == "b":
         numbers = "real numbers" if wanted == "f" else "whole numbers"
-        return Problem("dtype", f"expected {numbers}, got dtype bool: write .astype(float) or .astype(int)")
+        cast = ": write .astype(float) or .astype(int)" if np.array_equal(expected, got) else ""
+        return Problem("dtype", f"expected {numbers}, got dtype bool{cast}")
     if wanted in "iu" and came == "f" and not (np.isfinite(got) & (np.floor(got) == got)).all():
         return Problem("dtype", f"expected whole numbers, got fractions or NaN in an array of {got.dtype}")
     if wanted in "iu" and came == "f" and got.size and got.shape:

@@ -126,8 +126,9 @@ class Marked:
 def said(finding: Finding) -> str:
     """The sentence about a finding."""
     size = "" if finding.exponent is None else f": a number as large as {finding.exponent:.4g} goes into it"
-    several = "s" if len(finding.spans) > 1 else ""
-    return (WATCHES | IDLE | REPAIRS)[finding.kind].replace("{exponent}", size).replace("{s}", several)
+    plural, singular = ("s", "") if len(finding.spans) > 1 else ("", "s")
+    says = (WATCHES | IDLE | REPAIRS)[finding.kind].replace("{exponent}", size)
+    return says.replace("{s}", plural).replace("{es}", singular)
 
 
 def marked(findings: Sequence[Finding], pieces: Sequence[tuple[str, str]]) -> tuple[Marked, ...]:

@@ -151,12 +151,14 @@ def one_repair(
 ) -> tuple[list[Finding], list[Finding]]:
     """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs.
 
-    Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does, and
-    the case that is shown is right, or closer in each of its numbers.
+    Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does, the
+    case that is shown is right, or closer in each of its numbers, and no case that was right is wrong: the listed
+    mistake would have spoiled it.
     """
     found: dict[Finding, tuple] = {}  # with what decides which one is told first
     with_listed: dict[Finding, tuple] = {}
     before = distance(search, shown)
+    right_before = [case for case in cases if passes(search, case)]
     with over_if(found, with_listed):
         for trial in trials:
             if found and trial.mutation.cost > min(found.values())[0] + MORE_COST:
@@ -168,9 +170,8 @@ def one_repair(
                     found[trial.finding] = trial.rank
                 elif runs and not found and trial.mutation.cost <= DEAREST_BESIDE and not leaves_out(trial.mutation):
                     number = listed_mistake(search, cases)
-                    if number is not None and is_closer(
-                        distance(search, shown), before
-                    ):  # one mistake is less than two
+                    closer = number is not None and is_closer(distance(search, shown), before)
+                    if closer and all(passes(search, case) for case in right_before):  # one mistake is less than two
                         with_listed[replace(trial.finding, listed=number)] = trial.rank
     return sorted(found, key=found.get), sorted(with_listed, key=with_listed.get)[:1]
 

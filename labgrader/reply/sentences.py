@@ -281,8 +281,11 @@ def fulfilled(prop: Property, case: Case, got: object) -> bool:
 def which_cases(cases: Sequence[Case], right: Sequence[bool]) -> Sentence:
     """What to do with the case that is shown, and how many others are right; right: of each case."""
     shown = told_first(cases, [not is_right for is_right in right])
-    if shown is not None and cases[shown].edge:
-        says = "What is unusual about the case above, a size, a number, a type? Which of your lines depends on it?"
+    usual = [is_right for case, is_right in zip(cases, right, strict=True) if case.by_hand and not case.edge]
+    if shown is not None and usual and all(usual):
+        unusual = "What is unusual about the case above, a size, a number, a type?"
+        drawn = "What does the case above have that they do not: a size, a number, a direction?"
+        says = f"{unusual if cases[shown].edge else drawn} Which of your lines depends on it?"
         return Sentence("case", f"All usual hand-made cases are right. {says}")
     others = f" {sum(right)} of {len(cases)} cases are right." if any(right) else ""
     return Sentence("case", f"Do the case above by hand, and print what each of your lines gives for it.{others}")

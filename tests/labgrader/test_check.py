@@ -101,7 +101,7 @@ CASES = [
     (nine_more, "✘ share: 2 of 2 values are wrong\n" + HERE +
            "      returns   [[10, 12]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: Every right answer has this property, and yours does not: shares are not over two."),
-    (flags, "✘ share: expected real numbers, got dtype bool: write .astype(float) or .astype(int)\n" + HERE +
+    (flags, "✘ share: expected real numbers, got dtype bool\n" + HERE +
            "      returns   [[True, True]]\n      expected  [[0.98127, 1.4813]]\n"
            "  Hint: Do the case above by hand, and print what each of your lines gives for it."),
     (alters, "✘ share: it changes its argument n: work on a copy; what calls it still needs the old values\n  "

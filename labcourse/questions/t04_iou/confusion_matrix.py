@@ -53,11 +53,17 @@ QUESTION = Question(
         (np.array([[2, 255], [2, 1], [0, 2]], np.uint8), np.array([[1, 0], [1, 1], [0, 2]], np.uint8), 3, 255),
         (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),
         (np.array([[0]], np.uint8), np.array([[0]], np.uint8), 1, 255),
-        (np.zeros((250, 280), np.uint8), np.ones((250, 280), np.uint8), 2, 255),  # more than two bytes can count
+        (np.array([[255, 255]], np.uint8), np.array([[0, 1]], np.uint8), 2, 255),  # nothing was judged
+        (
+            np.zeros((240, 320), np.uint8),
+            np.ones((240, 320), np.uint8),
+            2,
+            255,
+        ),  # a frame: more than two bytes can count
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
         (np.array([[254]], np.uint8), np.array([[253]], np.uint8), 255, 255),
     ),
-    edges=4,
+    edges=5,
     random_cases=10,
     forbidden=("sklearn", "torchmetrics"),
 )
@@ -91,10 +97,11 @@ def only_what_is_no_class_ignored(y_true, y_pred, num_classes, ignore):
     return pair_count(*counted_pairs(y_true, y_pred, 255), num_classes)
 
 
-@wrong("n holds whole numbers of pixels: nothing is divided yet.")
-def shares_of_rows(y_true, y_pred, num_classes, ignore):
+@wrong("n holds whole numbers of pixels: nothing is divided yet.", of=("rows", "all"))
+def shares(y_true, y_pred, num_classes, ignore, of):
     n = pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)
-    return n / np.maximum(n.sum(axis=1, keepdims=True), 1)
+    with np.errstate(invalid="ignore"):
+        return n / n.sum() if of == "all" else n / np.maximum(n.sum(axis=1, keepdims=True), 1)
 
 
 @wrong("With 20 classes the numbers go wrong: what is 19 * 20 + 19 in uint8, which ends at 255?")
@@ -114,3 +121,10 @@ def as_long_as_the_largest_pair(y_true, y_pred, num_classes, ignore):
 @wrong("np.histogram2d spreads its bins from the least label to the largest: where does class 1 begin?")
 def bins_between_the_extremes(y_true, y_pred, num_classes, ignore):
     return np.histogram2d(*counted_pairs(y_true, y_pred, ignore), bins=num_classes)[0].astype(int)
+
+
+@wrong("Some pixels are lost: a pair of indices that occurs twice is written once. What adds them up?")
+def written_once(y_true, y_pred, num_classes, ignore):
+    n = np.zeros((num_classes, num_classes), int)
+    n[counted_pairs(y_true, y_pred, ignore)] += 1
+    return n

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from labcourse.questions.t04_iou import COUNTS, SMALL_COUNTS, counts, counts_of_many_classes, divide, iou_of, parts
-from labgrader.question import Question, wrong
+from labgrader.question import Question, holds, wrong
 
 
 def iou(n):
@@ -24,6 +24,12 @@ QUESTION = Question(
     random_cases=6,
     forbidden=("sklearn", "torchmetrics"),
 )
+
+
+@holds("each score is from 0 to 1, or NaN")
+def scores_are_shares(n, out):
+    return not ((np.asarray(out) < 0.0) | (np.asarray(out) > 1.0)).any()
+
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
@@ -89,3 +95,20 @@ def accuracy_by_class(n):
 def smoothed(n):
     correct, predicted, true = parts(n)
     return (correct + 1.0) / (predicted + true - correct + 1.0)
+
+
+@wrong("You divide by all pixels: most of them are neither truly class c nor called c. Which ones are in its union?")
+def share_of_all_pixels(n):
+    return divide(np.diagonal(n), np.full(len(n), n.sum()))
+
+
+@wrong("The larger of two sets is less than their union: what of the smaller one lies outside of it?")
+def the_larger_set(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, np.maximum(predicted, true))
+
+
+@wrong("The smaller of two sets is less than their union: what of the larger one lies outside of it?")
+def the_smaller_set(n):
+    correct, predicted, true = parts(n)
+    return divide(correct, np.minimum(predicted, true))

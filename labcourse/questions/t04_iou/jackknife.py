@@ -69,6 +69,11 @@ QUESTION = Question(
 )
 
 
+@holds("the score, a mean of shares, is from 0 to 1")
+def score_is_a_share(n_frames, out):
+    return 0.0 <= out[0] <= 1.0
+
+
 @holds("frames that are all alike have a standard error of 0")
 def alike_frames_say_the_same(n_frames, out):
     return np.isclose(out[1], 0.0, atol=1e-6) if (n_frames == n_frames[0]).all() else out[1] >= 0.0
@@ -310,3 +315,10 @@ def accuracy(n_frames):
 @wrong("Background is a class like the others: over which classes do you average?")
 def without_background(n_frames):
     return by(n_frames, lambda some: np.nanmean(np.append(iou_of(some.sum(axis=0))[1:], np.nan)))
+
+
+@wrong("You average the standard errors of the classes. Asked for is the one of their mean.")
+def errors_of_the_classes_averaged(n_frames):
+    left = np.array([iou_of(n_frames.sum(axis=0) - n) for n in n_frames])
+    off = np.nansum(np.square(left - np.nanmean(left, axis=0)), axis=0)
+    return pooled(n_frames), np.sqrt((1 - 1 / len(n_frames)) * off).mean()

@@ -133,3 +133,20 @@ def chosen_and_cut(n, group):
 def runs_as_they_come(n, group):
     starts = np.flatnonzero(np.diff(group, prepend=-1))
     return np.add.reduceat(np.add.reduceat(n, starts, axis=0), starts, axis=1)
+
+
+@wrong("The rows are merged and the columns are not: a prediction has a group, too.")
+def columns_cut_off(n, group):
+    merged = np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
+    return merged[:, : len(merged)]
+
+
+@wrong("Your cells hold the mean of those that become one. These are counts: what is the number of all their pixels?")
+def averaged(n, group):
+    size = np.bincount(group)
+    return merge_classes(n, group) / np.outer(size, size)
+
+
+@wrong("A truth value holds no count: you tell where pixels are. How many are they?")
+def whether_there_are_any(n, group):
+    return merge_classes(n, group) > 0

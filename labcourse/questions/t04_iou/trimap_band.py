@@ -55,9 +55,11 @@ QUESTION = Question(
         (np.array([[1, 1, 1], [1, 1, 1], [2, 1, 1]], np.uint8), 1),
         (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
         (np.array([[7]], np.uint8), 1),
+        (np.array([[0, 128, 128, 128]], np.uint8), 1),  # alike but for the first of eight bits
         (np.repeat([[4, 4], [9, 4]], 30, axis=0).astype(np.uint8), MOST_WIDE),  # more places than a byte counts
+        (np.repeat([4, 9], 16 * 16).reshape(32, 16).astype(np.uint8), MOST_WIDE),  # 256 of another class: 0 in a byte
     ),
-    edges=2,
+    edges=4,
     random_cases=8,
     points=3,
     forbidden=("cv2", "scipy", "skimage"),
@@ -163,3 +165,25 @@ def grown_from_where_classes_touch(y, width):
 @wrong("Labels go up to 254, and 8 bits with a sign end at 127: what becomes of the label 254?")
 def labels_of_8_bits_with_a_sign(y, width):
     return trimap_band(np.where(y > 127, 255, y).astype(np.uint8), width)
+
+
+@wrong("255 is no class: a pixel that nobody judged is in your band itself.")
+def unjudged_in_the_band(y, width):
+    return banded(y, width, square(width))
+
+
+@wrong("One pixel of another class nearby is enough: you ask that all of them are of another.")
+def all_of_the_window(y, width):
+    H, W = y.shape
+    framed = np.pad(y, width, constant_values=255)
+    steps = [step for step in square(width) if step != (0, 0)]
+    near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in steps]
+    return np.all([(n != y) & (n != 255) for n in near], axis=0) & (y != 255)
+
+
+@wrong("Beyond the border there is no class, not class 0; and a pixel of 255 is never in the band itself.")
+def border_and_unjudged_in_the_band(y, width):
+    H, W = y.shape
+    framed = np.pad(y, width)
+    near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in square(width)]
+    return np.any([(n != y) & (n != 255) for n in near], axis=0)

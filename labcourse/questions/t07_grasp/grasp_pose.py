@@ -169,3 +169,10 @@ def always_downwards(position, approach, closing):
     z = unit(approach) * (1.0 if approach[2] <= 0.0 else -1.0)
     y = unit(closing - (closing @ z) * z)
     return pose(np.cross(y, z), y, z, position)
+
+
+@wrong("You keep the part of the closing direction that lies along the approach: what is left without it?")
+def along_the_approach(position, approach, closing):
+    z = unit(approach)
+    y = unit((closing @ z) * z)
+    return pose(np.cross(y, z), y, z, position)

@@ -51,8 +51,8 @@ def _scene_round_a_grasp(rng):
 # high above, and in the other finger. How many lie on a border tells the borders apart.
 _AT_TIPS = [[2.625, 1.0, 0.25], [2.625, 0.875, 0.25], [2.5625, 1.0, 0.25]]
 _IN = [[2.5, 1.0, 0.5], [2.75, 1.0, 0.5], *_AT_TIPS, [2.625, 1.25, 1.5], [1.375, 0.75, 0.5]]
-# Those that do not: just inside the pad, beyond the finger, beside it, and below the tips.
-_OUT = [[2.25, 1.0, 0.5], [3.0, 1.0, 0.5], [2.625, 1.5, 0.5], [2.625, 1.0, 0.125]]
+# Those that do not: just inside the pad, beyond the finger, beside it on both sides, and below the tips.
+_OUT = [[2.25, 1.0, 0.5], [3.0, 1.0, 0.5], [2.625, 1.5, 0.5], [2.625, 0.5, 0.5], [2.625, 1.0, 0.125]]
 
 # These are in the grasp frame. Of a hand of which no axis is level: one beside the fingers, four in them.
 _BESIDE = np.array([[0.2, 0.55, -0.3], [-0.2, 0.35, 0.05], [0.0, -0.45, 0.05], [0.0, -0.45, -0.4], [-0.05, 0.25, -0.2]])
@@ -204,3 +204,27 @@ def or_after_and(P, T_base_grasp, width, half, thickness, tips, first):
 def pads_taken_as_level(P, T_base_grasp, *boxes):
     _, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes((P - T_base_grasp[:3, 3])[:, :2] @ T_base_grasp[:2, 0], y, z, *boxes)
+
+
+@wrong("x has two signs: what does x <= half say of a point far away on the negative side?")
+def pads_without_an_end(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(np.maximum(x, 0.0), y, z, width, half, thickness, tips)
+
+
+@wrong("The jaws close along y of the grasp frame, and the fingers are broad along x.")
+def axes_exchanged(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(y, x, z, *boxes)
+
+
+@wrong("z points down: the tips are at z = tips, not at -tips, and what is above them has a smaller z.")
+def heights_counted_upwards(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, -z, *boxes)
+
+
+@wrong("The frame's z points from the palm to the tips: these are at z = tips. Where are they in yours?")
+def tips_above_the_origin(P, T_base_grasp, width, half, thickness, tips):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return in_boxes(x, y, z, width, half, thickness, -tips)

@@ -129,3 +129,16 @@ def middle_taken_as_it_is(T_base_grasp, middle):
 def pads_taken_as_level(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3])
     return np.abs(off @ T_base_grasp[:3, 1]), np.abs(off[:2] @ T_base_grasp[:2, 0])
+
+
+@wrong("The middle is a point of the base frame: which transform takes base coordinates to the grasp frame?")
+def transform_not_inverted(T_base_grasp, middle):
+    off = 1000.0 * np.abs(T_base_grasp[:3, :3] @ middle + T_base_grasp[:3, 3])
+    return off[1], off[0]
+
+
+@wrong("The hand may lean: an axis has three components, and a yaw knows two. Which column of T is the axis?")
+def axes_of_a_yaw(T_base_grasp, middle):
+    yaw, off = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1]), 1000.0 * (middle - T_base_grasp[:3, 3])
+    along = np.array([np.cos(yaw), np.sin(yaw)])
+    return np.abs(off[:2] @ along), np.abs(off[1] * along[0] - off[0] * along[1])

@@ -232,6 +232,8 @@ def test_a_telling_case_is_shown_before_an_edge_and_before_whatever_fails_worse(
     assert everywhere == "hand-made case 1 of 2"
     mostly, _ = shown(lambda n: iou(n) if len(n) == 2 else n[9])
     assert mostly == "random case 1 of 4"
+    drawn, says = shown(lambda n: iou(n) if len(n) == 2 else iou(n) + 1.0)
+    assert drawn == "random case 1 of 4" and "right. What does the case above have that they do not" in says
     where, says = shown(lambda n: np.nan_to_num(iou(n)))  # only where a class never occurs
     assert where == "hand-made case 2 of 2" and says.startswith("All usual hand-made cases are right. What is unusual")
 

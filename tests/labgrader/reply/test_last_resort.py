@@ -7,6 +7,7 @@ from labgrader.question import Question
 from labgrader.reply import repair
 from labgrader.reply.finding import Finding, Span
 from labgrader.reply.idle import idle
+from labgrader.reply.listed import fingerprint
 from labgrader.reply.repair import repairs
 from labgrader.reply.sentences import found_in_the_program
 
@@ -15,8 +16,8 @@ CASES = [(np.array([1.0, 5.0]), np.array([2.0, 3.0])), (np.array([4.0, 0.5, 7.0]
 FRESH = [(np.array([-3.0, 2.0]), np.array([0.25, -8.0]))]
 
 
-def found(reference, source, shown=CASES, fresh=FRESH):
-    """What repair finds in a program, with the parts that it marks."""
+def found(reference, source, shown=CASES, fresh=FRESH, mistake=None):
+    """What repair finds in a program, with the parts that it marks; mistake: a listed one."""
 
     def off(expected, got):
         same = np.shape(expected) == np.shape(got)
@@ -26,11 +27,12 @@ def found(reference, source, shown=CASES, fresh=FRESH):
         return off(expected, got) is not None and not off(expected, got).any()
 
     cases, more = ([(args, reference(*args)) for args in some] for some in (shown, fresh))
+    listed = [{fingerprint(mistake(*args)): frozenset({0})} for args in shown] if mistake else ()
     pieces = ("quiet", "import numpy as np"), ("f", source)
     lines = source.split("\n")
     return [
         (f.kind, [lines[s.line - 1][s.column : s.end].strip() for s in f.spans])
-        for f in repairs(pieces, "f", cases, lambda: more, right, off)
+        for f in repairs(pieces, "f", cases, lambda: more, right, off, listed)
     ]
 
 
@@ -68,6 +70,24 @@ def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
 def test_a_mark_beside_a_listed_mistake_brings_each_number_of_the_case_closer(now, before, closer):
     arrays = [None if numbers is None else np.array(numbers) for numbers in (now, before)]
     assert repair.is_closer(*arrays) is closer
+
+
+def test_a_mark_beside_a_listed_mistake_spoils_no_case_that_was_right():
+    """One mistake, what b = 9 means, is not told as two, of which the second would have to undo the first."""
+    source, differs = "def f(a, b):\n    return 1.0 * (a != b)", lambda a, b: 1.0 * ((a != b) & (b != 9))
+    larger = lambda a, b: 1.0 * (a > b)  # noqa: E731
+    wrong = [(np.array([1]), np.array([9])), (np.array([3, 1, 2, 7]), np.array([5, 9, 2, 4]))]
+    more = [(np.array([7, 8, 0, 9, 9, 4]), np.array([9, 9, 9, 9, 0, 4]))]
+    assert found(differs, source, wrong, more, larger) == [("comparison", ["!="])]
+    assert found(differs, source, [*wrong, (np.array([1]), np.array([2]))], more, larger) == []
+
+
+@pytest.mark.parametrize(
+    "kind, places, says", [("name", 2, "places need another of"), ("name", 1, "place needs another")]
+)
+def test_a_sentence_agrees_with_how_many_places_are_marked(kind, places, says):
+    spans = tuple(Span(2, column, 2, column + 1) for column in (11, 15)[:places])
+    assert says in said(Finding(kind, 0, spans))[0]
 
 
 def test_what_no_single_change_mends_is_not_found():
