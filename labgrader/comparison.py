@@ -293,6 +293,8 @@ def wrong_dtype(expected, got) -> Problem | None:
     wanted, came = expected.dtype.kind, got.dtype.kind
     if wanted != "b" and came == "b" and expected.shape == () == got.shape:
         return Problem("dtype", "expected a number, got a truth value: does the task ask whether, or how many?")
+    if wanted in "iu" and came == "b" and expected.shape == ():
+        return Problem("dtype", "expected a number, got an array of bool: does the task ask which ones, or how many?")
     if wanted == "b" and came != "b":
         return Problem("dtype", f"expected bool, got dtype {got.dtype}: write a comparison, or .astype(bool)")
     if wanted != "b" and came == "b":

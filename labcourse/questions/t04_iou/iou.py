@@ -112,3 +112,17 @@ def the_larger_set(n):
 def the_smaller_set(n):
     correct, predicted, true = parts(n)
     return divide(correct, np.minimum(predicted, true))
+
+
+@wrong("FP and FN are both in the union, once each: which of them do you add twice?", twice=("FP", "FN"))
+def one_of_the_errors_twice(n, twice):
+    correct, predicted, true = parts(n)
+    return divide(correct, 2 * (predicted if twice == "FP" else true) - correct)
+
+
+@wrong(
+    "That is made of precision and recall, and it is no IoU: what is in the union of two sets?", of=("sum", "product")
+)
+def mean_or_product_of_precision_and_recall(n, of):
+    p, r = precision(n), recall(n)
+    return p * r if of == "product" else (p + r) / 2

@@ -156,7 +156,7 @@ def sum_outside_the_root(n_frames):
     return score, error**2 / np.sqrt(1 - 1 / len(n_frames))
 
 
-@wrong("Your error is always 0. Deviations from a mean add up to 0: is each of them squared before you add?")
+@wrong("Your error is always 0. Deviations add up to 0 unless each is squared first; and (F - 1) // F is 0, too.")
 def squared_after_the_sum(n_frames):
     return pooled(n_frames), 0.0
 

@@ -51,8 +51,9 @@ QUESTION = Question(
         (np.array([[5, 1], [2, 3]]), np.array([0, 0])),  # everything is one class
         (np.array([[5, 1], [2, 3]]), np.array([1, 0])),
         (np.array([[5]]), np.array([0])),
+        (np.array([[10**12, 10**12 - 2], [7, 10**12]]), np.array([0, 0])),  # few groups of many pixels
     ),
-    edges=1,
+    edges=2,
     points=3,
 )
 
@@ -150,3 +151,14 @@ def averaged(n, group):
 @wrong("A truth value holds no count: you tell where pixels are. How many are they?")
 def whether_there_are_any(n, group):
     return merge_classes(n, group) > 0
+
+
+@wrong("The columns are merged and the rows are not: the truth has a group, too.")
+def old_rows(n, group):
+    return old_columns(n.T, group).T
+
+
+@wrong("You sort the classes and cut: what the classes of one group have in common is a sum.")
+def sorted_and_cut(n, group):
+    G, order = group.max() + 1, np.argsort(group)
+    return n[np.ix_(order, order)][:G, :G]

@@ -55,11 +55,12 @@ QUESTION = Question(
         (np.array([[1, 1, 1], [1, 1, 1], [2, 1, 1]], np.uint8), 1),
         (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
         (np.array([[7]], np.uint8), 1),
+        (np.array([[255, 255, 255, 7]], np.uint8), 1),  # nor is 255 in the band where no class is near
         (np.array([[0, 128, 128, 128]], np.uint8), 1),  # alike but for the first of eight bits
         (np.repeat([[4, 4], [9, 4]], 30, axis=0).astype(np.uint8), MOST_WIDE),  # more places than a byte counts
         (np.repeat([4, 9], 16 * 16).reshape(32, 16).astype(np.uint8), MOST_WIDE),  # 256 of another class: 0 in a byte
     ),
-    edges=4,
+    edges=5,
     random_cases=8,
     points=3,
     forbidden=("cv2", "scipy", "skimage"),
@@ -187,3 +188,15 @@ def border_and_unjudged_in_the_band(y, width):
     framed = np.pad(y, width)
     near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in square(width)]
     return np.any([(n != y) & (n != 255) for n in near], axis=0)
+
+
+@wrong("Near the border you leave all pixels out: a window that ends at the image's border still has its other pixels.")
+def border_left_out(y, width):
+    whole = np.zeros(y.shape, bool)
+    whole[width : y.shape[0] - width, width : y.shape[1] - width] = True
+    return trimap_band(y, width) & whole
+
+
+@wrong("Your window reaches along one axis alone: edges lie across rows and across columns.", axis=(0, 1))
+def along_one_axis(y, width, axis):
+    return banded(y, width, [step for step in square(width) if step[1 - axis] == 0]) & (y != 255)

@@ -251,3 +251,12 @@ def fixed_half_turns_from_0(Sigma, now, turns):
 def in_degrees(Sigma, now, nearest):
     yaw = np.degrees(yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]))
     return yaw + 180 * np.round((now - yaw) / 180) if nearest else yaw
+
+
+@wrong(
+    "Your angle is made of variances, which have no direction. Which vector tells one?", of=("eigenvalues", "diagonal")
+)
+def angle_of_variances(Sigma, now, of):
+    variances = np.linalg.eigvalsh(Sigma[:2, :2]) if of == "eigenvalues" else np.sqrt(np.diagonal(Sigma)[[1, 0]])
+    yaw = np.arctan2(*variances)
+    return yaw + np.pi * np.round((now - yaw) / np.pi)

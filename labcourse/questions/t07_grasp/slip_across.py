@@ -142,3 +142,9 @@ def axes_of_a_yaw(T_base_grasp, middle):
     yaw, off = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1]), 1000.0 * (middle - T_base_grasp[:3, 3])
     along = np.array([np.cos(yaw), np.sin(yaw)])
     return np.abs(off[:2] @ along), np.abs(off[1] * along[0] - off[0] * along[1])
+
+
+@wrong("That is the whole distance: what is pushed, and what lies along the approach, do not slip.")
+def the_whole_distance(T_base_grasp, middle):
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    return np.abs(off @ T_base_grasp[:3, 1]), np.linalg.norm(off)

@@ -208,6 +208,8 @@ def test_tuples_are_judged_part_by_part():
     assert problem(lambda x: (x.sum(), x.mean(1)), both).says == "output 2 of 2: expected shape (2,), got (3,)"
     assert problem(lambda x: (x.sum(0), x.mean(0)), both).says == "output 1 of 2: expected a number, got shape (2,)"
     assert problem(lambda x: (x.sum() + 1, x.mean(0)), both).says == "1 of 3 values is wrong"
+    count = replace(QUESTION, reference=lambda n: int((n > 0).sum()))
+    assert problem(lambda n: n > 0, count).says.endswith("does the task ask which ones, or how many?")
 
 
 def test_the_first_problem_is_told_with_its_case():
