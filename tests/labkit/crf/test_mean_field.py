@@ -5,10 +5,11 @@ import itertools
 import numpy as np
 import pytest
 from random_crf import random_crf
+from scipy.ndimage import gaussian_filter
 from scipy.special import logsumexp, softmax
 
 from labkit.crf import PottsCRF, dense_crf, log_partition, marginals
-from labkit.crf.dense import GaussianFilter
+from labkit.crf.dense import GaussianFilter, elevation
 from labkit.crf.energy import pair_slices
 from labkit.crf.mean_field import mean_field_marginals
 
@@ -95,6 +96,70 @@ def test_the_lattice_is_close_to_the_sum_over_all_pairs(colours):
     error = np.abs(filtered - exact) / exact.mean()
     assert np.median(error) < 0.03 and error.max() < 0.25
     assert np.corrcoef(filtered.ravel(), exact.ravel())[0, 1] > 0.995
+
+
+def lattice_by_hand(features, values):
+    """The permutohedral lattice pixel by pixel, its corners in a dict: splat, blur along each direction, slice."""
+    d = features.shape[1]
+    corners = []  # of each pixel: (coordinates, weight)
+    for y in features @ elevation(d).T:
+        base = (d + 1) * np.round(y / (d + 1)).astype(int)
+        order = np.argsort(base - y, kind="stable")  # furthest above its multiple first
+        for _ in range(abs(excess := base.sum() // (d + 1))):
+            if excess > 0:  # the least above is lowered
+                last = order[-1]
+                base[last] -= d + 1
+                order = np.append(last, order[:-1])
+            else:
+                first = order[0]
+                base[first] += d + 1
+                order = np.append(order[1:], first)
+        above = (y - base)[order] / (d + 1)
+        weights = [1.0 - above[0] + above[-1], *(above[:-1] - above[1:])[::-1]]
+        for r, weight in enumerate(weights):
+            step = np.full(d + 1, r)
+            step[order[d + 1 - r :]] -= d + 1
+            corners.append((tuple(base + step), weight))
+    size = len(features)
+
+    def filtered(pixels):
+        at = {corner: 0.0 for corner, _ in corners}
+        for k, (corner, weight) in enumerate(corners):
+            at[corner] = at[corner] + weight * pixels[k // (d + 1)]
+        for j in range(d + 1):
+            step = (d + 1) * np.eye(d + 1, dtype=int)[j] - 1
+            near = {corner: (tuple(corner + step), tuple(corner - step)) for corner in at}
+            at = {c: at[c] + 0.5 * sum(at.get(other, 0.0) for other in near[c]) for c in at}
+        sliced = [weight * at[corner] for corner, weight in corners]
+        return np.array(sliced).reshape(size, d + 1, -1).sum(axis=1)
+
+    scale = 1.0 / np.sqrt(filtered(np.ones((size, 1))))
+    return scale * filtered(scale * values)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 5, 6])
+def test_the_lattice_is_the_one_of_the_paper(d):
+    """The same sums as in plain loops over pixels and corners, whichever numbers the corners got."""
+    rng = np.random.default_rng(d)
+    features, values = rng.normal(0.0, 2.0, (8, 10, d)), rng.random((80, 3)).astype(np.float32)
+    expected = lattice_by_hand(features.reshape(-1, d), values)
+    assert GaussianFilter("features", features).filtered(values) == pytest.approx(expected, rel=1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize(("noise", "share"), [(False, 0.015), (True, 0.2)])
+def test_the_dense_crf_is_as_far_from_exact_mean_field_as_it_says(noise, share):
+    rng = np.random.default_rng(3)
+    H, W, C = 40, 60, 4
+    y = np.stack([gaussian_filter(rng.normal(size=(H, W)), 6.0) for _ in range(C)]).argmax(axis=0)
+    image = rng.integers(0, 256, (H, W, 3)) if noise else rng.integers(0, 256, (C, 3))[y] + rng.normal(0, 8, (H, W, 3))
+    unary = rng.normal(size=(H, W, C)) - (0.0 if noise else 1.0) * np.eye(C)[y]
+    v, u = np.indices((H, W))
+    q = softmax(-unary.reshape(-1, C), axis=1)
+    for _ in range(10):
+        appearance = all_pairs_filter(np.dstack([u / 60.0, v / 60.0, image / 10.0]), q)
+        q = softmax(-unary.reshape(-1, C) + 10 * appearance + 3 * all_pairs_filter(np.dstack([u, v]) / 3.0, q), axis=1)
+    differ = (dense_crf(unary, image).argmax(axis=2).ravel() != q.argmax(axis=1)).mean()
+    assert (0.05 if noise else 0.0) <= differ < share
 
 
 def test_dense_mean_field_on_a_small_image_is_close_to_all_pairs():
