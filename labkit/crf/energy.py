@@ -197,13 +197,13 @@ def check_unary(unary: Num[np.ndarray, "H W C"]) -> Float[np.ndarray, "H W C"]:
     require("unary", unary.dtype.kind in "fiu", "real costs", f"dtype {unary.dtype}")
     if 0 in unary.shape or not 2 <= unary.shape[2] <= MAX_CLASSES:
         raise ValueError(f"unary: expected at least one pixel and 2 to {MAX_CLASSES} classes, got {unary.shape}")
-    if not unary.min() > -np.inf:  # NaN is not, either
-        raise ValueError("unary: expected costs that are finite or +inf (forbidden), got NaN or -inf")
     low, high = float(unary.min()), float(unary.max())
+    if not low > -np.inf:  # NaN is not, either
+        raise ValueError("unary: expected costs that are finite or +inf (forbidden), got NaN or -inf")
     finite = high if high < np.inf else float(unary.max(where=unary < np.inf, initial=low if low < np.inf else 0.0))
     largest = max(-low, finite)
     require("unary", largest <= MAX_COST, f"costs of at most {MAX_COST:g} in size, or +inf", f"{largest:.6g}")
-    if unary.max() == np.inf and np.isinf(unary.min(axis=2)).any():
+    if high == np.inf and np.isinf(unary.min(axis=2)).any():
         raise ValueError("unary: expected at least one allowed class per pixel, got a pixel with only +inf")
     return unary.astype(np.float64, copy=False)
 

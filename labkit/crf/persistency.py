@@ -13,9 +13,9 @@ import numpy as np
 from labkit.crf.cuts import Moves, trws_expansion
 from labkit.crf.energy import MapResult, PottsCRF, timed
 from labkit.crf.integers import pixel_numbers, quantise
-from labkit.crf.maxflow_kernels import SOURCE
+from labkit.crf.maxflow_kernels import FREE, SOURCE, max_flow
 from labkit.crf.message_kernels import trws_bound
-from labkit.crf.move_kernels import energy_of, fold_fixed, persistency_test
+from labkit.crf.move_kernels import cheapest, energy_of, fold_fixed, persistency_test, sources_of, surroundings
 from labkit.support.validation import MAX_ITERATIONS, check_whole
 
 # If more of the pixels than these shares are left after the first test, or after all, "trws+expansion" solves the image
@@ -23,6 +23,8 @@ from labkit.support.validation import MAX_ITERATIONS, check_whole
 MANY_UNCERTAIN, MANY_LEFT = 0.3, 0.05
 # How far flow is pushed on without search trees here: there are few sources, and all else is a sink.
 NEAR = 10
+# Steps from the sources within which a cut is tried before one of all pixels.
+REACHES = (6, 24)
 
 
 @timed
@@ -35,7 +37,7 @@ def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -
     """
     check_whole("iterations", iterations, 1, MAX_ITERATIONS)
     integer = quantise(crf)
-    moves = Moves(integer, crf.unary.argmin(axis=2))
+    moves = Moves(integer, cheapest(crf.unary))
     pixels = len(moves.nodes)
     fix_certain(moves)
     first, tried = moves.labels.copy(), 1
@@ -61,8 +63,30 @@ def persistency(crf: PottsCRF, iterations: int = 100, tolerance: float = 1e-4) -
     return replace(result, lower_bound=integer.lower_bound(bound - above, result.energy))
 
 
-def fix_certain(moves: Moves) -> None:
-    """Take the free pixels that keep their label in some best labelling out of the moves."""
+def fix_certain(moves: Moves, reaches: tuple[int, ...] = REACHES) -> None:
+    """Take the free pixels that keep their label in some best labelling out of the moves.
+
+    What may change lies near the pixels that would change by themselves, its sources. So the cut is made among the
+    pixels within a few steps of them, the outermost of which are dead ends. If no source can send anything there, no
+    source could if all pixels took part: it is the whole image's cut. Otherwise it is made anew, wider.
+    """
+    problem = moves.integer.unary, moves.integer.weights, moves.integer.step, moves.labels, moves.free
+    sources = sources_of(*problem, moves.nodes, moves.graph)
+    for reach in reaches:
+        near, inner = surroundings(sources, moves.free, moves.integer.step, reach, len(moves.nodes) // 2)
+        if inner < 0:
+            break
+        persistency_test(*problem, near[:inner], moves.graph)
+        moves.graph.excess[near[inner:]] = 0
+        moves.graph.capacity[near[inner:]] = 0
+        max_flow(moves.graph, *moves.trees, near, NEAR)
+        tree = moves.trees[0].tree[near]
+        moves.trees[0].tree[near] = FREE
+        if not (tree[inner:] == SOURCE).any():
+            moves.nodes = np.sort(near[tree == SOURCE])
+            moves.free[:] = False
+            moves.free[moves.nodes] = True
+            return
     _, _, tree = moves.cut(persistency_test, near=NEAR)
     moves.leave_free(tree == SOURCE)
 

@@ -12,6 +12,7 @@ from labkit.crf.cuts import Moves
 from labkit.crf.exact import enumerate_labellings
 from labkit.crf.integers import inside, quantise
 from labkit.crf.messages import message_passing
+from labkit.crf.move_kernels import cheapest
 from labkit.crf.persistency import fix_certain
 
 
@@ -22,8 +23,9 @@ from labkit.crf.persistency import fix_certain
     connectivity=st.sampled_from([4, 8]),
     lam=st.sampled_from([0.1, 0.3, 1.0, 4.0]),
     order=st.permutations([*range(5), None]),
+    reaches=st.sampled_from([(), (1,), (1, 2)]),
 )
-def test_some_best_labelling_keeps_every_certain_pixel(shape, seed, connectivity, lam, order):
+def test_some_best_labelling_keeps_every_certain_pixel(shape, seed, connectivity, lam, order, reaches):
     """Whatever labels are tested one after the other: all of one class, or those of least cost (None)."""
     crf = random_crf(seed, *shape, connectivity, lam, 0.1)
     integer = quantise(crf)
@@ -35,7 +37,7 @@ def test_some_best_labelling_keeps_every_certain_pixel(shape, seed, connectivity
         if alpha is None or alpha < shape[2]:
             start = np.pad(cheapest, 1).ravel() if alpha is None else np.full(len(moves.labels), alpha)
             moves.labels[moves.nodes] = start[moves.nodes]
-            fix_certain(moves)
+            fix_certain(moves, reaches)
             fixed = ~inside(moves.free, integer.size)
             keeps = (y[:, fixed] == inside(moves.labels, integer.size)[fixed]).all(axis=1)
             assert energies[keeps].min() == energies.min()
@@ -48,6 +50,24 @@ def test_a_strong_opinion_is_certain_and_a_weak_one_among_others_is_not():
     moves = Moves(quantise(PottsCRF(unary, weights)), unary.argmin(axis=2))
     fix_certain(moves)
     assert inside(moves.free, (1, 6)).tolist() == [[False, False, True, True, False, False]]
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+@pytest.mark.parametrize("reaches", [(1,), (3,), (2, 5), (40,)])
+def test_a_cut_near_the_sources_leaves_the_same_pixels_as_one_of_all(connectivity, reaches):
+    """Whether it is wide enough at once, after a wider one, or not, and whichever pixels were fixed before."""
+    p, image, depth = like_a_network(2, 60, 70)
+    extra = ((depth, 0.03),)
+    crf = PottsCRF.from_image(-np.log(p + 1e-4), image, 8.0, 30.0, 1.0, connectivity, extra)
+    local, whole = (Moves(quantise(crf), crf.unary.argmin(axis=2)) for _ in range(2))
+    assert np.array_equal(cheapest(crf.unary), crf.unary.argmin(axis=2))
+    for alpha in (None, 2, 0, 1, 3):
+        for moves, steps in ((local, reaches), (whole, ())):
+            if alpha is not None:
+                moves.labels[moves.nodes] = alpha
+            fix_certain(moves, steps)
+        assert np.array_equal(local.nodes, whole.nodes) and np.array_equal(local.free, whole.free)
+        assert alpha is not None or 0 < len(local.nodes) < 0.3 * p.shape[0] * p.shape[1]
 
 
 def like_a_network(seed, H, W, C=4):
