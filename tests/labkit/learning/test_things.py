@@ -232,6 +232,10 @@ def test_looks_in_other_sizes_are_averaged_in_pixels_of_the_one_view(crowd):
     assert once.votes.shape == thrice.votes.shape and thrice.view.to_turned.tolist() == once.view.to_turned.tolist()
     assert once.votes[5, 5].tolist() == [VOTE_UNIT, 0.0]
     np.testing.assert_allclose(thrice.votes[5, 5], [VOTE_UNIT * (2.0 + 0.5) / 2.0, 0.0], rtol=0.03)
+    none, same = look(engine, crowd, False, (0.5, 2.0), classes=False)  # the true size adds nothing to it
+    assert none is None and same.view.to_turned.tolist() == once.view.to_turned.tolist()
+    np.testing.assert_array_equal(same.votes, thrice.votes)
+    np.testing.assert_array_equal(same.foreground, thrice.foreground)
     h = len(once.foreground)
     away = np.abs(np.arange(h) - h / 2.0) > 4.0  # the three halves end within a few pixels of one another
     np.testing.assert_allclose(thrice.foreground[away], once.foreground[away], atol=1e-4)
