@@ -25,6 +25,7 @@ from labcli.commands.forget import forget
 from labcli.commands.grade import grade
 from labcli.commands.grades import grades
 from labcli.commands.perceive import perceive
+from labcli.commands.photos import photos
 from labcli.commands.release import release
 from labcli.commands.renumber import renumber
 from labcli.commands.sheet import sheet
@@ -40,7 +41,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (doctor, check, train, evaluate, export, compare, study, demo, perceive, sheet, calibrate):
+for command in (doctor, check, train, evaluate, export, compare, study, demo, perceive, sheet, calibrate, photos):
     app.command()(command)
 for command in (release, renumber, grade, texts, grades, forget, exam, trust):
     app.command()(command)

@@ -173,6 +173,8 @@ class Light:
 class SceneSpec:
     """Everything that a World needs. The robot's base link stands at the origin; floor and walls are background.
 
+    sheet: x, y and yaw (metres, radians) of the printed sheet of `labkit.geometry.sheet`, if one lies on the table: its
+    origin is the board's lower left corner. It is paper: things stand on the table through it.
     joints: the arm's, 7 angles (rad) and 2 fingers (m), where it stands; None is its home.
     """
 
@@ -185,6 +187,7 @@ class SceneSpec:
     robot: bool = True
     furniture: tuple[Furniture, ...] = ()
     joints: Vector | None = None
+    sheet: Vector | None = None
     seed: int = 0
     config: str = "by hand"
 
@@ -193,6 +196,8 @@ class SceneSpec:
         require("objects", len(set(names)) == len(names), "unique names", names)
         if self.joints is not None:
             check_finite("joints", check_shape("joints", self.joints, (9,)))
+        if self.sheet is not None:
+            check_finite("sheet", check_shape("sheet", self.sheet, (3,)))
         for thing in self.objects:
             off = np.abs(np.subtract(thing.position[:2], self.table.centre)) > np.array(self.table.size[:2]) / 2
             where = f"{self.table.size[:2]} m around {self.table.centre}"

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit.frame import RGBDFrame
 from labkit.geometry.sensor import StereoSensor
+from labkit.geometry.sheet import Sheet
 from labkit.labels import BACKGROUND, SURFACE
 from labkit.sim.client import Client, pybullet
 from labkit.sim.kinematics import HOME, PANDA_URDF
@@ -24,6 +25,7 @@ from labkit.support.validation import require
 TIME_STEP = 1.0 / 240.0
 FLOOR_BELOW_TABLE = 0.7
 ROOM = 6.0  # edge of the square room, metres
+SHEET_DOTS, SHEET_EDGE_MM, PAPER = 5, 15, 0.0003  # of the printed sheet: dots per mm, white around it, metres of height
 RENDERERS = {"tiny": pybullet.ER_TINY_RENDERER, "egl": pybullet.ER_BULLET_HARDWARE_OPENGL}
 MAX_DROP = 0.3  # metres from which an object may fall before it settles
 
@@ -179,6 +181,8 @@ class World:
             body = self._box(piece.size, piece.centre, piece.texture, piece.yaw, piece.pitch)
             if piece.surface:
                 self.surfaces.append(body)
+        if spec.sheet is not None:
+            self.surfaces.append(self._lay(spec.sheet))
         if spec.robot:
             stand = Texture(colour_a=(0.3, 0.3, 0.32))
             self._box((0.2, 0.2, -floor - 0.001), (0.0, 0.0, floor / 2), stand)
@@ -198,6 +202,25 @@ class World:
         with as_file(picture, ".png") as path:
             self.client.changeVisualShape(body, -1, textureUniqueId=self.client.loadTexture(path))
         self.client.changeDynamics(body, -1, lateralFriction=1.0, rollingFriction=0.001, spinningFriction=0.001)
+        return body
+
+    def _lay(self, sheet) -> int:
+        """The printed sheet as a picture on the table, which nothing touches."""
+        x, y, yaw = sheet
+        (width, height), edge = Sheet().size_mm, SHEET_EDGE_MM
+        board = Sheet().board.generateImage((SHEET_DOTS * width, SHEET_DOTS * height))
+        page = cv2.copyMakeBorder(board, *[SHEET_DOTS * edge] * 4, cv2.BORDER_CONSTANT, value=255)
+        left, right, top = -1e-3 * edge, 1e-3 * (width + edge), 1e-3 * (height + edge)
+        corners = ((left, left), (right, left), (right, top), (left, top))
+        lines = [f"v {a} {b} 0" for a, b in corners] + ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", "vn 0 0 1"]
+        quad = "\n".join([*lines, "f 1/1/1 2/2/1 3/3/1", "f 1/1/1 3/3/1 4/4/1", ""]).encode()
+        place = (x, y, self.spec.table.z + PAPER), (0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0))
+        with as_file(quad, ".obj") as path:
+            body = self.client.createMultiBody(
+                0.0, -1, self.client.createVisualShape(pybullet.GEOM_MESH, fileName=path), *place
+            )
+        with as_file(cv2.imencode(".png", page)[1].tobytes(), ".png") as path:
+            self.client.changeVisualShape(body, -1, textureUniqueId=self.client.loadTexture(path))
         return body
 
     def _load_robot(self) -> int:

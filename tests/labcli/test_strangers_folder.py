@@ -40,6 +40,7 @@ COMMANDS = {
     "renumber": ("renumber", "--help"),
     "sheet": ("sheet", "--help"),
     "calibrate": ("calibrate", "--help"),
+    "photos": ("photos", "--help"),
     "trust": ("trust", "nowhere"),
 }
 
