@@ -143,5 +143,5 @@ def with_argument(answer: Callable, name: str, value: object) -> Callable:
     def variant(*args):
         return answer(*args, **{name: value})
 
-    variant.__name__ = f"{answer.__name__}_{name}_{value}"
+    variant.__name__ = f"{answer.__name__}_{name}_{getattr(value, '__name__', value)}"
     return variant

@@ -85,7 +85,7 @@ def repaired(question: Question, text: str) -> bool:
     pieces = (("quiet", "import numpy as np"), (question.function, text))
     look = Look(*comparison_settings(question), question.function, pieces, pairs(public_cases(question)))
     fresh = lambda: pairs(more_public_cases(question))  # noqa: E731
-    return bool(repairs(pieces, question.function, look.public, fresh, look.right, look.entries))
+    return bool(repairs(pieces, question.function, look.public, fresh, look.right, look.off))
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
