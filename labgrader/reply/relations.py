@@ -324,7 +324,9 @@ def places(view: View) -> Iterator[tuple[str, Sequence[np.ndarray]]]:
         ignored = course().ignored
         for says, number in ((f"is {ignored}", ignored), ("is NaN", np.nan), ("is 0", 0)):
             pairs = list(zip(view.expected, values, strict=True))
-            if not all(v.ndim and v.dtype.kind in "iuf" and v.shape == e.shape[: v.ndim] for e, v in pairs):
+            if not all(v.dtype.kind in "iuf" and v.shape == e.shape[: v.ndim] for e, v in pairs):
+                continue
+            if not any(v.ndim for v in values):  # a single pixel is a place where others are pictures
                 continue
             if number is None or (number == ignored and not all(v.dtype == np.uint8 for v in values)):
                 continue

@@ -260,3 +260,14 @@ def clipped_at_the_border(image, lam, sigma_I, sigma_p):
     v, u = np.indices((H, W))
     near = [colours[np.clip(v + down, 0, H - 1), np.clip(u + right, 0, W - 1)] for down, right in PAIRS]
     return gaussian(((colours - near) ** 2).sum(axis=3), lam, sigma_I, sigma_p, ring=True)
+
+
+@wrong(
+    "One of the two terms is not as in the formula: each square is divided by 2 sigma^2, of its own sigma.",
+    of=("colour / 2 sigma", "colour / sigma^2", "place / 2 sigma", "place / sigma^2"),
+)
+def another_divisor(image, lam, sigma_I, sigma_p, of):
+    colour, halved = of.startswith("colour"), of.endswith("sigma^2")
+    sigma = sigma_I if colour else sigma_p
+    other = sigma / np.sqrt(2.0) if halved else np.sqrt(sigma)
+    return gaussian(squares(image), lam, *((other, sigma_p) if colour else (sigma_I, other)))

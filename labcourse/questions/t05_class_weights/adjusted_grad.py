@@ -134,11 +134,12 @@ def times_the_share(z, y, shares, tau):
     return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]
 
 
-@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
-def that_overflows(z, y, shares, tau):
+@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?", ignored=("0", "times 0"))
+def that_overflows(z, y, shares, tau, ignored):
     a = z + tau * np.log(shares)
     p = np.exp(a) / np.exp(a).sum(axis=-1, keepdims=True)
-    return np.where(y[..., None] == 255, 0.0, p - parts(a, y)[1])
+    _, Y, counted = parts(a, y)
+    return (p - Y) * counted if ignored == "times 0" else np.where(counted, p - Y, 0.0)
 
 
 @wrong("What is the derivative of z + constant by z? The shares do not depend on z.")

@@ -86,3 +86,9 @@ def weights_of_mean_one_over_classes(counts, power):
 def absent_class_as_one_pixel(counts, power):
     n = np.maximum(counts, 1)
     return n**-power * n.sum() / (n @ n**-power)
+
+
+@wrong("0 to a negative power is infinite, and infinity times 0 is NaN: what is the weight of a class without pixels?")
+def absent_class_infinite(counts, power):
+    w = counts ** -float(power)
+    return w * counts.sum() / (counts * w).sum()

@@ -51,6 +51,15 @@ def edge(y):
     return ~np.pad(np.ones((y.shape[0] - 2, y.shape[1] - 2), bool), 1)
 
 
+def test_a_single_pixel_among_pictures_hides_no_place():
+    """A label alone is an argument without axes: "where y is 255" is said of the pictures all the same."""
+    scores = lambda y, z: np.where((y == 255)[..., None], 0.0, z)  # noqa: E731
+    one = np.array(7, np.uint8), np.array([0.25, 0.5, 0.75])
+    pictures = lambda rng: (IMAGE.inputs(rng)[0], rng.random((5, 6, 3)))  # noqa: E731
+    question = Question(name="00_test.scores", reference=scores, inputs=pictures, by_hand=(one,))
+    assert judge(question, lambda y, z: z, 3).hint == "It is wrong only where y is 255; all else is right."
+
+
 FEW = Question(name="00_test.few", reference=lambda a: a > 0.5, inputs=lambda rng: (rng.random(2),), random_cases=3)
 
 
