@@ -13,16 +13,18 @@ import io
 import os
 import re
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from labgrader.course import course as course_here
 from labgrader.course import is_taught, taught_rows
 from labgrader.course import topics as all_topics
-from labgrader.release.publishing import unpublished
+from labgrader.release.publishing import ABSOLUTE, owner_and_name, texts, unpublished
 from labgrader.release.release import START, read_notebook, release, start_page, to_bytes
 from labgrader.support import PRIVATE, git, write_atomically
+
+LINK = re.compile(r"!?\[([^\[\]]*)\]\(([^)\s#]+)(?:#[^)\s]*)?\)")
 
 # What a file that students get does not hold, and what it would be.
 MARKS = {
@@ -74,7 +76,7 @@ def for_students(course: Path, topics: Sequence[str] = (), change: Callable = un
     """What students get of a course, as `bundle` says it; raises ValueError as that does.
 
     change: (notebook, name, course) -> the notebook as they get it. By default its links lead to the files beside it,
-    wherever the course is published.
+    wherever the course is published. Of a link to what they do not get, only the words stay.
     """
     course, here = Path(course), course_here()
     if drift := release(course, topics, check=True):
@@ -83,14 +85,36 @@ def for_students(course: Path, topics: Sequence[str] = (), change: Callable = un
     why = {name: said for name, said in why.items() if of(topics, name)}
     kept = [name for name, said in why.items() if not said]
     contents = {name: (course / name).read_bytes() for name in kept}
-    for name in kept:
+    contents |= dict.fromkeys((START, "README.md"), start_page(course, topics).encode()) if here.start else {}
+    for name, data in contents.items():
         if name.endswith(".md"):
-            contents[name] = taught_rows(contents[name].decode("utf-8")).encode()
+            contents[name] = without_dead_links(name, taught_rows(data.decode("utf-8")), contents).encode()
         if name.endswith(".ipynb"):
-            contents[name] = to_bytes(change(read_notebook(course / name), name, course))
-    if here.start:
-        contents |= dict.fromkeys((START, "README.md"), start_page(course, topics).encode())
+            notebook = change(read_notebook(course / name), name, course)
+            for cell in texts(notebook):
+                cell["source"] = without_dead_links(name, cell["source"], contents)
+            contents[name] = to_bytes(notebook)
     return Chosen(contents, {name: said for name, said in why.items() if said}, is_tracked)
+
+
+def without_dead_links(name: str, text: str, names: Collection[str]) -> str:
+    """The text of a page or cell of the file `name`; of a link that leads to none of the files `names`, the words stay.
+
+    >>> without_dead_links("docs/a.md", "[a](b.md#c), [d](../e.md), [f](https://f.example), [g](#g)", ["docs/b.md"])
+    '[a](b.md#c), d, [f](https://f.example), [g](#g)'
+    """
+    ours = f"/{owner_and_name(course_here())}/"
+
+    def mend(match: re.Match) -> str:
+        target = match[2]
+        if ours != "//" and ours in target:
+            target = ABSOLUTE.sub(r"/\2", f"]({target}").removeprefix("](")
+        if re.match(r"\w+:|#", target):
+            return match[0]
+        path = os.path.normpath(Path(name).parent / target if target[0] != "/" else target[1:]).replace(os.sep, "/")
+        return match[0] if path in names or any(other.startswith(f"{path}/") for other in names) else match[1]
+
+    return LINK.sub(mend, text)
 
 
 def looked_through(course: Path, places: Sequence[str]) -> tuple[dict[str, str], bool]:

@@ -9,18 +9,14 @@ instructor.
 
 import os
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-
-import nbformat
 
 from labgrader.course import course as course_here
 from labgrader.release.bundle import Bundle, for_students
-from labgrader.release.publishing import ABSOLUTE, badges, owner_and_name, published, texts
-from labgrader.release.release import to_bytes
+from labgrader.release.publishing import badges, published
 from labgrader.support import git, write_atomically
 
-LINK = re.compile(r"!?\[([^\[\]]*)\]\(([^)\s#]+)(?:#[^)\s]*)?\)")
 AUTHOR = ("-c", "user.name=course", "-c", "user.email=course")
 
 
@@ -40,7 +36,7 @@ def repository(course: Path, folder: Path, topics: Sequence[str] = ()) -> Bundle
     if there and said(folder, "status", "--porcelain", "--untracked-files=no"):
         raise ValueError(f"repository: expected no changes in {folder}; commit them or take them back first")
     chosen = for_students(course, topics, lambda notebook, name, root: published(notebook, name, root, here))
-    contents = {name: without_dead_links(name, data, chosen.contents) for name, data in chosen.contents.items()}
+    contents = chosen.contents
     folder.mkdir(parents=True, exist_ok=True)
     if not there:
         said(folder, "init", "-q", "-b", "main")
@@ -65,30 +61,6 @@ def said(folder: Path, *words: str) -> str:
     if done.returncode:
         raise ValueError(f"repository: git {words[0]} failed in {folder}: {os.fsdecode(done.stderr).strip()}")
     return os.fsdecode(done.stdout)
-
-
-def without_dead_links(name: str, data: bytes, names: Collection[str]) -> bytes:
-    """A page or notebook of a repository that holds `names`; of a link that leads to none of them the words stay."""
-
-    ours = f"/{owner_and_name(course_here())}/"
-
-    def mend(match: re.Match) -> str:
-        target = match[2]
-        if ours != "//" and ours in target:
-            target = ABSOLUTE.sub(r"/\2", f"]({target}").removeprefix("](")
-        if re.match(r"\w+:|#", target):
-            return match[0]
-        path = os.path.normpath(Path(name).parent / target if target[0] != "/" else target[1:]).replace(os.sep, "/")
-        return match[0] if path in names or any(other.startswith(f"{path}/") for other in names) else match[1]
-
-    if name.endswith(".md"):
-        return LINK.sub(mend, data.decode("utf-8")).encode()
-    if not name.endswith(".ipynb"):
-        return data
-    notebook = nbformat.reads(data.decode("utf-8"), as_version=4)
-    for cell in texts(notebook):
-        cell["source"] = LINK.sub(mend, cell["source"])
-    return to_bytes(notebook)
 
 
 def below_title(page: str, badges: Sequence[str]) -> str:

@@ -315,6 +315,7 @@ def test_the_bundle_holds_what_students_need_and_no_model_answer(tmp_path):
     with zipfile.ZipFile(tmp_path / "course.zip") as archive:
         archive.extractall(tmp_path)
     course = tmp_path / "course"
+    assert links_out_of(course) == []
     for path in ROOT.glob("solutions/*/*.ipynb"):
         for cell in read_notebook(path).cells:
             mark = cell.metadata.get("nbgrader", {})
@@ -323,6 +324,17 @@ def test_the_bundle_holds_what_students_need_and_no_model_answer(tmp_path):
                 assert not [
                     name for name in names if name.endswith("ipynb") and lines[0] in (course / name).read_text()
                 ]
+
+
+def links_out_of(folder):
+    """The links of a bundle's pages and cells that lead to no file of it, each with its page."""
+    pages = {path: path.read_text(encoding="utf-8") for path in folder.rglob("*.md")}
+    for path in folder.rglob("*.ipynb"):
+        pages[path] = "\n".join(cell.source for cell in read_notebook(path).cells if cell.cell_type == "markdown")
+    pages.pop(folder / "docs/site/landing.md", None)  # whose addresses are those of the site that is made with it
+    links = [(path, link) for path, text in pages.items() for link in re.findall(r"\]\(([^)\s#]+)[^)\s]*\)", text)]
+    assert len(links) > 30
+    return [(path, link) for path, link in links if not re.match(r"\w+:", link) and not (path.parent / link).exists()]
 
 
 @pytest.mark.nightly
@@ -351,6 +363,8 @@ def test_a_weeks_bundle_holds_its_labs_their_lessons_and_nothing_else_of_the_cou
             text = archive.read(f"week/{page}").decode()
             links = re.findall(r"\]\((?!https?:)([^)]+)\)", text)
             assert len(links) == 5 and set(links) <= {*names} and "ROWS" not in text
+        archive.extractall(tmp_path)
+    assert links_out_of(tmp_path / "week") == []
     with pytest.raises(ValueError, match="topics: expected some of 01_labels"):
         bundle(ROOT, tmp_path / "x.zip", ["04_iuo"])
 
