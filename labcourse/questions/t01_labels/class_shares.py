@@ -68,23 +68,23 @@ def of_all_images(y, C):
     return counts(y, C).sum(axis=0) / np.count_nonzero(y != 255)
 
 
-@wrong("That is the lesson's share, of all pixels. Leave out what nobody judged, and images without the class.")
+@wrong("That is the lesson's share, of all pixels. Leave out unjudged pixels, and images without the class.")
 def of_all_pixels(y, C):
     return counts(y, C).sum(axis=0) / y.size
 
 
-@wrong("You divide by all pixels of the images that show a class: which of these pixels did nobody judge?")
+@wrong("You divide by all pixels of the images that show a class: which of them were never judged?")
 def unjudged_counted(y, C):
     return shares(counts(y, C), np.full(len(y), y[0].size))
 
 
-@wrong("Add up pixels first and divide once: a mean of the images' shares counts pixels of some images for more.")
+@wrong("Add up pixels first and divide once: a mean of the images' shares gives pixels of some images more weight.")
 def mean_over_the_images_that_show_it(y, C):
     n = counts(y, C)
     return (n / n.sum(axis=1, keepdims=True)).sum(axis=0) / np.maximum((n > 0).sum(axis=0), 1)
 
 
-@wrong("A mean of the images' shares counts an image without the class as 0, and its pixels should not count at all.")
+@wrong("A mean of the images' shares counts an image without the class as 0; its pixels should not count at all.")
 def mean_over_all_images(y, C):
     n = counts(y, C)
     return (n / n.sum(axis=1, keepdims=True)).mean(axis=0)
@@ -101,7 +101,7 @@ def share_of_the_images(y, C):
     return (counts(y, C) > 0).mean(axis=0)
 
 
-@wrong("Pixels of 255 are counted as class 0: nobody has judged them, so they belong to no class.")
+@wrong("You count pixels of 255 as class 0: they were never judged, so they belong to no class.")
 def unjudged_is_background(y, C):
     n = counts(np.where(y == 255, 0, y), C)
     return shares(n, n.sum(axis=1))
@@ -124,7 +124,7 @@ def nothing_by_nothing(y, C):
     return np.where(counts(y, C).any(axis=0), class_shares(y, C), np.nan)
 
 
-@wrong("Yours gives a rare class a large number: that is one over its share (a weight, topic 05).")
+@wrong("You give a rare class a large number: that is one over its share (a weight, topic 05).")
 def inverse_shares(y, C):
     with np.errstate(divide="ignore"):
         return 1 / class_shares(y, C)
@@ -136,13 +136,13 @@ def counted_in_bytes(y, C):
     return shares(n, n.sum(axis=1))
 
 
-@wrong("Clipping makes the largest class of 255: pixels that nobody judged are then counted for that class.")
+@wrong("Clipping turns 255 into the largest class: unjudged pixels are then counted as that class.")
 def unjudged_as_the_last_class(y, C):
     n = counts(np.minimum(y, C - 1), C)
     return shares(n, n.sum(axis=1))
 
 
-@wrong("np.bincount counts 255 like any other number: leave out the pixels that nobody judged before you count.")
+@wrong("np.bincount counts 255 like any other number: leave out unjudged pixels before you count.")
 def unjudged_as_a_class(y, C):
     n = counts(y, 256)
     return shares(n, n.sum(axis=1))
@@ -153,7 +153,7 @@ def line_of_the_lesson(y, C):
     return np.bincount(y.ravel(), minlength=C) / y.size
 
 
-@wrong("Each class has judged pixels of its own to be divided by: over which axis does n count images?")
+@wrong("Each class has its own number of judged pixels to divide by: over which axis does n count images?")
 def sums_of_the_other_axis(y, C):
     n = counts(y, C)
     return n.sum(axis=0) / np.maximum((n.sum(axis=0) * (n > 0)).sum(axis=0), 1)
@@ -165,7 +165,9 @@ def images_with_255_left_out(y, C):
     return class_shares(whole, C)
 
 
-@wrong("You take the median of the images' shares: a large and a small image count alike. Add up pixels, then divide.")
+@wrong(
+    "You take the median of the images' shares, so a large and a small image count alike. Add up pixels, then divide."
+)
 def median_over_images(y, C):
     shares = [[np.mean(i[i != 255] == c) for i in y if (i == c).any()] for c in range(C)]
     return np.array([np.median(s) if s else 0.0 for s in shares])

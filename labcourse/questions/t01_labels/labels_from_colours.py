@@ -99,7 +99,7 @@ def first_of(same, otherwise=255):
     return np.where(same.any(axis=-1), same.argmax(axis=-1), otherwise)
 
 
-@wrong("A mixed colour has no class: the nearest one may belong to a class that was never there.")
+@wrong("A mixed colour has no class: the nearest colour may belong to a class that was never there.")
 def nearest_colour(rgb, palette):
     """Whatever colour lies nearest."""
     distance = ((rgb[:, :, None, :].astype(float) - palette) ** 2).sum(axis=-1)
@@ -111,7 +111,7 @@ def last_of(same):
     return np.where(same.any(axis=-1), same.shape[-1] - 1 - same[..., ::-1].argmax(axis=-1), 255)
 
 
-ALL_THREE = "Two colours are the same only if all three channels are equal: is one equal channel enough in yours?"
+ALL_THREE = "Two colours are the same only if all three channels are equal: do you accept one equal channel?"
 NOT_THE_SUM = "Different colours can be equally bright: compare the channels, not their sum."
 
 
@@ -139,18 +139,18 @@ def by_brightness_of_the_last(rgb, palette):
     return last_of(rgb.sum(axis=-1, dtype=int)[..., None] == palette.sum(axis=-1, dtype=int))
 
 
-@wrong("An unknown colour is 255, not 0: what does yours start from, and what is argmax of a row of False?")
+@wrong("An unknown colour is 255, not 0: what do you start from, and what is argmax of a row of False?")
 def unknown_becomes_0(rgb, palette):
     """Unknown colours become class 0."""
     return first_of(matches(rgb, palette).all(axis=-1), 0)
 
 
-@wrong("Bytes wrap round: 16 * 16 is 256, and a byte holds 0 for it. Compare the channels themselves.")
+@wrong("Bytes wrap around: 16 * 16 is 256, which a byte stores as 0. Compare the channels themselves.")
 def squares_of_bytes(rgb, palette):
     return last_of((((rgb[:, :, None].astype(int) - palette) ** 2) % 256 == 0).all(axis=-1))
 
 
-@wrong("Each turn of your loop overwrites the one before: without this class's colour a pixel keeps its label.")
+@wrong("Each pass of your loop overwrites the one before: a pixel without this class's colour must keep its label.")
 def last_class_alone(rgb, palette):
     return np.where((rgb == palette[-1]).all(axis=-1), len(palette) - 1, 255)
 
@@ -160,7 +160,7 @@ def red_alone(rgb, palette):
     return last_of(matches(rgb, palette)[..., 0])
 
 
-@wrong("np.isin asks whether a number stands anywhere in the colour: is [0, 0, 255] the same as [255, 0, 0]?")
+@wrong("np.isin asks whether a number occurs anywhere in the colour: is [0, 0, 255] the same as [255, 0, 0]?")
 def channels_in_any_order(rgb, palette):
     return last_of((rgb[:, :, None, :, None] == palette[:, None, :]).any(axis=-1).all(axis=-1))
 
@@ -171,7 +171,7 @@ def blue_first(rgb, palette):
     return first_of(matches(rgb[..., ::-1], palette).all(axis=-1))
 
 
-@wrong("argmax is 0 where class 0 fits, and where no class fits: what tells the two apart?")
+@wrong("argmax is 0 where class 0 fits, and also where no class fits: how do you tell the two apart?")
 def class_0_becomes_unknown(rgb, palette):
     y = first_of(matches(rgb, palette).all(axis=-1), 0)
     return np.where(y == 0, 255, y)

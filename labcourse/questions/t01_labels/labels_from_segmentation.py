@@ -95,36 +95,36 @@ def some_alone(segmentation, class_of_part, which):
     return labels_from_segmentation(np.where(np.isin(segmentation >> 24, which), segmentation, -1), class_of_part)
 
 
-@wrong("The upper bits are the link plus one, and so is the column: the base, link -1, is column 0.")
+@wrong("The upper bits hold the link plus one, and so does the column: the base, link -1, is column 0.")
 def one_column_off(segmentation, class_of_part):
     body, part, seen = body_part_seen(segmentation)
     return np.where(seen, class_of_part[body, part - 1], 0)
 
 
-@wrong("As the lesson looks up a body, it gives a whole row of this table: which column of it is the pixel's link?")
+@wrong("Looking up a body, as in the lesson, gives a whole row of this table: which column is the pixel's link?")
 def rows_of_classes(segmentation, class_of_part):
     body, _, seen = body_part_seen(segmentation)
     return np.where(seen[..., None], class_of_part[body], 0)
 
 
-@wrong("Values in the millions are body + ((link + 1) << 24), and yours skips them: which bits hold the body?")
+@wrong("Values in the millions are body + ((link + 1) << 24), and you skip them: which bits hold the body?")
 def base_links_only(segmentation, class_of_part):
     """Compare the raw values with body numbers: whatever has link bits matches none."""
     return some_alone(segmentation, class_of_part, [0])
 
 
-@wrong("Where nothing is seen stands -1, and in NumPy the index -1 means the last entry.", part=(0, -1))
+@wrong("Pixels where nothing is seen are -1, and in NumPy the index -1 means the last entry.", part=(0, -1))
 def nothing_is_the_last_body(segmentation, class_of_part, part):
     body, column, seen = body_part_seen(segmentation)
     return class_of_part[np.where(seen, body, -1), np.where(seen, column, part)]
 
 
-@wrong("Yours returns the numbers of bodies: look up the class of the body's part in class_of_part.")
+@wrong("You return the numbers of bodies: look up the class of the body's part in class_of_part.")
 def body_for_class(segmentation, class_of_part):
     return body_part_seen(segmentation)[0]
 
 
-@wrong("Yours returns the numbers of bodies: look up the class of the body's part in class_of_part.")
+@wrong("You return the numbers of bodies: look up the class of the body's part in class_of_part.")
 def body_in_a_byte_for_class(segmentation, class_of_part):
     return body_for_class(segmentation, class_of_part).astype(np.uint8)
 
@@ -148,6 +148,6 @@ def rows_and_columns_exchanged(segmentation, class_of_part):
     return np.where(seen, class_of_part[part, body], 0)
 
 
-@wrong("You find the base and link 0 alone, and a body may have many links. What holds for all of them?")
+@wrong("You find only the base and link 0, but a body may have many links. What do all of them have in common?")
 def first_link_alone(segmentation, class_of_part):
     return some_alone(segmentation, class_of_part, [0, 1])

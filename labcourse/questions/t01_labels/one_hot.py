@@ -34,32 +34,32 @@ def last(y, C):
     return (y[..., None] == np.arange(C)).astype(np.uint8)
 
 
-@wrong("That is the lesson's tensor, with the classes last. Here they are the second axis: (N, C, H, W).")
+@wrong("That is the lesson's tensor, with the classes last. Here the classes are the second axis: (N, C, H, W).")
 def classes_last(y, C):
     return last(y, C)
 
 
-@wrong("The numbers are right and stand in the wrong places: reshape does not move an axis.")
+@wrong("The numbers are right but in the wrong places: reshape does not move an axis.")
 def reshaped(y, C):
     return last(y, C).reshape(len(y), C, *y.shape[1:])
 
 
-@wrong("Rows and columns are exchanged in yours: the last two axes are still H and W.")
+@wrong("You swapped rows and columns: the last two axes are still H and W.")
 def rows_and_columns_exchanged(y, C):
     return last(y, C).swapaxes(1, 3)
 
 
-@wrong("A class that is not in these images has a plane too, of zeros: there are always C of them.")
+@wrong("A class that is not in these images has a plane of zeros: there are always C planes.")
 def classes_that_occur(y, C):
     return (y[:, None] == np.unique(y[y != 255])[:, None, None]).astype(np.uint8)
 
 
-@wrong("Add up the entries of a pixel that nobody judged, 255: what should come out, and what does in yours?")
+@wrong("Add up the entries of an unjudged pixel, 255: what should the sum be, and what is yours?")
 def ignored_is_shared_out(y, C):
     return np.where((y == 255)[:, None], 1 / C, one_hot(y, C))
 
 
-@wrong("The function gets C, which need not be 4: how many of the C planes does yours fill?")
+@wrong("The function gets C, which need not be 4: how many of the C planes do you fill?")
 def four_classes(y, C):
     Y = one_hot(y, C)
     Y[:, 4:] = 0

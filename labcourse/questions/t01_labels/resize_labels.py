@@ -76,7 +76,7 @@ QUESTION = Question(
 )
 
 
-@holds("no label is there that was not there before")
+@holds("no label appears that was not there before")
 def no_label_is_new(y, height, width, resized):
     return set(np.unique(resized).tolist()) <= set(np.unique(y).tolist())
 
@@ -102,22 +102,22 @@ def from_the_corner(y, height, width):
     return copied(y, (height, width), lambda i, n, old: i * old // n)
 
 
-@wrong("Yours lays the corner pixels' centres on each other. Here the images' edges lie on each other.")
+@wrong("You align the centres of the corner pixels. Here the edges of the images are aligned.")
 def corner_to_corner(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round(np.linspace(0, old - 1, n)))
 
 
-@wrong("The half belongs to the new pixel: it is added before you scale, (i + 0.5) * H / h, not afterwards.")
+@wrong("The half belongs to the new pixel: add it before you scale, (i + 0.5) * H / h, not afterwards.")
 def half_added_afterwards(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum(i * old / n + 0.5, old - 1))
 
 
-@wrong("Subtract no 0.5 before floor: here old pixel u reaches from u to u + 1, and its centre is u + 0.5.")
+@wrong("Do not subtract 0.5 before floor: here old pixel u reaches from u to u + 1, and its centre is u + 0.5.")
 def half_subtracted(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * old / n - 0.5)
 
 
-@wrong("Rows are multiplied by H / height, old by new: is yours height / H?")
+@wrong("Rows are multiplied by H / height, old over new: is yours height / H?")
 def scaled_by_new_over_old(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * n / old)
 
@@ -133,18 +133,18 @@ def padded_or_cropped(y, height, width):
     return np.pad(y, ((0, max(height - H, 0)), (0, max(width - W, 0))), mode="edge")[:height, :width]
 
 
-@wrong("On the border of two old pixels, floor takes the later one: which one does np.round take?")
+@wrong("On the border between two old pixels, floor takes the later one: which one does np.round take?")
 def rounded(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n - 0.5))
 
 
-@wrong("The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+@wrong("The pixel into which a centre falls is the whole part, floor: round may go on to the next one.")
 def rounded_up(y, height, width):
     """IndexError, where the last centre is rounded to the number of pixels."""
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n))
 
 
-@wrong("A new pixel copies the one old pixel under its centre: how many old pixels does yours ask?")
+@wrong("A new pixel copies the one old pixel under its centre: how many old pixels do you use?")
 def voted(y, height, width):
     """The most frequent label of the old pixels that a new one covers."""
 
@@ -158,17 +158,17 @@ def voted(y, height, width):
     return out
 
 
-@wrong("Columns are counted along W and rows along H: you take H for both.")
+@wrong("Columns are counted along W and rows along H: you use H for both.")
 def height_for_both(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * len(y) / n)
 
 
-@wrong("Columns have a factor of their own, W / width: yours are scaled by H / height, as rows are.")
+@wrong("Columns have their own factor, W / width: you scale them by H / height, like rows.")
 def columns_scaled_as_rows(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))
 
 
-@wrong("The pixel in which a centre falls is the whole part, floor: round goes on to the next one.")
+@wrong("The pixel into which a centre falls is the whole part, floor: round may go on to the next one.")
 def rounded_up_and_clipped(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n).clip(0, old - 1))
 
@@ -183,7 +183,7 @@ def multiplied_by_the_quotient(y, height, width):
     return copied(y, (height, width), lambda i, n, old: (i + 0.5) * (old / n))
 
 
-@wrong("A step of whole pixels is right only where the size is divided by a whole number. Where is each new centre?")
+@wrong("A step of whole pixels is right only if the size is divided by a whole number. Where is each new centre?")
 def every_step_th_pixel(y, height, width):
     a, b = max(y.shape[0] // height, 1), max(y.shape[1] // width, 1)
     return y[a // 2 :: a, b // 2 :: b][:height, :width]

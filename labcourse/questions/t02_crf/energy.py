@@ -52,7 +52,7 @@ def steps(y):
     return np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
 
 
-@wrong("Pairs that agree change your energy: with one label everywhere only the unary costs may remain.")
+@wrong("Pairs that agree change your energy: with one label everywhere, only the unary costs should remain.")
 def spins(y, psi, weights):
     """Agreement is rewarded by w, disagreement costs w, as for spins of +1 and -1."""
     return unary_part(y, psi) + (weights * np.where(disagreeing(y), 1, -1)).sum()
@@ -64,19 +64,19 @@ def label_steps(y, psi, weights):
     return unary_part(y, psi) + (weights * steps(y.astype(int))).sum()
 
 
-@wrong("Yours charges neighbours that agree. The weight is paid where two labels differ.")
+@wrong("You charge neighbours that agree. The weight is paid where two labels differ.")
 def agreement_charged(y, psi, weights):
     """The weight paid where neighbours agree."""
     return unary_part(y, psi) + (weights * ~disagreeing(y)).sum()
 
 
-@wrong("Each pair stands once in weights, at the pixel that owns it: does yours visit it from one end only?")
+@wrong("Each pair is in weights once, at the pixel that owns it: do you visit it from one end only?")
 def pairs_twice(y, psi, weights):
     """Each pair counted from both ends."""
     return unary_part(y, psi) + 2.0 * (weights * disagreeing(y)).sum()
 
 
-@wrong("A pixel in the middle has eight neighbours: how many kinds of pairs does yours add up?")
+@wrong("A pixel in the middle has eight neighbours: how many kinds of pairs do you add up?")
 def four_neighbours(y, psi, weights):
     """The diagonals forgotten."""
     return unary_part(y, psi) + (weights * disagreeing(y))[:2].sum()
@@ -96,7 +96,7 @@ def both_diagonals_to_the_right_in_loops(y, psi, weights):
     return both_diagonals_to_the_right(y, psi, inside)
 
 
-@wrong("A pair's weight stands at the pixel that owns it, (v, u): do you read it at the neighbour's place?")
+@wrong("A pair's weight is stored at the pixel that owns it, (v, u): do you read it at the neighbour's place?")
 def weights_of_the_neighbours(y, psi, weights):
     moved = np.stack([np.roll(w, (-down, -right), (0, 1)) for w, (down, right) in zip(weights, PAIRS, strict=True)])
     return unary_part(y, psi) + (np.where(weights > 0.0, moved, 0.0) * disagreeing(y)).sum()
@@ -108,7 +108,7 @@ def rolled_backwards(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y, [(-down, -right) for down, right in PAIRS])).sum()
 
 
-@wrong("weights[3] stands at the upper pixel of its pair: is that the left one of the two?")
+@wrong("weights[3] is stored at the upper pixel of its pair: is that the left one of the two?")
 def fourth_kind_at_the_lower_column(y, psi, weights):
     """The last kind of pairs multiplied by the weights one column to the left of theirs."""
     left = np.roll(weights[3], 1, axis=1)
@@ -116,13 +116,13 @@ def fourth_kind_at_the_lower_column(y, psi, weights):
     return unary_part(y, psi) + (np.stack([*weights[:3], left]) * disagreeing(y)).sum()
 
 
-@wrong("A pixel pays for the label that y gives it: does yours pay for its cheapest class?")
+@wrong("A pixel pays for the label that y gives it: do you charge it for its cheapest class?")
 def cheapest_classes(y, psi, weights):
     """The pixels' minima in the place of what the labels cost."""
     return psi.min(axis=2).sum() + (weights * disagreeing(y)).sum()
 
 
-@wrong("A difference of bytes wraps round, 0 - 1 is 255; and only whether two labels differ counts.")
+@wrong("A difference of bytes wraps around, 0 - 1 is 255; and all that counts is whether two labels differ.")
 def byte_steps(y, psi, weights):
     return unary_part(y, psi) + (weights * steps(y)).sum()
 
@@ -142,17 +142,17 @@ def pairs_of_the_border_skipped(y, psi, weights):
     return unary_part(y, psi) + (weights * disagreeing(y))[:, :-1, 1:-1].sum()
 
 
-@wrong("A pair that disagrees pays its own weight: what does each of them pay in yours?")
+@wrong("A pair that disagrees pays its own weight: what do you charge each of them?")
 def disagreements_counted(y, psi, weights):
     return unary_part(y, psi) + np.count_nonzero((weights > 0.0) & disagreeing(y))
 
 
-@wrong("A pixel pays for one class, its label's: how many entries of psi[v, u] does yours add up?")
+@wrong("A pixel pays for one class, its label's: how many entries of psi[v, u] do you add up?")
 def costs_of_all_classes(y, psi, weights):
     return psi.sum() + (weights * disagreeing(y)).sum()
 
 
-ORDER = "weights holds the kinds right, below, below right, below left: do your steps stand in this order?"
+ORDER = "weights holds the kinds right, below, below right, below left: are your steps in this order?"
 
 
 @wrong(ORDER)

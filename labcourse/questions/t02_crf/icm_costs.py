@@ -94,7 +94,7 @@ def charged_for_agreeing(y, psi, weights, v, u):
     return 2 * psi[v, u] + sum(w for w, _, _ in own + owned) - charged(own + owned, y, psi, v, u)
 
 
-@wrong("The pair with the left neighbour belongs to that neighbour: at which pixel does its weight stand?")
+@wrong("The pair with the left neighbour belongs to that neighbour: at which pixel is its weight?")
 def own_weights(y, psi, weights, v, u):
     """The weights stored at the pixel, also for the pairs that its neighbours own."""
     H, W = y.shape
@@ -103,13 +103,13 @@ def own_weights(y, psi, weights, v, u):
     return charged(pairs_of(weights, v, u)[0] + back, y, psi, v, u)
 
 
-@wrong("A pixel in the middle belongs to eight pairs, and owns four: where do the weights of the others stand?")
+@wrong("A pixel in the middle belongs to eight pairs and owns four: where are the weights of the others?")
 def ahead_only(y, psi, weights, v, u):
     """Only the pairs that the energy's loop visits at this pixel."""
     return charged(pairs_of(weights, v, u)[0], y, psi, v, u)
 
 
-@wrong("Neighbours touch at corners, too: how many pairs has a pixel in the middle?")
+@wrong("Neighbours touch at corners, too: how many pairs does a pixel in the middle have?")
 def four_neighbours(y, psi, weights, v, u):
     """The diagonals forgotten."""
     straight = np.concatenate([weights[:2], np.zeros_like(weights[2:])])
@@ -124,7 +124,7 @@ def label_of_now(y, psi, weights, v, u):
     return psi[v, u] + sum(w for w, b, a in own + owned if y[b, a] != y[v, u])
 
 
-@wrong("Each class is compared with the neighbours' labels: is yours compared with y[v, u], the pixel's own?")
+@wrong("Each class is compared with the neighbours' labels: do you compare them with y[v, u], the pixel's own?")
 def compared_with_itself(y, psi, weights, v, u):
     own, owned = pairs_of(weights, v, u)
     return psi[v, u] + sum(w for w, _, _ in own + owned) * (np.arange(psi.shape[2]) != y[v, u])
@@ -147,19 +147,19 @@ def clipped_at_the_border(y, psi, weights, v, u):
     return charged(both, y, psi, v, u)
 
 
-@wrong("A pixel at the border has fewer neighbours, and pays for those that it has: yours pays for none.")
+@wrong("A pixel at the border has fewer neighbours and pays for those it has: you charge it for none.")
 def no_pairs_at_the_border(y, psi, weights, v, u):
     H, W, _ = psi.shape
     inside = 0 < v < H - 1 and 0 < u < W - 1
     return icm_costs(y, psi, weights, v, u) if inside else psi[v, u].copy()
 
 
-@wrong("Each class costs its own psi, whatever the neighbours are: where does psi come into yours?")
+@wrong("Each class costs its own psi, whatever the neighbours are: where do you use psi?")
 def without_psi(y, psi, weights, v, u):
     return icm_costs(y, np.zeros_like(psi), weights, v, u)
 
 
-@wrong("Rows and columns begin at 0: does yours leave out a neighbour in row 0, or in column 0?")
+@wrong("Rows and columns begin at 0: do you leave out a neighbour in row 0, or in column 0?")
 def neighbours_in_the_first_row_left_out(y, psi, weights, v, u):
     own, owned = pairs_of(weights, v, u)
     return charged(own + [(w, b, a) for w, b, a in owned if b > 0 and a > 0], y, psi, v, u)

@@ -98,7 +98,7 @@ def wrapped_words(image, lam, sigma_I, sigma_p):
     return gaussian((differences(image).astype(np.int16) ** 2).sum(axis=3, dtype=float), lam, sigma_I, sigma_p)
 
 
-@wrong("lam stands before the exponential, not in its exponent: two like pixels at distance 0 weigh lam.")
+@wrong("lam multiplies the exponential and is not in its exponent: the weight of two like pixels at distance 0 is lam.")
 def lam_in_the_exponent(image, lam, sigma_I, sigma_p):
     return gaussian(squares(image), 1.0, sigma_I, sigma_p, ring=True) ** lam * inside(image.shape[:2])
 
@@ -134,7 +134,7 @@ def kept_at_the_left_end(image, lam, sigma_I, sigma_p):
     return np.concatenate([w[:3], np.roll(w[3:], -1, axis=2)])
 
 
-@wrong("Look at the denominators again: what stands before sigma squared in a Gaussian?")
+@wrong("Look at the denominators again: what multiplies sigma squared in a Gaussian?")
 def without_the_2(image, lam, sigma_I, sigma_p):
     """A Gaussian without the 2 in its exponent."""
     return gaussian(squares(image), lam, sigma_I / np.sqrt(2.0), sigma_p / np.sqrt(2.0))
@@ -190,7 +190,7 @@ def column_before_the_first(image, lam, sigma_I, sigma_p):
 
 
 @wrong(
-    "One exponential holds both terms, and lam stands before it: exp(a) + exp(b) is not exp(a + b).", share=(1.0, 0.5)
+    "One exponential contains both terms, and lam multiplies it: exp(a) + exp(b) is not exp(a + b).", share=(1.0, 0.5)
 )
 def two_exponentials_added(image, lam, sigma_I, sigma_p, share):
     near = gaussian(np.zeros_like(squares(image)), lam, sigma_I, sigma_p)
@@ -202,7 +202,7 @@ def colours_up_to_1(image, lam, sigma_I, sigma_p):
     return gaussian(squares(image) / 255.0**2, lam, sigma_I, sigma_p)
 
 
-@wrong("Is your sum of squares still made of bytes? They have no negative numbers: begin with floats.")
+@wrong("Is your sum of squares still in bytes? They have no negative numbers: begin with floats.")
 def negated_without_a_sign(image, lam, sigma_I, sigma_p):
     """The minus of the exponent before an unsigned sum: it becomes almost 2^64."""
     byte = differences(image).astype(int).astype(np.uint8)
@@ -211,7 +211,7 @@ def negated_without_a_sign(image, lam, sigma_I, sigma_p):
     return np.where(inside(image.shape[:2]), weights, 0.0)
 
 
-@wrong("In a grey image, red and green of one brightness are alike: how many channels has your difference?")
+@wrong("In a grey image, red and green of one brightness are alike: how many channels does your difference have?")
 def grey_image(image, lam, sigma_I, sigma_p):
     return gaussian(differences(image).mean(axis=3) ** 2, lam, sigma_I, sigma_p)
 
@@ -222,7 +222,7 @@ def converted_late_the_other_way_round(image, lam, sigma_I, sigma_p):
     return gaussian(((-differences(image) % 256) ** 2).sum(axis=3), lam, sigma_I, sigma_p)
 
 
-@wrong("weights[3] stands at the upper pixel of its pair: at which of the two does yours stand?")
+@wrong("weights[3] is stored at the upper pixel of its pair: at which of the two do you store it?")
 def kept_at_the_lower_pixel(image, lam, sigma_I, sigma_p):
     """The fourth kind of pair from each pixel to the one above it on the right."""
     w = gaussian(squares(image), lam, sigma_I, sigma_p)
@@ -253,7 +253,7 @@ def last_row_and_column_left_out(image, lam, sigma_I, sigma_p):
     return weights
 
 
-@wrong("Outside of the image there is no neighbour: which pixel does a row or column that you clip lead to?")
+@wrong("Outside the image there is no neighbour: which pixel does a row or column that you clip lead to?")
 def clipped_at_the_border(image, lam, sigma_I, sigma_p):
     """A neighbour beyond the border taken for the nearest pixel inside."""
     (H, W, _), colours = image.shape, image.astype(float)

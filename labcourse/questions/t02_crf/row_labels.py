@@ -120,19 +120,19 @@ def traced(came, last):
     return np.array(labels[::-1])
 
 
-@wrong("That is each pixel's own choice: does changing the class cost w in yours, and keeping it nothing?")
+@wrong("That is each pixel's own choice: do you charge w for changing the class, and nothing for keeping it?")
 def pixel_by_pixel(psi, w):
     """The weights forgotten, or paid by all classes alike."""
     return psi.argmin(axis=1)
 
 
-@wrong("The cheapest class so far need not be on the cheapest way: trace that back. Keeping a class costs no w.")
+@wrong("The cheapest class so far need not be on the cheapest path: trace that back. Keeping a class costs no w.")
 def never_walked_back(psi, w):
     """The minimum at each pixel of the forward walk."""
     return walk(psi, w).argmin(axis=1)
 
 
-@wrong("Choosing pixel by pixel from the left cannot know what comes: keep a cost for every class.")
+@wrong("Choosing pixel by pixel from the left cannot know what comes later: keep a cost for every class.")
 def greedy(psi, w):
     """From the left, each pixel the class that is cheapest given the label before it."""
     labels = [psi[0].argmin()]
@@ -147,7 +147,7 @@ def next_pairs_weight(psi, w):
     return row_labels(psi, np.roll(w, -1))
 
 
-@wrong("Each pair has a weight of its own: is the first pair's weight paid for all pairs in yours?")
+@wrong("Each pair has its own weight: do you charge the first pair's weight for all pairs?")
 def first_weight_for_all(psi, w):
     return row_labels(psi, np.repeat(w[:1], len(w)))
 
@@ -170,7 +170,7 @@ def traced_one_pixel_off(psi, w):
     return traced(came[:-1], best[-1].argmin())
 
 
-@wrong("Decide where a pixel comes from while `best` ends at pixel u - 1: does yours add psi[u] before?")
+@wrong("Decide where a pixel comes from while `best` ends at pixel u - 1: do you add psi[u] before that?")
 def asked_too_late(psi, w):
     best, came = walk_with_origins(psi, w, late=1)
     return traced(came[1:], best[-1].argmin())
@@ -181,14 +181,14 @@ def last_pixel_on_its_own(psi, w):
     return traced(walk_with_origins(psi, w)[1][1:], psi[-1].argmin())
 
 
-@wrong("Your way back ends one step too early: what came[1] says of the first pixel is not used.")
+@wrong("You stop tracing back one step too early: what came[1] says about the first pixel is not used.")
 def first_pixel_not_reached(psi, w):
     labels = row_labels(psi, w).copy()
     labels[0] *= len(labels) == 1
     return labels
 
 
-@wrong("The first pixel's own cheapest class need not lie on the best way: its label is traced back as well.")
+@wrong("The first pixel's own cheapest class need not be on the best path: its label is traced back as well.")
 def first_pixel_on_its_own(psi, w):
     return np.array([psi[0].argmin(), *row_labels(psi, w)[1:]])
 
@@ -209,6 +209,6 @@ def pixel_after_pixel_again(psi, w):
     return y
 
 
-@wrong("Both walks end at pixel u, and both hold psi[u]: how often is it in their sum?")
+@wrong("Both passes end at pixel u, and both include psi[u]: how often is it in their sum?")
 def own_cost_twice(psi, w):
     return (walk(psi, w) + walk(psi[::-1], w[::-1])[::-1]).argmin(axis=1)

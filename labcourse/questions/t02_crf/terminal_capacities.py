@@ -108,17 +108,17 @@ def source_and_sink_exchanged(psi, known, large):
     return sink, source, constant
 
 
-@wrong("A pixel known to be 0 must stay on the source's side: which of its arcs must be too dear to cut?")
+@wrong("A pixel known to be 0 must stay on the source's side: which of its arcs must be too expensive to cut?")
 def strokes_exchanged(psi, known, large):
     return *with_strokes(*unknown_arcs(psi), swapped(known), large), constant_of(psi, known)
 
 
-@wrong("A pixel known to be 0 must stay on the source's side: which of its arcs must be too dear to cut?")
+@wrong("A pixel known to be 0 must stay on the source's side: which of its arcs must be too expensive to cut?")
 def strokes_exchanged_and_constant_of_the_smaller_costs(psi, known, large):
     return *with_strokes(*unknown_arcs(psi), swapped(known), large), psi.min(axis=2).sum()
 
 
-@wrong("A pixel known to be 0 must stay on the source's side: which of its arcs must be too dear to cut?")
+@wrong("A pixel known to be 0 must stay on the source's side: which of its arcs must be too expensive to cut?")
 def other_label_known(psi, known, large):
     return terminal_capacities(psi, swapped(known), large)
 
@@ -135,7 +135,7 @@ def large_in_the_place_of_its_cost(psi, known, large):
     return terminal_capacities(np.where(off, large, psi), np.full_like(known, 255), large)
 
 
-@wrong("A known pixel pays its known label's cost, even if that is the dearer one: what is in your constant for it?")
+@wrong("A known pixel pays its known label's cost, even if that is the higher one: what is in your constant for it?")
 def constant_of_the_smaller_costs(psi, known, large):
     return *with_strokes(*unknown_arcs(psi), known, large), psi.min(axis=2).sum()
 
@@ -158,30 +158,30 @@ def large_added_right_constant(psi, known, large):
     return source + large * (known == 0), sink + large * (known == 1), constant_of(psi, known)
 
 
-@wrong("One arc of a known pixel is large; the other still binds it to the wrong side: how much must that one have?")
+@wrong("One arc of a known pixel is large; the other still ties it to the wrong side: what must its capacity be?")
 def other_arc_kept(psi, known, large):
     source, sink = unknown_arcs(psi)
     arcs = np.where(known == 0, large, source), np.where(known == 1, large, sink)
     return *arcs, constant_of(psi, known)
 
 
-@wrong("One arc of a known pixel is large; the other still binds it to the wrong side: how much must that one have?")
+@wrong("One arc of a known pixel is large; the other still ties it to the wrong side: what must its capacity be?")
 def other_arc_and_constant_kept(psi, known, large):
     source, sink = unknown_arcs(psi)
     return np.where(known == 0, large, source), np.where(known == 1, large, sink), psi.min(axis=2).sum()
 
 
-@wrong("You treat pixels known to be of one label only. `known` may be 0 and 1.", label=(0, 1))
+@wrong("You handle pixels known to have one of the two labels only. `known` may be 0 or 1.", label=(0, 1))
 def one_label_known(psi, known, large, label):
     return terminal_capacities(psi, np.where(known == label, known, 255), large)
 
 
-@wrong("255 says that nothing is known of the pixel: it keeps its own arcs.", label=(0, 1))
+@wrong("255 says that nothing is known about the pixel: it keeps its own arcs.", label=(0, 1))
 def unknown_taken_for_known(psi, known, large, label):
     return terminal_capacities(psi, np.where(known == 255, label, known), large)
 
 
-@wrong("A pixel with 255 counts in yours as one that is known to be 1. Does a condition take 255 for true?")
+@wrong("You treat a pixel with 255 as one that is known to be 1. Is 255 true in a condition?")
 def known_as_a_condition(psi, known, large):
     return np.where(known, 0.0, large), np.where(known, large, 0.0), psi.min(axis=2).sum()
 
@@ -199,24 +199,26 @@ def one_minimum_for_all(psi, known, large):
     return *arcs, psi.min() * psi[..., 0].size
 
 
-@wrong("A negative cost needs no clipping: less the pixel's smaller cost, both of its arcs are 0 or more.")
+@wrong("A negative cost needs no clipping: once the pixel's smaller cost is subtracted, both arcs are 0 or more.")
 def negative_costs_clipped(psi, known, large):
     return terminal_capacities(np.maximum(psi, 0.0), known, large)
 
 
-@wrong("The smaller cost leaves both arcs: what remains on the other arc is the difference of the two costs.")
+@wrong(
+    "The smaller cost is subtracted from both arcs: what remains on the other arc is the difference of the two costs."
+)
 def whole_costs_kept(psi, known, large):
     dearer = np.where(psi > psi.min(axis=2, keepdims=True), psi, 0.0)
     return *with_strokes(dearer[..., 1], dearer[..., 0], known, large), constant_of(psi, known)
 
 
-@wrong("One arc of each pixel has capacity 0: if label 1 costs more, which of its two arcs stays?")
+@wrong("One arc of each pixel has capacity 0: if label 1 costs more, which of its two arcs remains?")
 def difference_in_both_arcs(psi, known, large):
     difference = np.abs(psi[..., 1] - psi[..., 0])
     return *with_strokes(difference, difference, known, large), constant_of(psi, known)
 
 
-@wrong("A pixel pays its smaller cost in any case, whatever its sign: did you take it from both arcs?")
+@wrong("A pixel pays its smaller cost in any case, whatever its sign: did you subtract it from both arcs?")
 def only_negative_costs_taken(psi, known, large):
     arcs = with_strokes(np.maximum(psi[..., 1], 0.0), np.maximum(psi[..., 0], 0.0), known, large)
     return *arcs, np.minimum(psi, 0.0).sum()

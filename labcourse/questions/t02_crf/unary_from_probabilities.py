@@ -54,20 +54,20 @@ def mixed(p, eps):
 
 
 @wrong(
-    "That is the lesson's cost, with a floor. Here nothing is cut off: mix p with the blind guess, then take the log."
+    "That is the lesson's cost, with a floor. Here nothing is clipped: mix p with the blind guess, then take the log."
 )
 def floor_of_the_lesson(p, eps):
     return -np.log(np.maximum(p, eps))
 
 
 @wrong(
-    "That is the lesson's cost, with a floor. Here nothing is cut off: mix p with the blind guess, then take the log."
+    "That is the lesson's cost, with a floor. Here nothing is clipped: mix p with the blind guess, then take the log."
 )
 def floor_of_one_class(p, eps):
     return -np.log(np.maximum(p, eps / p.shape[-1]))
 
 
-@wrong("Nothing is cut off here, at neither end: mix p with the blind guess, then take the log.", end=("eps", "0"))
+@wrong("Nothing is clipped here, at either end: mix p with the blind guess, then take the log.", end=("eps", "0"))
 def clipped(p, eps, end):
     return -np.log(np.clip(p, eps, 1.0 - eps) if end == "eps" else np.where(p == 0.0, eps / p.shape[-1], p))
 
@@ -78,7 +78,7 @@ def added_and_scaled(p, eps):
     return -np.log(q / q.sum(axis=-1, keepdims=True))
 
 
-@wrong("A blind guess may hit the class that the network has named, too: it is spread over all C classes.")
+@wrong("A blind guess may hit the network's own class, too: it is spread over all C classes.")
 def guess_of_the_others(p, eps):
     return -np.log((1.0 - eps) * p + (1.0 - p) * eps / (p.shape[-1] - 1))
 
@@ -96,17 +96,17 @@ def softmaxed_again(p, eps):
     return -np.log(mixed(e / e.sum(axis=-1, keepdims=True), eps))
 
 
-@wrong("If the network guesses blindly, each class has the same probability: how much is that with C classes?")
+@wrong("If the network guesses blindly, each class has the same probability: what is it for C classes?")
 def guess_of_1(p, eps):
     return -np.log((1.0 - eps) * p + eps)
 
 
-@wrong("The network's own answer counts only in the rest of the cases: which share is that?", per_class=(True, False))
+@wrong("The network's own answer counts only in the remaining cases: what share is that?", per_class=(True, False))
 def whole_of_p(p, eps, per_class):
     return -np.log(p + (eps / p.shape[-1] if per_class else eps))
 
 
-@wrong("The shares are exchanged: eps is the small one, that of the blind guess.")
+@wrong("You swapped the shares: eps is the small one, that of the blind guess.")
 def shares_exchanged(p, eps):
     return -np.log(eps * p + (1.0 - eps) / p.shape[-1])
 
@@ -122,7 +122,7 @@ def another_axis_counted(p, eps, axis):
     return -np.log((1.0 - eps) * p + eps / p.shape[axis])
 
 
-@wrong("The guess is spread over the classes alone: p.size counts the pixels, too.")
+@wrong("The guess is spread over the classes only: p.size counts the pixels, too.")
 def everything_counted(p, eps):
     return -np.log((1.0 - eps) * p + eps / p.size)
 
@@ -132,7 +132,7 @@ def four_classes(p, eps):
     return -np.log((1.0 - eps) * p + eps / 4)
 
 
-@wrong("A class costs -log p: where does the factor before your logarithm come from?")
+@wrong("A class costs -log p: where does the factor in front of your logarithm come from?")
 def entropies(p, eps):
     return -mixed(p, eps) * np.log(mixed(p, eps))
 
@@ -148,6 +148,6 @@ def another_logarithm(p, eps, base):
     return -np.log(mixed(p, eps)) / np.log(base)
 
 
-@wrong("A likely class is to be cheap: which sign has the logarithm of a number below 1?")
+@wrong("A likely class must be cheap: what is the sign of the logarithm of a number below 1?")
 def sign_forgotten(p, eps):
     return np.log(mixed(p, eps))

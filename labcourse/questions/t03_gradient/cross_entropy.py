@@ -60,17 +60,17 @@ def loss(log_p, y, s):
     return weighed(log_p, y, targets(y, log_p.shape[-1], s))
 
 
-@wrong("That is the lesson's loss, of the true class alone. A share s of each pixel is spread over all classes.")
+@wrong("That is the lesson's loss, of the true class alone. Here a share s of each pixel is spread over all classes.")
 def without_the_share(z, y, s):
     return cross_entropy(z, y, 0.0)
 
 
-@wrong("Yours has the share 1 - s of the true class alone: the share s of each pixel costs something, too.")
+@wrong("You have only the true class's share, 1 - s: the share s of each pixel costs something, too.")
 def true_share_alone(z, y, s):
     return (1.0 - s) * cross_entropy(z, y, 0.0)
 
 
-@wrong("The share s is spread over all C classes, the true one included: which weight has that one?")
+@wrong("The share s is spread over all C classes, the true one included: what is the true one's weight?")
 def spread_over_the_others(z, y, s):
     C = z.shape[-1]
     t = targets(y, C, 0.0)
@@ -92,60 +92,61 @@ def share_for_each_class(z, y, s):
     return weighed(log_probabilities(z), y, (1.0 - s) * targets(y, z.shape[-1], 0.0) + s)
 
 
-@wrong("The two shares are exchanged: 1 - s of a pixel belongs to its true class.")
+@wrong("You swapped the two shares: 1 - s of a pixel belongs to its true class.")
 def shares_exchanged(z, y, s):
     return cross_entropy(z, y, 1.0 - s)
 
 
-@wrong("You smooth the prediction. It is the target that is spread: the logarithm stands inside of the sum.")
+@wrong("You smooth the prediction. It is the target that is smoothed: the logarithm is inside the sum.")
 def smoothed_prediction(z, y, s):
     p = np.exp(log_probabilities(z))
     return -float(np.log((targets(y, z.shape[-1], s) * p).sum(axis=-1))[y != 255].sum())
 
 
 @wrong(
-    "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?", epsilon=EPSILONS
+    "A loss has no upper limit. How large can -log(p + epsilon) be, and can you write log p without p?",
+    epsilon=EPSILONS,
 )
 def cross_entropy_with(z, y, s, epsilon):
     return loss(np.log(np.exp(log_probabilities(z)) + epsilon), y, s)
 
 
-@wrong("z holds logits, and the loss makes probabilities of them itself: does yours do so twice?")
+@wrong("z holds logits, and the loss turns them into probabilities itself: do you do so twice?")
 def cross_entropy_softmax_twice(z, y, s):
     return cross_entropy(softmax_over_classes(z), y, s)
 
 
-@wrong("Yours uses logits alone: log p is z - lse(z), and lse depends on the logits of all classes.")
+@wrong("You use logits alone: log p is z - lse(z), and lse depends on the logits of all classes.")
 def cross_entropy_without_softmax(z, y, s):
     return loss(z, y, s)
 
 
-@wrong("Yours uses logits alone: log p is z - lse(z), and lse depends on the logits of all classes.")
+@wrong("You use logits alone: log p is z - lse(z), and lse depends on the logits of all classes.")
 def cross_entropy_without_softmax_or_share(z, y, s):
     return loss(z, y, 0.0)
 
 
-@wrong("Yours adds up 1 - p: the loss of a pixel is made of minus the logarithms of p.")
+@wrong("You add up 1 - p: the loss of a pixel is made of negative logarithms of p.")
 def cross_entropy_of_probabilities(z, y, s):
     return loss(np.exp(log_probabilities(z)) - 1.0, y, s)
 
 
-@wrong("All classes count alike in yours: the true one's weight is 1 - s + s / C, the others' are s / C.")
+@wrong("You weight all classes alike: the true one's weight is 1 - s + s / C, the others' are s / C.")
 def cross_entropy_of_all_classes(z, y, s):
     return weighed(log_probabilities(z), y, np.ones(z.shape))
 
 
-@wrong("The loss is a sum over the pixels. Yours is divided by how many are counted, and fails if none is.")
+@wrong("The loss is a sum over the pixels. You divide by how many are counted, which fails if none is.")
 def cross_entropy_mean_of_counted(z, y, s):
     return cross_entropy(z, y, s) / np.count_nonzero(y != 255)
 
 
-@wrong("A pixel labelled 255 adds nothing at all: yours leaves out its one-hot, and its share s is still there.")
+@wrong("A pixel labelled 255 adds nothing at all: you leave out its one-hot, but its share s is still there.")
 def cross_entropy_with_the_share_of_ignored(z, y, s):
     return cross_entropy(z, y, s) - float(s * log_probabilities(z).mean(axis=-1)[y == 255].sum())
 
 
-@wrong("A pixel labelled 255 adds nothing at all. Yours leaves out its true logit and still adds its lse.")
+@wrong("A pixel labelled 255 adds nothing at all. You leave out its true logit but still add its lse.")
 def cross_entropy_with_ignored_lse(z, y, s):
     return cross_entropy(z, y, s) + float(np.logaddexp.reduce(z, axis=-1)[y == 255].sum())
 
@@ -156,7 +157,7 @@ def cross_entropy_of_rounded_probabilities(z, y, s):
         return loss(np.log(np.exp(log_probabilities(z))), y, s)
 
 
-@wrong("z[:, y] takes the columns of all pixels' classes for each pixel: one entry per row is asked for.")
+@wrong("z[:, y] takes the columns of all pixels' classes for each pixel: you need one entry per row.")
 def cross_entropy_of_all_pixels_classes(z, y, s):
     counted = y != 255
     log_p = log_probabilities(z[counted])
@@ -168,7 +169,7 @@ def cross_entropy_of_the_surest_class(z, y, s):
     return cross_entropy(z, np.where(y == 255, 255, z.argmax(axis=-1)), s)
 
 
-@wrong("z holds logits, some of them negative: what makes probabilities of them?")
+@wrong("z holds logits, some of them negative: what turns them into probabilities?")
 def cross_entropy_of_logits(z, y, s):
     return loss(np.log(z), y, s)
 
@@ -183,12 +184,12 @@ def cross_entropy_as_squared_error(z, y, s):
     return loss(-((1.0 - np.exp(log_probabilities(z))) ** 2), y, s)
 
 
-@wrong("Yours asks yes or no for each class on its own. Which function lets the classes share 1 among them?")
+@wrong("You ask yes or no for each class on its own. Which function lets the classes share 1 among them?")
 def cross_entropy_of_sigmoids(z, y, s):
     return float((np.logaddexp(0.0, z) - targets(y, z.shape[-1], s) * z)[y != 255].sum())
 
 
-@wrong("To which base is your logarithm, and to which is that of the loss?")
+@wrong("What is the base of your logarithm, and of the one in the loss?")
 def cross_entropy_in_bits(z, y, s):
     return cross_entropy(z, y, s) / np.log(2.0)
 
@@ -199,7 +200,7 @@ def cross_entropy_with_ignored_as_class_0(z, y, s):
 
 
 @wrong(
-    "A loss has no upper end. How large is it at most in yours, and can you write log p without p?",
+    "A loss has no upper limit. How large can yours become, and can you write log p without p?",
     floor=(np.finfo(float).tiny, 1e-300, 1e-100, 1e-50),
 )
 def cross_entropy_with_a(z, y, s, floor):

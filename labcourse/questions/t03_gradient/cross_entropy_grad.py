@@ -62,12 +62,14 @@ def target(z, y, s):
     return targets(y, z.shape[-1], s)
 
 
-@wrong("That is the lesson's p less a one-hot. Here a share s is spread over all classes: which target has each class?")
+@wrong(
+    "That is the lesson's p minus a one-hot. Here a share s is spread over all classes: what is each class's target?"
+)
 def grad_of_the_lesson(z, y, s):
     return cross_entropy_grad(z, y, 0.0)
 
 
-@wrong("That is the lesson's p less a one-hot. Here a share s is spread over all classes, and 255 has no gradient.")
+@wrong("That is the lesson's p minus a one-hot. Here a share s is spread over all classes, and 255 has no gradient.")
 def grad_of_the_lesson_of_all_pixels(z, y, s):
     return softmax_over_classes(z) - target(z, y, 0.0)
 
@@ -99,7 +101,7 @@ def grad_of_a_share_that_is_not_divided(z, y, s, part):
     return (softmax_over_classes(z) - t) * (y != 255)[..., None]
 
 
-@wrong("The shares are exchanged: 1 - s of a pixel belongs to its true class.")
+@wrong("You swapped the shares: 1 - s of a pixel belongs to its true class.")
 def grad_with_shares_exchanged(z, y, s):
     return cross_entropy_grad(z, y, 1.0 - s)
 
@@ -109,7 +111,7 @@ def grad_with_less_of_p(z, y, s):
     return (((1.0 - s) * softmax_over_classes(z)) - target(z, y, s)) * (y != 255)[..., None]
 
 
-@wrong("A pixel of 255 has no gradient in any class: its one-hot is zeros, and what of its share s?")
+@wrong("A pixel of 255 has no gradient in any class: its one-hot is zeros, but what about its share s?")
 def grad_leaves_the_share_of_ignored(z, y, s):
     return np.where((y == 255)[..., None], -s / z.shape[-1], cross_entropy_grad(z, y, s))
 
@@ -124,7 +126,7 @@ def grad_over_pixels(z, y, s):
     return (softmax_over_pixels(z) - target(z, y, s)) * (y != 255)[..., None]
 
 
-@wrong("The target is subtracted from probabilities: what makes probabilities of your logits?")
+@wrong("The target is subtracted from probabilities: what turns your logits into probabilities?")
 def grad_of_logits(z, y, s):
     return (z - target(z, y, s)) * (y != 255)[..., None]
 
@@ -151,27 +153,27 @@ def targets_of_the_surest(z, s):
     return targets(z.argmax(axis=-1), z.shape[-1], s)
 
 
-@wrong("1 - s is taken off at one class of each pixel: at the one of the largest logit, or at the true one?")
+@wrong("1 - s is subtracted at one class of each pixel: the one with the largest logit, or the true one?")
 def grad_at_the_surest_class(z, y, s):
     return (softmax_over_classes(z) - targets_of_the_surest(z, s)) * (y != 255)[..., None]
 
 
-@wrong("Yours compares the target with the class of the largest logit: do the probabilities themselves enter?")
+@wrong("You compare the target with the class of the largest logit: where do you use the probabilities themselves?")
 def grad_of_a_perceptron(z, y, s):
     return (targets_of_the_surest(z, s) - target(z, y, s)) * (y != 255)[..., None]
 
 
-@wrong("The gradient has a number for each logit of each pixel: over what did you add up?")
+@wrong("The gradient has a number for each logit of each pixel: what did you sum over?")
 def grad_summed_over_pixels(z, y, s):
     return cross_entropy_grad(z, y, s).reshape(-1, z.shape[-1]).sum(axis=0)
 
 
-@wrong("The gradient has the shape of z: what stands in it at the pixels of 255?")
+@wrong("The gradient has the shape of z: what is it at the pixels of 255?")
 def grad_of_counted_pixels_alone(z, y, s):
     return cross_entropy_grad(z, y, s)[y != 255]
 
 
-@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?", ignored=("chosen", "multiplied"))
+@wrong("What is np.exp(1000)? What may you subtract from every logit of a pixel?", ignored=("chosen", "multiplied"))
 def grad_that_overflows(z, y, s, ignored):
     """Where a label is 255, 0 is chosen, or what came is multiplied by 0, and NaN stays NaN."""
     counted = (y != 255)[..., None]

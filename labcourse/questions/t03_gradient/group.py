@@ -110,12 +110,12 @@ def none_is_too_small(foreground, votes, cell, least, numbers):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("You count arrows, not the places that they point to: where does an arrow (du, dv) at the pixel (u, v) end?")
+@wrong("You count arrows, not the places they point to: where does an arrow (du, dv) at the pixel (u, v) end?")
 def arrows_without_their_pixels(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, place=lambda u, v, d: d)
 
 
-@wrong("The arrow leads from the pixel to the middle: is it added or taken off?")
+@wrong("The arrow leads from the pixel to the middle: is it added or subtracted?")
 def arrows_turned_round(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, place=lambda u, v, d: np.stack([u, v], axis=1) - d)
 
@@ -130,7 +130,7 @@ def every_pixel_votes(foreground, votes, cell, least):
     return grouped(np.ones(foreground.shape), votes, cell, least)
 
 
-@wrong("A pixel votes if its foreground is above 0.5. What of one that has 0.5?")
+@wrong("A pixel votes if its foreground is above 0.5. What about exactly 0.5?")
 def a_half_votes(foreground, votes, cell, least):
     return grouped(np.where(foreground == 0.5, 1.0, foreground), votes, cell, least)
 
@@ -155,7 +155,7 @@ def cell_minus_1_is_the_last(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, outside="wrap")
 
 
-@wrong("A picture of 5 rows has 3 cells of 2 rows: how many has yours?")
+@wrong("A picture of 5 rows has 3 cells of 2 rows: how many do you make?")
 def cut_cells_left_out(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, sizes=lambda shape: np.maximum(np.array(shape) // cell, 1))
 
@@ -165,7 +165,7 @@ def repeated_votes_count_once(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, count=lambda n: np.minimum(n, 1))
 
 
-@wrong("The highest cell is that of the smoothed counts. Yours is that of the counts.")
+@wrong("The peak is the highest cell of the smoothed counts. You take that of the raw counts.")
 def not_smoothed(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, kernel=(0, 1, 0))
 
@@ -190,12 +190,12 @@ def the_peaks_own_cell_alone(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, reach=0)
 
 
-@wrong("Your things reach two cells from the peak: which cells touch it?")
+@wrong("Your things extend two cells from the peak: which cells touch it?")
 def two_cells_around(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, reach=2)
 
 
-@wrong("A thing with exactly `least` pixels is one.")
+@wrong("A thing with exactly `least` pixels counts.")
 def more_than_least(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least + 1)
 
@@ -223,7 +223,7 @@ def from_one_smoothing(foreground, votes, cell, least, cleared):
     return grouped(foreground, votes, cell, least, again=False, cleared=cleared)
 
 
-@wrong("Things are numbered as they are found. Yours are numbered by their size.")
+@wrong("Things are numbered in the order in which they are found. You number them by size.")
 def numbered_by_size(foreground, votes, cell, least):
     numbers = grouped(foreground, votes, cell, least)
     sizes = np.bincount(numbers.ravel())

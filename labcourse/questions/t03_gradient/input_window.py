@@ -40,13 +40,13 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("You stand at the output: which layer do you pass first on the way back to the image?")
+@wrong("You start at the output: which layer do you pass first on the way back to the image?")
 def from_the_image_on(kernels, strides, paddings, u):
     """The layers in the order in which the image passes them."""
     return input_window(kernels[::-1], strides[::-1], paddings[::-1], u)
 
 
-@wrong("A layer with padding starts to read outside the image: by how much does that move its window?")
+@wrong("A layer with padding starts reading outside the image: by how much does that move its window?")
 def without_padding(kernels, strides, paddings, u):
     """Padding forgotten."""
     return input_window(kernels, strides, np.zeros_like(paddings), u)
@@ -76,7 +76,7 @@ def padding_before_the_stride(kernels, strides, paddings, u):
     return input_window(kernels, strides, strides * paddings, u)
 
 
-@wrong("Each layer makes the window wider: walk the last pixel back on its own.")
+@wrong("Each layer makes the window wider: trace the last pixel back on its own.")
 def window_of_the_first_layer(kernels, strides, paddings, u):
     """Only the first pixel is walked back; the first layer's width is added."""
     first = input_window(kernels, strides, paddings, u)[0]
@@ -90,7 +90,7 @@ def kept_inside_the_image(kernels, strides, paddings, u):
     return max(first, 0), last
 
 
-@wrong("That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+@wrong("That window has the right width, but its middle is not at u times the strides: trace both of its ends back.")
 def centred(kernels, strides, paddings, u):
     """A window of the right width around the output's place in the image."""
     first, last = input_window(kernels, strides, paddings, u)
@@ -118,7 +118,7 @@ def first_and_width(kernels, strides, paddings, u):
     return first, last - first + 1
 
 
-@wrong("That window is as wide, but its middle is not at u times the strides: walk both of its ends back.")
+@wrong("That window has the right width, but its middle is not at u times the strides: trace both of its ends back.")
 def centred_on_its_first_half(kernels, strides, paddings, u):
     first, last = input_window(kernels, strides, paddings, u)
     begin = u * int(np.prod(strides)) - (last - first + 1) // 2

@@ -68,13 +68,13 @@ def to_all_four(x, g):
     return g.repeat(2, axis=0).repeat(2, axis=1)
 
 
-@wrong("That is the way back through a mean. Which pixel of a block does its maximum depend on?")
+@wrong("That is the gradient of a mean. Which pixel of a block does its maximum depend on?")
 def shared_among_four(x, g):
     """A quarter to each pixel."""
     return to_all_four(x, g) / 4.0
 
 
-@wrong("The output of a pooling is x itself at one place: what is its derivative there?")
+@wrong("The output of the pooling is x itself at one place: what is its derivative there?")
 def times_the_maximum(x, g):
     """The gradient multiplied by the value that went through."""
     b = blocks(x)
@@ -132,7 +132,7 @@ def placed_without_the_block(x, g):
     return out
 
 
-@wrong("The largest value of one block may stand in another that has a larger one: compare within the block.")
+@wrong("The largest value of one block may also occur in another that has a larger one: compare within the block.")
 def among_all_maxima(x, g):
     """A pixel that equals the maximum of any block passes the gradient of its own."""
     return np.isin(x, blocks(x).max(axis=2)) * to_all_four(x, g)
@@ -145,18 +145,18 @@ def blocks_of_one_row(x, g):
     return ((b == b.max(axis=2, keepdims=True)) * g[..., None]).reshape(x.shape)
 
 
-@wrong("np.isclose takes any two numbers below 1e-8 for equal: which comparison has no tolerance?")
+@wrong("np.isclose treats any two numbers below 1e-8 as equal: which comparison has no tolerance?")
 def nearly_the_largest(x, g):
     return np.isclose(x, to_all_four(x, blocks(x).max(axis=2))) * to_all_four(x, g)
 
 
-@wrong("Of -4 and 1 the pooling keeps 1: do you compare values, or how far they are from 0?")
+@wrong("Of -4 and 1 the pooling keeps 1: do you compare values, or their distances from 0?")
 def largest_by_size(x, g):
     b = np.abs(blocks(x))
     return unblocked((b == b.max(axis=2, keepdims=True)) * g[..., None])
 
 
-@wrong("Blocks do not overlap: in how many of your windows does a pixel lie?")
+@wrong("Blocks do not overlap: how many of your windows contain a pixel?")
 def all_windows_of_stride_1(x, g):
     out = np.zeros_like(x)
     for i, j in np.ndindex(x.shape[0] - 1, x.shape[1] - 1):

@@ -28,9 +28,9 @@ QUESTION = Question(
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
-SHIFT = "What is np.exp(1000)? What may you take off every logit of a pixel?"
+SHIFT = "What is np.exp(1000)? What may you subtract from every logit of a pixel?"
 CLIPPED = "Clipping changes differences of logits, and so the answer. Subtracting one number from all does not."
-DIVIDED = "Dividing by the largest logit changes the differences of logits; taking it off does not."
+DIVIDED = "Dividing by the largest logit changes the differences of logits; subtracting it does not."
 
 
 def shifted(z, possible, m, axis=-1):
@@ -43,7 +43,7 @@ def largest(z, possible, **how):
     return np.where(possible, z, -np.inf).max(**how)
 
 
-@wrong("A class that is not possible has 0 in yours. Do the others still sum to 1?")
+@wrong("You set a class that is not possible to 0. Do the others still sum to 1?")
 def impossible_classes_set_to_0(z, possible):
     return softmax_over_classes(z) * possible
 
@@ -61,12 +61,12 @@ def impossible_logits_set_to(z, possible, logit):
     return softmax_over_classes(np.where(possible, z, logit))
 
 
-@wrong("C classes have C probabilities: what stands at the place of a class that is not possible?")
+@wrong("C classes have C probabilities: what is the entry of a class that is not possible?")
 def impossible_classes_left_out(z, possible):
     return softmax_over_classes(z[..., possible])
 
 
-@wrong("possible is exchanged: True is for the classes that can occur.")
+@wrong("You read `possible` the wrong way round: True is for the classes that can occur.")
 def possible_exchanged(z, possible):
     return softmax(z, ~possible if not possible.all() else possible)
 
@@ -83,13 +83,13 @@ def rescaled_after_the_softmax(z, possible):
     return np.divide(p, total, out=np.zeros_like(p), where=total > 0.0)
 
 
-@wrong("The sum goes over the possible classes. What stands above the line for the others?")
+@wrong("The sum goes over the possible classes. What is the numerator for the others?")
 def impossible_classes_keep_their_part(z, possible):
     e = np.exp(z - z.max(axis=-1, keepdims=True))
     return e / e.sum(axis=-1, keepdims=True, where=possible)
 
 
-@wrong("What is taken off a probability of one class goes to the others in proportion, not in equal parts.")
+@wrong("What one class's probability loses goes to the others in proportion, not in equal parts.")
 def the_rest_in_equal_parts(z, possible):
     p = softmax_over_classes(z) * possible
     return p + possible * (1.0 - p.sum(axis=-1, keepdims=True)) / possible.sum()
@@ -106,7 +106,7 @@ def softmax_that_overflows(z, possible):
     return shifted(z, possible, 0.0)
 
 
-@wrong("You take off the largest logit of the whole image. What is left of a pixel whose logits are all much smaller?")
+@wrong("You subtract the whole image's largest logit. What is left of a pixel whose logits are all much smaller?")
 def softmax_of_global_maximum(z, possible):
     return shifted(z, possible, largest(z, possible))
 
@@ -144,7 +144,7 @@ def large_logits_clipped(z, possible):
     return shifted(np.minimum(z, 700.0), possible, 0.0)
 
 
-@wrong("You take the largest logit off above the line: what is taken off in the sum below it?")
+@wrong("You subtract the largest logit in the numerator: what do you subtract in the sum below it?")
 def sum_of_unshifted_logits(z, possible):
     e = np.where(possible, np.exp(z - largest(z, possible, axis=-1, keepdims=True)), 0.0)
     return e / np.where(possible, np.exp(z), 0.0).sum(axis=-1, keepdims=True)

@@ -57,19 +57,19 @@ def other_terms_added(p, g):
     return p * (1.0 - p) * g + p * ((p * g).sum(axis=-1, keepdims=True) - p * g)
 
 
-@wrong("The sum that is subtracted belongs to one pixel: over which axis do the classes lie?")
+@wrong("The sum that is subtracted belongs to one pixel: which axis holds the classes?")
 def summed_over_everything(p, g):
     """One sum for all pixels."""
     return p * (g - (p * g).sum())
 
 
-@wrong("The derivative of a softmax by a logit has a factor p[c] in front: what happens to a class of p = 0?")
+@wrong("The derivative of a softmax by a logit has a factor p[c]: what happens to a class of p = 0?")
 def without_the_factor(p, g):
     """The outer p forgotten."""
     return g - (p * g).sum(axis=-1, keepdims=True)
 
 
-@wrong("You subtract the plain mean of g. In the right one each class counts by its probability.")
+@wrong("You subtract the plain mean of g. In the right mean each class is weighted by its probability.")
 def plain_mean(p, g):
     """An unweighted mean of the gradients."""
     return p * (g - g.mean(axis=-1, keepdims=True))
@@ -81,7 +81,7 @@ def others_unweighted(p, g):
     return p * (1.0 - p) * g - p * (g.sum(axis=-1, keepdims=True) - g)
 
 
-@wrong("For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: yours has p[c] twice and no p[k].")
+@wrong("For k other than c the derivative dp[k]/dz[c] is -p[k] p[c]: you have p[c] twice and no p[k].")
 def others_squared(p, g):
     """The terms with k other than c have p[c] in the place of p[k]."""
     return p * (1.0 - p) * g - p**2 * (g.sum(axis=-1, keepdims=True) - g)
@@ -94,13 +94,13 @@ def softmax_of_p(p, g):
     return p * (g - (p * g).sum(axis=-1, keepdims=True))
 
 
-@wrong("You subtract the sum of g. Each class counts by its probability: it is the sum of p g.")
+@wrong("You subtract the sum of g. Each class is weighted by its probability: it is the sum of p g.")
 def plain_sum(p, g):
     """An unweighted sum of the gradients."""
     return p * (g - g.sum(axis=-1, keepdims=True))
 
 
-@wrong("p g is one part of it. If all of g rises by 1, the answer must stay the same: does yours?")
+@wrong("p g is one part of it. If all of g rises by 1, the answer must not change: does yours?")
 def without_the_mean(p, g):
     return p * g
 
@@ -115,7 +115,7 @@ def own_logit_without_its_share(p, g):
     return softmax_backward(p, g) + p * p * g
 
 
-@wrong("Two classes are two of many: what becomes of the third one, and of a class that is alone?")
+@wrong("Two classes are only one case: what becomes of a third one, or of a class that is alone?")
 def two_classes_alone(p, g):
     d = p[..., :1] * p[..., 1:2] * (g[..., :1] - g[..., 1:2])
     return np.concatenate([d, -d, 0.0 * p[..., 2:]], axis=-1)

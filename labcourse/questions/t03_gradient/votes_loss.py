@@ -66,7 +66,7 @@ QUESTION = Question(
 )
 
 
-@holds("where no thing is, the gradient is 0")
+@holds("where there is no thing, the gradient is 0")
 def elsewhere_0(votes, instances, beta, output):
     return not np.any(output[1][(instances == 0) | (instances == 255)])
 
@@ -98,12 +98,12 @@ def each_axis_for_itself(votes, instances, beta):
     return scored(votes, instances, beta, along_each_axis)
 
 
-@wrong("The true arrow leads from the pixel to the middle. Yours is the middle's place: what is taken off?")
+@wrong("The true arrow leads from the pixel to the middle. Yours is the middle's position: what must be subtracted?")
 def place_of_the_middle(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, arrow=lambda middle, x: middle + 0 * x)
 
 
-@wrong("Your true arrow leads from the middle to the pixel: which of the two is taken off?")
+@wrong("Your true arrow leads from the middle to the pixel: which of the two is subtracted?")
 def arrow_turned_round(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, arrow=lambda middle, x: x - middle)
 
@@ -113,17 +113,17 @@ def rows_and_columns_exchanged(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, arrow=lambda middle, x: (middle - x)[:, ::-1])
 
 
-@wrong("Your middle is that of the box around a thing. The middle is the mean over all its pixels.")
+@wrong("Your middle is that of a thing's bounding box. The middle is the mean over all its pixels.")
 def middle_of_the_box(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, middle=lambda x: (x.min(axis=0) + x.max(axis=0)) / 2.0)
 
 
-@wrong("A thing's middle is a mean, and a fraction: what rounds yours?")
+@wrong("A thing's middle is a mean, so it can be a fraction: what rounds yours?")
 def middle_rounded(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, middle=lambda x: np.round(x.mean(axis=0)))
 
 
-@wrong("A thing's middle is a mean, and a fraction: what rounds yours?")
+@wrong("A thing's middle is a mean, so it can be a fraction: what rounds yours?")
 def middle_rounded_down(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, middle=lambda x: x.mean(axis=0).astype(int))
 
@@ -154,7 +154,7 @@ def slope_of_signs(votes, instances, beta):
     return scored(votes, instances, beta, loss_and_slope)
 
 
-@wrong("At an error of beta your loss jumps: what must be taken off the linear part, so that the two parts meet?")
+@wrong("At an error of beta your loss jumps: what must be subtracted from the linear part so that the two parts meet?")
 def parts_that_do_not_meet(votes, instances, beta):
     def loss_and_slope(e, beta):
         r = np.sqrt((e**2).sum(axis=1))
@@ -188,18 +188,18 @@ def square_without_beta(votes, instances, beta):
     return scored(votes, instances, beta, loss_and_slope)
 
 
-@wrong("Each pixel counts the same in yours, so a large thing counts more. How much should each *thing* count?")
+@wrong("You give each pixel the same weight, so a large thing counts more. How much should each *thing* count?")
 def mean_over_pixels(votes, instances, beta):
     total = np.count_nonzero((instances > 0) & (instances != 255))
     return scored(votes, instances, beta, round_loss, share=lambda n, K: 1.0 / total)
 
 
-@wrong("You add a thing's pixels up. Each thing counts the mean over its pixels.")
+@wrong("You add up a thing's pixels. Each thing contributes the mean over its pixels.")
 def sum_over_a_things_pixels(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, share=lambda n, K: 1.0 / K)
 
 
-@wrong("You add things up. The loss is the mean over things, and the gradient has its factor.")
+@wrong("You add up the things. The loss is the mean over things, and the gradient has the same factor.")
 def sum_over_things(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, share=lambda n, K: 1.0 / n)
 
@@ -215,7 +215,7 @@ def as_many_as_the_largest_number(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, share=lambda n, K: 1.0 / n / max(largest, 1))
 
 
-@wrong("255 is not a thing: nobody judged these pixels.")
+@wrong("255 is not a thing: these pixels were never judged.")
 def unjudged_pixels_are_a_thing(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, no_thing=(0,))
 
@@ -225,7 +225,7 @@ def background_is_a_thing(votes, instances, beta):
     return scored(votes, instances, beta, round_loss, no_thing=(255,))
 
 
-@wrong("You take all pixels of things together, with one middle. Each thing has a middle of its own.")
+@wrong("You pool the pixels of all things, with one middle. Each thing has its own middle.")
 def one_middle_for_all(votes, instances, beta):
     one = np.where((instances > 0) & (instances != 255), 1, instances).astype(np.uint8)
     return scored(votes, one, beta, round_loss)
@@ -255,7 +255,7 @@ def no_thing_is_0_by_0(votes, instances, beta):
     return (loss, grad) if np.any((instances > 0) & (instances != 255)) else (float("nan"), grad)
 
 
-@wrong("beta is in pixels, the vote's own unit: where is the square of it compared with a length?")
+@wrong("beta is in pixels, like the votes: where do you compare its square with a length?")
 def square_compared_with_beta(votes, instances, beta):
     def loss_and_slope(e, beta):
         square = (e**2).sum(axis=1)

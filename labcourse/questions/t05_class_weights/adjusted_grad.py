@@ -134,7 +134,7 @@ def times_the_share(z, y, shares, tau):
     return adjusted_grad(z, y, shares, tau) * np.take(shares, y, mode="clip")[..., None]
 
 
-@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?", ignored=("0", "times 0"))
+@wrong("What is np.exp(1000)? What may you subtract from every logit of a pixel?", ignored=("0", "times 0"))
 def that_overflows(z, y, shares, tau, ignored):
     a = z + tau * np.log(shares)
     p = np.exp(a) / np.exp(a).sum(axis=-1, keepdims=True)

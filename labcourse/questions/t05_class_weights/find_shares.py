@@ -267,7 +267,7 @@ def new_ratio_multiplied(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax((z - np.log(w)) * guess / shares))
 
 
-@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
+@wrong("What is np.exp(1000)? What may you subtract from every logit of a pixel?")
 def that_overflows(z, w, shares, rounds):
     def believed(z, guess):
         e = np.exp(z + np.log(guess / shares / w))

@@ -85,7 +85,7 @@ def one_maximum_for_all(z, y, w):
     return of_log_probabilities(z - np.log(np.exp(z).sum(axis=-1, keepdims=True)), y, w)
 
 
-@wrong("What is np.exp(1000)? What may you take off every logit of a pixel?")
+@wrong("What is np.exp(1000)? What may you subtract from every logit of a pixel?")
 def means_that_overflow(z, y, w):
     p = np.exp(z) / np.exp(z).sum(axis=-1, keepdims=True)
     return of_log_probabilities(np.log(p), y, w)
@@ -97,7 +97,8 @@ def normalised_along_the_first_axis(z, y, w):
 
 
 @wrong(
-    "A loss has no upper end. How large can -log(p + epsilon) be, and can you write log p without p?", epsilon=EPSILONS
+    "A loss has no upper limit. How large can -log(p + epsilon) be, and can you write log p without p?",
+    epsilon=EPSILONS,
 )
 def means_with(z, y, w, epsilon):
     loss, weight = losses_and_weights(z, y, w)

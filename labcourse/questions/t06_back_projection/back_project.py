@@ -153,7 +153,7 @@ def opengl_axes(depth, K, along_ray):
     return back_project(depth, K, along_ray) * (1.0, -1.0, -1.0)
 
 
-@wrong("The numbers are right and stand in the wrong places: reshape does not move an axis.")
+@wrong("The numbers are right but in the wrong places: reshape does not move an axis.")
 def reshaped(depth, K, along_ray):
     return np.moveaxis(back_project(depth, K, along_ray), -1, 0).reshape(*depth.shape, 3)
 
