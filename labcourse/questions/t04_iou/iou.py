@@ -34,19 +34,19 @@ def scores_are_shares(n, out):
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("The overlap stands in the row sum and in the column sum: how often is it in your union?")
+@wrong("The overlap is in the row sum and in the column sum: how often is it in your union?")
 def overlap_twice_in_the_union(n):
     correct, predicted, true = parts(n)
     return divide(correct, predicted + true)
 
 
-@wrong("That is Dice (F1), another score: the overlap stands once in an IoU, not twice.")
+@wrong("That is Dice (F1), another score: an IoU has the overlap once, not twice.")
 def dice(n):
     correct, predicted, true = parts(n)
     return divide(2.0 * correct, predicted + true)
 
 
-@wrong("A pixel of class 1 that is called 2 is in neither set of class 0: is it in your union of class 0?")
+@wrong("A pixel of class 1 that is predicted as 2 is in neither set of class 0: is it in your union of class 0?")
 def all_but_the_other_hits(n):
     return divide(np.diagonal(n), n.sum() - np.trace(n) + np.diagonal(n))
 
@@ -57,13 +57,13 @@ def overlap_three_times_in_the_union(n):
     return divide(correct, predicted + true + correct)
 
 
-@wrong("C classes have C scores: what stands at the place of a class that is neither true nor predicted?")
+@wrong("C classes have C scores: what is the entry of a class that is neither true nor predicted?")
 def absent_classes_left_out(n):
     scores = iou_of(n)
     return scores[~np.isnan(scores)]
 
 
-@wrong("A class that is neither true nor predicted has no score: is 0 not that of a class that is never found?")
+@wrong("A class that is neither true nor predicted has no score: what would a score of 0 say about it?")
 def absent_classes_score_0(n):
     return iou_of(n, empty=0.0)
 
@@ -85,13 +85,13 @@ def nan_where_never_true(n):
     return np.where(n.sum(axis=1) > 0, iou_of(n), np.nan)
 
 
-@wrong("Pixels that are neither true nor called class c count as right in yours: are they in its union?")
+@wrong("You count pixels that are neither labelled nor predicted as class c as right: are they in its union?")
 def accuracy_by_class(n):
     correct, predicted, true = parts(n)
     return 1.0 - (predicted + true - 2.0 * correct) / n.sum()
 
 
-@wrong("You add 1 to both, so that nothing is 0 / 0: what should a class score that occurs nowhere?")
+@wrong("You add 1 to both to avoid 0 / 0: what should the score of a class be that occurs nowhere?")
 def smoothed(n):
     correct, predicted, true = parts(n)
     return (correct + 1.0) / (predicted + true - correct + 1.0)

@@ -105,22 +105,22 @@ def with_factor(n_frames, factor):
     return pooled(n_frames), spread(without_each(n_frames, pooled), factor)
 
 
-@wrong("The scores without one frame lie close together, as they share nearly all frames: by which factor too close?")
+@wrong("The scores without one frame are close together, as they share nearly all frames: by which factor too close?")
 def spread_of_the_scores(n_frames):
     return with_factor(n_frames, lambda F: 1 / F)
 
 
-@wrong("The scores without one frame lie close together, as they share nearly all frames: by which factor too close?")
+@wrong("The scores without one frame are close together, as they share nearly all frames: by which factor too close?")
 def spread_of_the_scores_of_a_sample(n_frames):
     return with_factor(n_frames, lambda F: 1 / (F - 1))
 
 
-@wrong("That divides the scores' spread by the root of F, as for F numbers that do not depend on each other. Do these?")
+@wrong("That divides the scores' spread by the root of F, as for F independent numbers. Are these independent?")
 def as_if_they_were_independent(n_frames):
     return with_factor(n_frames, lambda F: 1 / (F * (F - 1)))
 
 
-@wrong("That divides the scores' spread by the root of F, as for F numbers that do not depend on each other. Do these?")
+@wrong("That divides the scores' spread by the root of F, as for F independent numbers. Are these independent?")
 def as_if_they_were_independent_by_f(n_frames):
     return with_factor(n_frames, lambda F: 1 / F**2)
 
@@ -139,7 +139,7 @@ def factor_too_large(n_frames, of):
     return with_factor(n_frames, factors.get(of, lambda F: (F - 1) ** 2 / F))
 
 
-@wrong("The factor belongs to the squares: it stands under the root, too.")
+@wrong("The factor belongs to the squares: it is under the root, too.")
 def factor_outside_the_root(n_frames):
     return with_factor(n_frames, lambda F: ((F - 1) / F) ** 2)
 
@@ -150,7 +150,7 @@ def squared(n_frames):
     return score, error**2
 
 
-@wrong("The root is one of the factor and the sum together. Yours is one of the factor alone.")
+@wrong("The root is taken of the factor times the sum. You take it of the factor alone.")
 def sum_outside_the_root(n_frames):
     score, error = jackknife(n_frames)
     return score, error**2 / np.sqrt(1 - 1 / len(n_frames))
@@ -161,33 +161,33 @@ def squared_after_the_sum(n_frames):
     return pooled(n_frames), 0.0
 
 
-@wrong("Deviations are squared one by one, and then added up: yours are not squared.")
+@wrong("Deviations are squared one by one and then added up: you do not square them.")
 def absolute_deviations(n_frames):
     left = without_each(n_frames, pooled)
     return pooled(n_frames), (len(left) - 1) / len(left) * np.abs(left - left.mean()).sum()
 
 
-@wrong(
-    "The deviations are those from the mean of the scores without one frame. Yours are from the score of all frames."
-)
+@wrong("Deviations are taken from the mean of the scores without one frame. Yours are from the score of all frames.")
 def deviations_from_the_score_of_all(n_frames):
     left = without_each(n_frames, pooled)
     return pooled(n_frames), np.sqrt((len(left) - 1) / len(left) * np.square(left - pooled(n_frames)).sum())
 
 
-@wrong("You correct the score's bias. Asked for is the mean IoU of all frames as it is.")
+@wrong("You correct the score's bias. The task asks for the plain mean IoU of all frames.")
 def bias_corrected(n_frames):
     F, (score, error) = len(n_frames), jackknife(n_frames)
     return F * score - (F - 1) * without_each(n_frames, pooled).mean(), error
 
 
-@wrong("Without frame k all others are counted, those before it, too. Yours never come back once they are left out.")
+@wrong(
+    "Without frame k all other frames count, also those before it. You never bring back a frame once it is left out."
+)
 def left_out_for_good(n_frames):
     left = np.array([pooled(n_frames[k + 1 :]) for k in range(len(n_frames) - 1)])
     return pooled(n_frames), spread(left, lambda _: (len(n_frames) - 1) / len(n_frames))
 
 
-@wrong("The overlap stands in the row sum and in the column sum: how often is it in your union?")
+@wrong("The overlap is in the row sum and in the column sum: how often is it in your union?")
 def overlap_twice_in_the_union(n_frames):
     def score(some):
         correct, predicted, true = parts(some.sum(axis=0))
@@ -200,7 +200,7 @@ def alone(n_frames):
     return np.array([np.nanmean(iou_of(n)) for n in n_frames])
 
 
-@wrong("You score each frame alone. The pooled score is no mean of these: leave one frame out, score the others.")
+@wrong("You score each frame alone. The pooled score is not their mean: leave one frame out and score the others.")
 def standard_error_of_the_frames(n_frames):
     return pooled(n_frames), spread(alone(n_frames), lambda F: 1 / (F * (F - 1)))
 
@@ -210,7 +210,7 @@ def one_frame_in(n_frames):
     return pooled(n_frames), spread(alone(n_frames), lambda F: (F - 1) / F)
 
 
-@wrong("Your score is the mean of those without one frame. It is to be that of all frames, pooled.")
+@wrong("Your score is the mean of those without one frame. It should be the score of all frames, pooled.")
 def mean_of_what_is_left(n_frames):
     return without_each(n_frames, pooled).mean(), jackknife(n_frames)[1]
 
@@ -243,15 +243,13 @@ def occurring(n_frames):
     return ~np.isnan(iou_of(n_frames.sum(axis=0)))
 
 
-@wrong("A class that only the frame left out holds occurs no more: does it count in the mean of the others?")
+@wrong("A class that is only in the omitted frame no longer occurs: does it count in the mean of the others?")
 def a_class_left_out_scores_0(n_frames):
     left = without_each(n_frames, lambda some: iou_of(some.sum(axis=0), empty=0.0)[occurring(n_frames)].mean())
     return pooled(n_frames), spread(left, lambda F: (F - 1) / F)
 
 
-@wrong(
-    "A class that only the frame left out holds occurs no more, and its score is NaN. What is a mean with a NaN in it?"
-)
+@wrong("A class that is only in the omitted frame no longer occurs: its score is NaN. What is a mean with a NaN in it?")
 def a_class_left_out_is_nan(n_frames):
     left = without_each(n_frames, lambda some: iou_of(some.sum(axis=0))[occurring(n_frames)].mean())
     return pooled(n_frames), spread(left, lambda F: (F - 1) / F)
@@ -263,7 +261,8 @@ def nan_in_the_mean(n_frames):
 
 
 @wrong(
-    "A class that no frame holds or predicts moves your mean: over how many classes do you average?", empty=(0.0, 1.0)
+    "A class that is in no frame and never predicted changes your mean: over how many classes do you average?",
+    empty=(0.0, 1.0),
 )
 def absent_classes_count(n_frames, empty):
     return by(n_frames, lambda some: iou_of(some.sum(axis=0), empty=empty).mean())
@@ -287,7 +286,7 @@ def found_only(n_frames):
     return by(n_frames, score)
 
 
-@wrong("In your sum a class with many pixels outweighs the others: each class has one vote here, whatever its size.")
+@wrong("In your sum a class with many pixels outweighs the others: here each class counts once, whatever its size.")
 def sum_over_sum(n_frames):
     def score(some):
         correct, predicted, true = parts(some.sum(axis=0))
@@ -297,7 +296,8 @@ def sum_over_sum(n_frames):
 
 
 @wrong(
-    "Your scores are recall or precision: a union holds the row of a class and its column.", whole=("true", "predicted")
+    "Your scores are recall or precision: a union contains both the row and the column of a class.",
+    whole=("true", "predicted"),
 )
 def half_of_the_union(n_frames, whole):
     def score(some):

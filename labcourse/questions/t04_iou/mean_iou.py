@@ -42,12 +42,12 @@ def mean_of_frames_by_class(n_frames):
     return np.nanmean(scores[:, seen], axis=0).mean()
 
 
-@wrong("Each class of each frame has a vote in your mean, however few pixels it has. Add counts first, divide once.")
+@wrong("Each class of each frame counts once in your mean, however few pixels it has. Add counts first, divide once.")
 def mean_of_all_scores(n_frames):
     return np.nanmean([iou_of(n) for n in n_frames])
 
 
-@wrong("In your sum a class with many pixels outweighs the others: each class has one vote here, whatever its size.")
+@wrong("In your sum a class with many pixels outweighs the others: here each class counts once, whatever its size.")
 def sum_over_sum(n_frames):
     correct, predicted, true = parts(n_frames.sum(axis=0))
     return correct.sum() / (predicted + true - correct).sum()
@@ -77,7 +77,7 @@ def weighted_by_frequency(n_frames):
     return np.nansum(iou_of(n) * n.sum(axis=1)) / n.sum()
 
 
-@wrong("A class that no frame holds or predicts lifts your mean: over how many classes do you average?")
+@wrong("A class that is in no frame and never predicted raises your mean: over how many classes do you average?")
 def absent_is_1(n_frames):
     return iou_of(n_frames.sum(axis=0), empty=1.0).mean()
 
@@ -92,12 +92,12 @@ def without_background(n_frames):
     return np.nanmean(iou_of(n_frames.sum(axis=0))[1:])
 
 
-@wrong("16 bits hold numbers up to 32,767: how many pixels of a class have all frames together?")
+@wrong("16 bits hold numbers up to 32,767: how many pixels can a class have in all frames together?")
 def added_in_16_bits(n_frames):
     return np.nanmean(iou_of(n_frames.sum(axis=0, dtype=np.int16)))
 
 
-@wrong("Means of counts need not be whole: what does the cast to integers do to a class of few pixels?")
+@wrong("Means of counts need not be integers: what does the cast to integers do to a class of few pixels?")
 def means_cut_to_whole_numbers(n_frames):
     return np.nanmean(iou_of(n_frames.mean(axis=0).astype(int)))
 

@@ -73,31 +73,31 @@ def mistakes_within_a_group_dropped(n, group):
     return merge_classes(np.where(mistake, 0, n), group)
 
 
-@wrong("The rows are merged and the columns are not: a prediction has a group, too.")
+@wrong("You merge the rows but not the columns: a prediction has a group, too.")
 def rows_alone(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     np.add.at(merged, group, n)
     return merged
 
 
-@wrong("Your matrix is G x C: its rows are merged, and its columns are still the old classes.")
+@wrong("Your matrix is G x C: its rows are merged, but its columns are still the old classes.")
 def old_columns(n, group):
     return np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
 
 
-@wrong("Your matrix still has C rows: an index array chooses rows, and does not add those of one group.")
+@wrong("Your matrix still has C rows: an index array selects rows, it does not add those of one group.")
 def rows_chosen(n, group):
     return n[np.ix_(group, group)]
 
 
-@wrong("Only the diagonal of n comes into yours: where do the mistakes between two groups go?")
+@wrong("You use only the diagonal of n: where do the mistakes between two groups go?")
 def diagonal_alone(n, group):
     merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
     np.add.at(merged, (group, group), np.diagonal(n))
     return merged
 
 
-@wrong("The result has a row for each group, yours one for each old class: how many groups are there?")
+@wrong("The result has one row per group, yours one per old class: how many groups are there?")
 def as_large_as_before(n, group):
     empty = len(n) - (group.max() + 1)
     return np.pad(merge_classes(n, group), (0, empty))
@@ -116,7 +116,7 @@ def runs_of_neighbours(n, group):
     return np.add.reduceat(np.add.reduceat(n, starts, axis=0), starts, axis=1)
 
 
-@wrong("Every cell is a sum: what one group is taken for another adds up, too, not only what is on the diagonal.")
+@wrong("Every cell is a sum: confusions of one group with another add up, too, not only what is on the diagonal.")
 def only_the_diagonal_is_summed(n, group):
     first = [int(np.argmax(group == g)) for g in range(group.max() + 1)]
     out = n[np.ix_(first, first)].copy()
@@ -124,7 +124,7 @@ def only_the_diagonal_is_summed(n, group):
     return out
 
 
-@wrong("An index array chooses rows and columns, and adds nothing up: what is the sum over the classes of one group?")
+@wrong("An index array selects rows and columns but adds nothing up: what is the sum over the classes of one group?")
 def chosen_and_cut(n, group):
     G = group.max() + 1
     return n[np.ix_(group, group)][:G, :G]

@@ -87,7 +87,7 @@ def border_is_an_edge(y, width):
     return trimap_band(np.pad(y, width), width)[width:-width, width:-width]
 
 
-@wrong("255 is no class: a neighbour that nobody judged does not put a pixel into the band.")
+@wrong("255 is no class: an unjudged neighbour does not put a pixel into the band.")
 def unjudged_is_a_class(y, width):
     return trimap_band(np.where(y == 255, 9, y), width) & (y != 255)
 
@@ -97,17 +97,17 @@ def cross_window(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v == 0 or u == 0]) & (y != 255)
 
 
-@wrong("The window is a square: is the pixel `width` rows down and `width` columns to the right in yours?")
+@wrong("The window is a square: do you include the pixel `width` rows down and `width` columns to the right?")
 def diamond_window(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if abs(v) + abs(u) <= width]) & (y != 255)
 
 
-@wrong("Your window reaches further up and left than down and right: which number does range leave out?")
+@wrong("Your window extends further up and left than down and right: which number does range leave out?")
 def window_without_its_end(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v < width and u < width]) & (y != 255)
 
 
-@wrong("Your window reaches only down and right: pixels above and to the left are neighbours, too.")
+@wrong("Your window extends only down and right: pixels above and to the left are neighbours, too.")
 def down_and_right_alone(y, width):
     return banded(y, width, [(v, u) for v, u in square(width) if v >= 0 and u >= 0]) & (y != 255)
 
@@ -118,7 +118,7 @@ def grown_from_the_pixels_beside_the_edge(y, width):
     return banded(beside, width, square(width), lambda near, _: near == 1) & (y != 255)
 
 
-@wrong("Pixels of the opposite border come in, as by np.roll: beyond its border an image has no pixels.")
+@wrong("Pixels of the opposite border get in, as with np.roll: beyond its border an image has no pixels.")
 def rolled_round(y, width):
     near = [np.roll(y, step, axis=(0, 1)) for step in square(width)]
     return (y != 255) & np.any([(n != y) & (n != 255) for n in near], axis=0)
@@ -134,7 +134,7 @@ def other_side(y, width):
     return banded(y, width, square(width), np.greater) & (y != 255)
 
 
-@wrong("A window of one class is in your band if 255 or your frame is in it, too: which labels are classes?")
+@wrong("A window of one class is in your band if it also has 255 or your padding in it: which labels are classes?")
 def unjudged_and_frame_are_a_class(y, width):
     framed = np.pad(np.where(y == 255, 9, y), width, constant_values=9)
     return trimap_band(framed, width)[width:-width, width:-width] & (y != 255)

@@ -91,7 +91,7 @@ def parts(z, y):
     return p, (y[..., None] == np.arange(z.shape[-1])).astype(float), (y != 255)[..., None]
 
 
-@wrong("All logits of a pixel move, each by the share of its class: yours moves only the true one.")
+@wrong("All logits of a pixel move, each by the share of its class: you move only the true one.")
 def true_logit_alone(z, y, shares, tau):
     p, Y, counted = parts(z + tau * np.log(shares) * parts(z, y)[1], y)
     return (p - Y) * counted
@@ -115,7 +115,7 @@ def shares_as_weights(z, y, shares, tau):
     return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
 
 
-@wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
+@wrong("Subtract each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
 def one_maximum_for_all(z, y, shares, tau):
     a = z + tau * np.log(shares)
     e = np.exp(a - a.max())
@@ -123,7 +123,9 @@ def one_maximum_for_all(z, y, shares, tau):
     return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
 
 
-@wrong("log(tau * shares) is log(shares) plus one number for all classes, which changes nothing. Where must tau stand?")
+@wrong(
+    "log(tau * shares) is log(shares) plus one number for all classes, which changes nothing. Where does tau belong?"
+)
 def tau_inside_the_logarithm(z, y, shares, tau):
     p, Y, counted = parts(z + np.log(tau * shares), y)
     return (p - Y) * counted

@@ -50,7 +50,7 @@ def ratios_multiplied(z, w, shares, new_shares):
     return z * new_shares / (w * shares)
 
 
-@wrong("Logits go in, and logits come out.")
+@wrong("Logits go in and logits come out.")
 def probabilities(z, w, shares, new_shares):
     q = np.exp(z - np.logaddexp.reduce(z, axis=-1, keepdims=True)) * new_shares / (w * shares)
     return q / q.sum(axis=-1, keepdims=True)
@@ -73,6 +73,6 @@ def by_exponentials(z, w, shares, new_shares):
     return np.log(p * new_shares / (w * shares))
 
 
-@wrong("Logits may lie as low as they like: how low can log(p + epsilon) be, and do you need p?", epsilon=EPSILONS)
+@wrong("Logits may be as low as they like: how low can log(p + epsilon) be, and do you need p?", epsilon=EPSILONS)
 def by_probabilities_and(z, w, shares, new_shares, epsilon):
     return np.log(probabilities(z, w, shares, new_shares) + epsilon)

@@ -82,7 +82,7 @@ def weights_of_mean_one_over_classes(counts, power):
     return w
 
 
-@wrong("A class without pixels gets 1 and has no part in the mean; you count it as one pixel.")
+@wrong("A class without pixels gets 1 and is not part of the mean; you count it as one pixel.")
 def absent_class_as_one_pixel(counts, power):
     n = np.maximum(counts, 1)
     return n**-power * n.sum() / (n @ n**-power)

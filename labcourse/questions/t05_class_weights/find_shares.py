@@ -106,7 +106,7 @@ def of_rounds(z, shares, rounds, believed, first=None):
     return repeated(lambda guess: believed(z, guess).mean(axis=0), shares if first is None else first, rounds)
 
 
-@wrong("The network was trained with weights, and its logits still hold them. Where do you take them out?")
+@wrong("The network was trained with weights, and they are still in its logits. Where do you take them out?")
 def weights_left_in(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / shares)))
 
@@ -116,9 +116,7 @@ def ratio_upside_down(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(shares / guess / w)))
 
 
-@wrong(
-    "You change what the last round has changed. A guess replaces the shares of training: what does a round begin with?"
-)
+@wrong("You change what the last round changed. A guess replaces the training shares: what does each round begin with?")
 def shifts_added_up(z, w, shares, rounds):
     a, guess = z.reshape(-1, z.shape[-1]) - np.log(w), shares
     for _ in range(rounds):
@@ -127,7 +125,7 @@ def shifts_added_up(z, w, shares, rounds):
     return guess
 
 
-@wrong("You take the weights out in every round. Once they are out, the logits hold them no more.")
+@wrong("You take the weights out in every round. Once is enough: after that, they are no longer in the logits.")
 def weights_taken_out_each_time(z, w, shares, rounds):
     a, guess = z.reshape(-1, z.shape[-1]), shares
     for _ in range(rounds):
@@ -136,7 +134,7 @@ def weights_taken_out_each_time(z, w, shares, rounds):
     return guess
 
 
-@wrong("The network's logits changed, round after round: yours start from those of the round before, weights and all.")
+@wrong("You start each round from the logits of the round before, weights and all. Which logits should it start from?")
 def all_shifts_added_up(z, w, shares, rounds):
     a, guess = z.reshape(-1, z.shape[-1]), shares
     for _ in range(rounds):
@@ -167,13 +165,13 @@ def summed_over_everything(z, w, shares, rounds):
     return repeated(step, shares, rounds)
 
 
-@wrong("The mean is one over all pixels. In an image they lie along two axes: over how many does yours go?")
+@wrong("The mean runs over all pixels. In an image they lie along two axes: over how many do you take it?")
 def mean_over_the_first_axis(z, w, shares, rounds):
     return repeated(lambda guess: softmax(z + np.log(guess / shares / w)).mean(axis=0), shares, rounds)
 
 
 @wrong(
-    "The weights are in each pixel's probabilities. From their mean nothing can take them out: when can you?",
+    "The weights are in each pixel's probabilities. They cannot be taken out of the mean: when can they?",
     how=("each time", "at last"),
 )
 def weights_taken_out_of_the_mean(z, w, shares, rounds, how):
@@ -185,7 +183,7 @@ def weights_taken_out_of_the_mean(z, w, shares, rounds, how):
     return guess
 
 
-@wrong("The guess after the last round is asked for, alone.", first=(0, 1))
+@wrong("Return only the guess after the last round.", first=(0, 1))
 def all_guesses(z, w, shares, rounds, first):
     return np.array([shares, *(find_shares(z, w, shares, k + 1) for k in range(rounds))][first:])
 
@@ -199,7 +197,7 @@ def pixels_counted(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, one_hot)
 
 
-@wrong("The mean is one of probabilities, each pixel's own. Yours is one of logits, of which you take the softmax.")
+@wrong("The mean is one of probabilities, each pixel's own. You take a mean of logits, and then its softmax.")
 def mean_of_logits(z, w, shares, rounds):
     def one(z, guess):
         return softmax((z + np.log(guess) - np.log(w * shares)).mean(axis=0, keepdims=True))
@@ -208,7 +206,7 @@ def mean_of_logits(z, w, shares, rounds):
 
 
 @wrong(
-    "Each pixel's probabilities must sum to 1 before you take their mean; yours only do on the average.",
+    "Each pixel's probabilities must sum to 1 before you take their mean; yours do so only on average.",
     of=("probabilities", "likelihoods"),
 )
 def normalised_after_the_mean(z, w, shares, rounds, of):
@@ -220,7 +218,7 @@ def normalised_after_the_mean(z, w, shares, rounds, of):
     return guess
 
 
-@wrong("You ask each class on its own, yes or no. A pixel is of one class: its probabilities sum to 1.", summed=(0, 1))
+@wrong("You ask each class on its own, yes or no. A pixel has one class: its probabilities sum to 1.", summed=(0, 1))
 def sigmoids(z, w, shares, rounds, summed):
     def believed(z, guess):
         p = 1.0 / (1.0 + np.exp(-(z + np.log(guess / shares / w))))
@@ -234,12 +232,14 @@ def one_round(z, w, shares, rounds):
     return find_shares(z, w, shares, 1)
 
 
-@wrong("Your guess is that of another round. Where does your loop begin, after which step does it end?", more=(-1, 1))
+@wrong(
+    "Your guess is that of another round. Where does your loop begin, and after which step does it end?", more=(-1, 1)
+)
 def rounds_miscounted(z, w, shares, rounds, more):
     return find_shares(z, w, shares, rounds + more)
 
 
-@wrong("The first guess is the shares of training. Yours gives all classes the same one.")
+@wrong("The first guess is the training shares. You give all classes the same share.")
 def from_equal_shares(z, w, shares, rounds):
     first = np.full(len(shares), 1.0 / len(shares))
     return of_rounds(z, shares, rounds, lambda z, guess: softmax(z + np.log(guess / shares / w)), first)
@@ -276,7 +276,7 @@ def that_overflows(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, believed)
 
 
-@wrong("Take off each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
+@wrong("Subtract each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
 def one_maximum_for_all(z, w, shares, rounds):
     def believed(z, guess):
         a = z + np.log(guess / shares / w)

@@ -54,17 +54,17 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("That is the most likely class. Saying it may be the dearest mistake: where does `cost` come in?")
+@wrong("That is the most likely class. Naming it may be the most expensive mistake: where do you use `cost`?")
 def most_likely(q, cost):
     return q.argmax(axis=-1)
 
 
-@wrong("Your price depends on the true class alone. Here it depends on the class that is said, too.")
+@wrong("Your cost depends on the true class alone. Here it also depends on the class that is named.")
 def one_weight_per_class(q, cost):
     return (q * cost.sum(axis=1)).argmax(axis=-1)
 
 
-@wrong("You decide for the class that costs most.")
+@wrong("You choose the class that costs most.")
 def dearest(q, cost):
     return (q @ cost).argmax(axis=-1)
 
@@ -74,7 +74,7 @@ def right_for_nothing(q, cost):
     return (q @ (cost * (1.0 - np.eye(len(cost))))).argmin(axis=-1)
 
 
-@wrong("You decide as if the most probable class were surely the true one. What does it cost if another one is?")
+@wrong("You decide as if the most probable class were certainly the true one. What does it cost if it is not?")
 def cheapest_for_the_most_likely(q, cost):
     return cost[q.argmax(axis=-1)].argmin(axis=-1)
 
@@ -89,7 +89,7 @@ def summed_over_what_is_said(q, cost):
     return (q[..., None] * cost).sum(axis=-1).argmin(axis=-1)
 
 
-@wrong("q[i] multiplies cost[i, j], the row of the true class: does it multiply a column in yours?")
+@wrong("q[i] multiplies cost[i, j], the row of the true class: do you multiply a column?")
 def rows_and_columns_exchanged(q, cost):
     return (q @ cost.T).argmin(axis=-1)
 
@@ -99,6 +99,6 @@ def the_least_price(q, cost):
     return (q @ cost).min(axis=-1)
 
 
-@wrong("What it costs to say j depends on the true class: weigh row i of `cost` by q[i], and add up the rows.")
+@wrong("The cost of naming j depends on the true class: weight row i of `cost` by q[i], and add up the rows.")
 def column_sums(q, cost):
     return np.argmin(cost.sum(axis=0) * (1 - q), axis=-1)

@@ -67,7 +67,7 @@ def means_not_weighted(z, y, w):
     return float(loss.mean()), float(loss.sum() / weight.sum())
 
 
-@wrong("The first mean is one of weighted losses, too: the two differ only in what they are divided by.")
+@wrong("The first mean also averages weighted losses: the two differ only in what they are divided by.")
 def first_mean_not_weighted(z, y, w):
     loss, weight = losses_and_weights(z, y, w)
     return float(loss.mean()), float((loss * weight).sum() / weight.sum())
@@ -91,7 +91,7 @@ def means_that_overflow(z, y, w):
     return of_log_probabilities(np.log(p), y, w)
 
 
-@wrong("The probabilities of one pixel add up to 1: along which axis of z do its classes stand?")
+@wrong("The probabilities of one pixel add up to 1: which axis of z holds its classes?")
 def normalised_along_the_first_axis(z, y, w):
     return of_log_probabilities(z - np.logaddexp.reduce(z, axis=0, keepdims=True), y, w)
 

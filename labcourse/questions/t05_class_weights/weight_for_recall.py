@@ -77,7 +77,7 @@ def of_all_pixels(q1, y, recall):
     return weight_for_recall(q1, np.ones_like(y), recall)
 
 
-@wrong("Pixels are found from the surest to the least sure; yours starts with the least sure one.")
+@wrong("Pixels are found from the surest to the least sure; you start with the least sure one.")
 def from_below(q1, y, recall):
     return 1.0 / weight_for_recall(1.0 - q1, y, recall)
 
@@ -94,7 +94,7 @@ def the_threshold(q1, y, recall):
     return 1.0 / (1.0 + weight_for_recall(q1, y, recall))
 
 
-@wrong("Class 1 is called where w q1 reaches 1 - q1: what must w q1 reach in yours?")
+@wrong("Class 1 is predicted where w q1 reaches 1 - q1: what must w q1 reach in your answer?")
 def against_one(q1, y, recall):
     return 1.0 + weight_for_recall(q1, y, recall)
 
@@ -118,7 +118,7 @@ def at_least_one(q1, y, recall):
 
 
 @wrong(
-    "By rounding, (1 - q) / q * q can be just below 1 - q. Give the limit a little room, or sort the pixels instead."
+    "By rounding, (1 - q) / q * q can be just below 1 - q. Give the limit a little slack, or sort the pixels instead."
 )
 def tried_without_room(q1, y, recall):
     odds = np.unique((1.0 - q1) / q1)  # a larger one finds no fewer
@@ -146,7 +146,7 @@ def as_many_of_all_pixels(q1, y, recall):
     return float((1.0 - last) / last)
 
 
-@wrong("You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
+@wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
 def weight_for_precision(q1, y, recall):
     odds = np.unique((1.0 - q1) / q1)
     return float(next(w for w in odds if np.mean(y[w * q1 >= 1.0 - q1]) >= recall))
@@ -165,7 +165,7 @@ def equal_ones_counted_once(q1, y, recall):
     return weight_for_recall(once, np.ones(len(once), bool), recall)
 
 
-@wrong("You divide by the pixels that are called class 1, and that is precision: what is recall a share of?")
+@wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
 def largest_pixel_with_precision(q1, y, recall):
     """The least sure pixel down to which enough of those that are called class 1 are."""
     last = [q for q in np.sort(q1) if y[q1 >= q].mean() >= recall]

@@ -97,7 +97,7 @@ def whatever_the_hand_has_now(Sigma, now, how):
     return told(yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]), now, how)
 
 
-@wrong("An axis comes back to itself after half a turn, pi, not after a whole one: which multiples may you add?")
+@wrong("An axis returns to itself after half a turn, pi, not after a whole one: which multiples may you add?")
 def nearest_by_whole_turns(Sigma, now):
     yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
     return yaw + 2 * np.pi * np.round((now - yaw) / (2 * np.pi))
@@ -138,7 +138,7 @@ def next_one_below(Sigma, now):
     return now - (now - yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])) % np.pi
 
 
-@wrong("Half a turn is pi: adding quarter turns takes closing along x for closing along y.")
+@wrong("Half a turn is pi: adding quarter turns confuses closing along x with closing along y.")
 def nearest_by_quarter_turns(Sigma, now):
     yaw = yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0])
     return yaw + np.pi / 2 * np.round((now - yaw) / (np.pi / 2))
@@ -202,7 +202,7 @@ def double_angle_not_halved(Sigma, now, how):
 
 
 @wrong(
-    "Your yaw does not see the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.",
+    "Your yaw ignores the sign of Sigma[0, 1], so it cannot tell a thing from its mirror image.",
     how=(AS_IT_COMES, NEAREST),
 )
 def variances_as_a_direction(Sigma, now, how):
@@ -210,14 +210,14 @@ def variances_as_a_direction(Sigma, now, how):
 
 
 @wrong(
-    "Only 0 and 90 degrees are in your choice. A thing can lie at any angle: what does Sigma[0, 1] tell?",
+    "You choose only between 0 and 90 degrees. A thing can lie at any angle: what does Sigma[0, 1] tell you?",
     how=(AS_IT_COMES, NEAREST),
 )
 def smaller_of_the_two_variances(Sigma, now, how):
     return told(0.0 if Sigma[0, 0] < Sigma[1, 1] else np.pi / 2, now, how)
 
 
-@wrong("From above one sees x and y: which rows and columns of Sigma are they?", how=(AS_IT_COMES, NEAREST))
+@wrong("From above you see x and y: which rows and columns of Sigma are they?", how=(AS_IT_COMES, NEAREST))
 def seen_from_the_side(Sigma, now, how):
     return told(yaw_of(np.linalg.eigh(Sigma[1:, 1:])[1][:, 0]), now, how)
 
@@ -236,7 +236,7 @@ def arctan_of_the_quotient(Sigma, now, how):
         return told(0.5 * np.arctan(2.0 * Sigma[0, 1] / (Sigma[0, 0] - Sigma[1, 1])) + np.pi / 2, now, how)
 
 
-@wrong("Modulo pi / 2 takes closing along x for closing along y: which turn brings an axis back to itself?")
+@wrong("Modulo pi / 2 confuses closing along x with closing along y: which turn brings an axis back to itself?")
 def modulo_a_right_angle(Sigma, now):
     return yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]) % (np.pi / 2)
 
@@ -247,7 +247,7 @@ def fixed_half_turns_from_0(Sigma, now, turns):
     return min((yaw + turn * np.pi for turn in turns), key=lambda angle: abs(angle - now))
 
 
-@wrong("`now` is in radians, and radians are asked for: where do degrees come in?", nearest=(False, True))
+@wrong("`now` is in radians, and so is the answer: where do degrees come in?", nearest=(False, True))
 def in_degrees(Sigma, now, nearest):
     yaw = np.degrees(yaw_of(np.linalg.eigh(Sigma[:2, :2])[1][:, 0]))
     return yaw + 180 * np.round((now - yaw) / 180) if nearest else yaw

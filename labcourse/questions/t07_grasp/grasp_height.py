@@ -78,42 +78,42 @@ def palm_forgotten(P, table_z, palm, tips, clearance):
     return max(P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong("Only the upper part was seen, and you reach below it: nobody knows what is there.")
+@wrong("Only the upper part was seen, and you reach below it: what is there is unknown.")
 def unseen_depth(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, table_z + clearance) + tips
 
 
-@wrong("All three bounds are heights of the tips, and you add tips to the table's alone.")
+@wrong("All three bounds are heights of the tips, but you add tips only to the table's.")
 def origin_from_the_table_alone(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance + tips)
 
 
-@wrong("The object's top is a height in the base frame. You take how tall the object is.")
+@wrong("The object's top is a height in the base frame. You use the object's own height.")
 def tallness_for_the_top(P, table_z, palm, tips, clearance):
     return max(np.ptp(P[:, 2]) - palm, P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong("clearance is air between the tips and the table: to which of the three bounds does it belong?")
+@wrong("clearance is the gap between the tips and the table: to which of the three bounds does it belong?")
 def clearance_below_the_palm_too(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm + clearance, P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong("clearance is air above the table: at which height is the table?")
+@wrong("clearance is measured from the table: at which height is the table?")
 def table_at_zero(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, P[:, 2].min(), clearance) + tips
 
 
-@wrong("A table may stand lower than the robot's base: what lies at height 0?")
+@wrong("A table may be lower than the robot's base: what is at height 0?")
 def never_below_the_base(P, table_z, palm, tips, clearance):
     return max(0.0, P[:, 2].max() - palm, P[:, 2].min(), table_z + clearance) + tips
 
 
-@wrong("All three bounds are heights of the tips: to which of yours do you add no tips?")
+@wrong("All three bounds are heights of the tips: to which of them do you not add tips?")
 def origin_without_the_palms_bound(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, P[:, 2].min() + tips, table_z + clearance + tips)
 
 
-@wrong("P has x and y as well: what is the largest number in all of it?")
+@wrong("P has x and y as well: which of them may hold the largest number?")
 def extremes_of_all_coordinates(P, table_z, palm, tips, clearance):
     return max(P.max() - palm, P.min(), table_z + clearance) + tips
 

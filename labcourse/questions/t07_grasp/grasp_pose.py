@@ -80,7 +80,7 @@ def left_handed_pose(position, approach, closing):
     return pose(np.cross(z, y), y, z, position)
 
 
-@wrong("Is y dot z 0? What of the closing direction lies along the approach must be taken off first.")
+@wrong("Is y dot z 0? First subtract the part of the closing direction that lies along the approach.")
 def closing_taken_as_it_is(position, approach, closing):
     y, z = unit(closing), unit(approach)
     return pose(np.cross(y, z), y, z, position)
@@ -93,7 +93,7 @@ def closing_crossed_with_the_approach(position, approach, closing):
     return pose(np.cross(y, z), y, z, position)
 
 
-@wrong("Leaving out z suits a hand from above alone: take off what lies along the approach, wherever it points.")
+@wrong("Leaving out z works only for a hand from above: subtract the part along the approach, wherever it points.")
 def closing_made_level(position, approach, closing):
     y, z = unit(closing * (1.0, 1.0, 0.0)), unit(approach)
     return pose(np.cross(y, z), y, z, position)
@@ -106,13 +106,13 @@ def approach_bent(position, approach, closing):
     return pose(np.cross(y, z), y, z, position)
 
 
-@wrong("How long is the approach that you are given? What is taken off must not depend on its length.")
+@wrong("How long is the approach that you are given? The part that you subtract must not depend on its length.")
 def projected_on_a_long_vector(position, approach, closing):
     y, z = unit(closing - (closing @ approach) * approach), unit(approach)
     return pose(np.cross(y, z), y, z, position)
 
 
-@wrong("y gets shorter when the part along z is taken off: which length has it at the end?")
+@wrong("y gets shorter when the part along z is subtracted: what is its length at the end?")
 def closing_left_short(position, approach, closing):
     y, z = unit(closing), unit(approach)
     y = y - (y @ z) * z
@@ -145,7 +145,7 @@ def position_in_the_last_row(position, approach, closing):
     return T
 
 
-@wrong("Leaving out z suits a hand from above alone: take off what lies along the approach, wherever it points.")
+@wrong("Leaving out z works only for a hand from above: subtract the part along the approach, wherever it points.")
 def closing_made_level_and_x_a_unit(position, approach, closing):
     y, z = unit(closing * (1.0, 1.0, 0.0)), unit(approach)
     return pose(unit(np.cross(y, z)), y, z, position)

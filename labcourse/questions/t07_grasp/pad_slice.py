@@ -98,21 +98,21 @@ def whole_cloud(P, T_base_grasp, half):
     return middle_and_width(in_grasp(P, T_base_grasp)[1])
 
 
-@wrong("A median leans to the side that shows more points; the jaws meet the two outermost ones.")
+@wrong("A median is pulled towards the side with more points; the jaws meet the two outermost ones.")
 def median_for_the_middle(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     y = y[np.abs(x) <= half]
     return (np.median(y), np.ptp(y)) if len(y) else (0.0, 0.0)
 
 
-@wrong("A mean leans to the side that shows more points; the jaws meet the two outermost ones.")
+@wrong("A mean is pulled towards the side with more points; the jaws meet the two outermost ones.")
 def mean_for_the_middle(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     y = y[np.abs(x) <= half]
     return (y.mean(), np.ptp(y)) if len(y) else (0.0, 0.0)
 
 
-@wrong("The jaws close along y of the grasp frame, and the pads are broad along x.")
+@wrong("The jaws close along y of the grasp frame, and the pads are wide along x.")
 def x_for_y(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(x[np.abs(y) <= half])
@@ -124,13 +124,13 @@ def cut_in_the_base_frame(P, T_base_grasp, half):
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong("A pad reaches half of its breadth to either side of the middle.")
+@wrong("A pad extends half its width to either side of the middle.")
 def one_side_of_the_pad(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[(x >= 0.0) & (x <= half)])
 
 
-@wrong("A single point between the pads is a slice, too: its middle is that point, and only its width is 0.")
+@wrong("A single point between the pads is a slice, too: its middle is that point and its width is 0.")
 def one_point_is_nothing(P, T_base_grasp, half):
     middle, width = pad_slice(P, T_base_grasp, half)
     return (middle if width > 0.0 else 0.0), width
@@ -142,13 +142,13 @@ def half_of_the_width(P, T_base_grasp, half):
     return width / 2, width
 
 
-@wrong("The position is a point of the base frame: take it off before you turn, not after.")
+@wrong("The position is a point of the base frame: subtract it before you rotate, not after.")
 def position_taken_off_after_the_turn(P, T_base_grasp, half):
     x, y, _ = (P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong("Beside the pads your y becomes 0: may a point that is not in the slice be one of the outermost?")
+@wrong("You set y to 0 outside the pads: may a point that is not in the slice be one of the outermost?")
 def zero_beside_the_pads(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y * (np.abs(x) <= half))
@@ -167,7 +167,7 @@ def twice_the_larger_side(P, T_base_grasp, half):
     return middle_and_width(y)[0], 2.0 * np.abs(y).max(initial=0.0)
 
 
-@wrong("The pads are broad along x: which coordinate says whether a point lies between them?")
+@wrong("The pads are wide along x: which coordinate says whether a point lies between them?")
 def cut_along_y(P, T_base_grasp, half):
     _, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[np.abs(y) <= half])
@@ -179,7 +179,7 @@ def transform_not_inverted(P, T_base_grasp, half):
     return middle_and_width(y[np.abs(x) <= half])
 
 
-@wrong("You turn the points: where is the origin of the grasp frame, and where is it for you?")
+@wrong("You rotate the points: where is the origin of the grasp frame, and where is yours?")
 def position_not_taken_off(P, T_base_grasp, half):
     x, y, _ = (P @ T_base_grasp[:3, :3]).T
     return middle_and_width(y[np.abs(x) <= half])
@@ -191,7 +191,7 @@ def edges_left_out(P, T_base_grasp, half):
     return middle_and_width(y[np.abs(x) < half])
 
 
-@wrong("x has two signs: what does x <= half say of a point far away on the negative side?")
+@wrong("x has two signs: what does x <= half say about a point far away on the negative side?")
 def one_edge_alone(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(y[x <= half])

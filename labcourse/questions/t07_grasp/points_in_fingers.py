@@ -110,12 +110,12 @@ def transform_not_inverted(P, T_base_grasp, *boxes):
     return in_boxes(*moved(P, T_base_grasp), *boxes)
 
 
-@wrong("The position is a point of the base frame: take it off before you turn, not after.")
+@wrong("The position is a point of the base frame: subtract it before you rotate, not after.")
 def position_taken_off_after_the_turn(P, T_base_grasp, *boxes):
     return in_boxes(*(P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T, *boxes)
 
 
-@wrong("What lies lower than the tips is in nobody's way. The frame's z points down.")
+@wrong("What lies lower than the tips is not in the way. The frame's z points down.")
 def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)
 
@@ -132,14 +132,14 @@ def one_finger(P, T_base_grasp, width, half, thickness, tips):
     return in_boxes(x, np.where(y >= 0.0, y, np.nan), z, width, half, thickness, tips)
 
 
-@wrong("What stands between the pads is what you want to hold: it is not in the way.")
+@wrong("What is between the pads is what you want to hold: it is not in the way.")
 def between_the_pads_too(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     inside = (np.abs(x) <= half) & (np.abs(y) <= width / 2 + thickness) & (z <= tips)
     return int(inside.sum())
 
 
-@wrong("The fingers reach up from the tips without end: a point with z far below 0 is in their way, too.")
+@wrong("The fingers extend upwards from the tips without limit: a point with z far below 0 is in their way, too.")
 def near_the_tips_alone(P, T_base_grasp, *boxes):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, np.abs(z), *boxes)
@@ -158,12 +158,12 @@ def heights_of_the_base_frame(P, T_base_grasp, width, half, thickness, tips):
     return in_boxes(x, y, T_base_grasp[2, 3] - P[:, 2], width, half, thickness, tips)
 
 
-@wrong("A finger begins at its pad and reaches outwards; yours has the pad in its middle.")
+@wrong("A finger begins at its pad and extends outwards; yours has the pad in its middle.")
 def fingers_astride_their_pads(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width - thickness, half, thickness, tips)
 
 
-@wrong("A finger ends `thickness` outside its pad: what is still further out is in nobody's way.")
+@wrong("A finger ends `thickness` outside its pad: anything further out is not in the way.")
 def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, np.inf, tips)
 
@@ -192,7 +192,7 @@ def pads_and_outer_sides_left_out(P, T_base_grasp, width, half, thickness, tips)
     return int(((np.abs(x) <= half) & (out > 0.0) & (out < thickness) & (z <= tips)).sum())
 
 
-@wrong("Python reads & before |, as it reads * before +: which finger do x and z cut in yours?", first=(1.0, -1.0))
+@wrong("Python reads & before |, as it reads * before +: which finger do your x and z apply to?", first=(1.0, -1.0))
 def or_after_and(P, T_base_grasp, width, half, thickness, tips, first):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     out, near = first * y - width / 2, (np.abs(x) <= half) & (z <= tips)

@@ -44,13 +44,13 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("Turn the hand by 90 degrees: which of the two errors do the jaws undo then? Which frame knows?")
+@wrong("Turn the hand by 90 degrees: which of the two errors do the jaws undo then? Which frame tells you?")
 def in_the_base_frame(T_base_grasp, middle):
     off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
     return off[1], off[0]
 
 
-@wrong("Height is no slip: what is left is along the pads, the x axis of the grasp frame.")
+@wrong("Height is not slip: what is left is along the pads, the x axis of the grasp frame.")
 def height_counted_too(T_base_grasp, middle):
     off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
     return np.abs(off[1]), np.hypot(off[0], off[2])
@@ -75,19 +75,19 @@ def left_in_the_tables_plane(T_base_grasp, middle):
     return pushed, np.sqrt(np.maximum(off @ off - pushed**2, 0.0))
 
 
-@wrong("The base's x is where the jaws close in the example only: which column of T says so for any hand?")
+@wrong("The jaws close along the base's x only in the example: which column of T gives the direction for any hand?")
 def in_the_base_frame_of_the_example(T_base_grasp, middle):
     off = 1000.0 * np.abs(middle - T_base_grasp[:3, 3])
     return off[0], off[1]
 
 
-@wrong("The position is a point of the base frame: take it off before you turn, not after.")
+@wrong("The position is a point of the base frame: subtract it before you rotate, not after.")
 def position_taken_off_after_the_turn(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ middle - T_base_grasp[:3, 3])
     return off[1], off[0]
 
 
-@wrong("Distances at right angles add as squares: the whole less the pushed part is not the slip.")
+@wrong("Distances at right angles add as squares: the whole minus the pushed part is not the slip.")
 def lengths_subtracted(T_base_grasp, middle):
     off = 1000.0 * (middle - T_base_grasp[:3, 3])
     pushed = np.abs(off @ T_base_grasp[:3, 1])
@@ -107,13 +107,13 @@ def in_metres(T_base_grasp, middle):
     return off[1], off[0]
 
 
-@wrong("The jaws close along y of the grasp frame: that part is pushed, and it is asked for first.")
+@wrong("The jaws close along y of the grasp frame: that part is pushed, and it comes first.")
 def exchanged(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
     return off[0], off[1]
 
 
-@wrong("A slip is a distance: what do yours say if the middle lies on the other side of the hand?")
+@wrong("A slip is a distance: what is yours if the middle lies on the other side of the hand?")
 def with_signs(T_base_grasp, middle):
     off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
     return off[1], off[0]

@@ -90,19 +90,19 @@ def padding_as_pixels(data, height, width, step, is_bigendian):
     return metres(units(pixels, height, width, 2 * width, ">" if is_bigendian else "<"))
 
 
-@wrong("A row takes step bytes, and its pixels 2 width of them: what do you do with the rest?")
+@wrong("A row takes step bytes, its pixels 2 * width of them: what do you do with the rest?")
 def padding_as_pixels_of_all_bytes(data, height, width, step, is_bigendian):
     numbers = np.frombuffer(bytes(data), ">u2" if is_bigendian else "<u2")  # raises if their count is odd
     return metres(numbers[: height * width].reshape(height, width))
 
 
-@wrong("65535 has become -1: the numbers have no sign. Which type is that?")
+@wrong("65535 has become -1: the numbers are unsigned. Which type is that?")
 def signed_distances(data, height, width, step, is_bigendian):
     numbers = units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16)
     return np.where(numbers == 0, np.nan, numbers / 1000)
 
 
-@wrong("What is far away has become negative, or a hole. What does the U in 16UC1 stand for?")
+@wrong("Distant points have become negative, or holes. What does the U in 16UC1 stand for?")
 def signed_numbers(data, height, width, step, is_bigendian):
     return metres(units(data, height, width, step, ">" if is_bigendian else "<").astype(np.int16))
 
@@ -113,19 +113,19 @@ def low_byte_only(data, height, width, step, is_bigendian):
     return metres(numbers % 256)
 
 
-@wrong("The two bytes of a pixel stand side by side in the row, not half a row apart.")
+@wrong("The two bytes of a pixel are side by side in the row, not half a row apart.")
 def halves_of_a_row(data, height, width, step, is_bigendian):
     rows = data.reshape(height, step)[:, : 2 * width].reshape(height, 2, width)
     return decode_depth(rows.transpose(0, 2, 1).ravel(), height, width, 2 * width, is_bigendian)
 
 
-@wrong("The padding stands at a row's end: where do the row's pixels begin?")
+@wrong("The padding is at a row's end: where do the row's pixels begin?")
 def padding_in_front(data, height, width, step, is_bigendian):
     rows = data.reshape(height, step)[:, step - 2 * width :]
     return decode_depth(rows.ravel(), height, width, 2 * width, is_bigendian)
 
 
-@wrong("65535 is a distance here, 65.535 m: which number alone says that nothing was seen?")
+@wrong("65535 is a distance here, 65.535 m: which is the only number that means that nothing was seen?")
 def largest_for_a_hole(data, height, width, step, is_bigendian):
     depth = decode_depth(data, height, width, step, is_bigendian)
     return np.where(depth > 65.534, np.nan, depth)

@@ -75,17 +75,17 @@ def holes_kept(P):
     return packed(P).ravel()
 
 
-@wrong("Points with NaN have become (0, 0, 0), a place in the robot's base. They should be left out.")
+@wrong("Points with NaN have become (0, 0, 0), a position in the robot's base. They should be left out.")
 def holes_as_origin(P):
     return packed(np.where(np.isfinite(P).all(axis=1, keepdims=True), P, 0.0)).ravel()
 
 
-@wrong("astype(np.uint8) makes one byte of each number, its whole part. A float32 has four: how do you get at these?")
+@wrong("astype(np.uint8) turns each number into one byte, its whole part. A float32 has four: how do you get at them?")
 def numbers_cast_to_bytes(P):
     return np.pad(finite(P), ((0, 0), (0, 1))).astype(np.uint8).ravel()
 
 
-@wrong("A point of yours takes 32 bytes: float32 has 4 bytes per number. How many has float64?")
+@wrong("Your points take 32 bytes each: float32 has 4 bytes per number. How many does float64 have?")
 def double_precision(P):
     return packed(finite(P), "<f8", padding=8).ravel()
 
@@ -100,20 +100,20 @@ def no_padding(P):
     return packed(finite(P), padding=0).ravel()
 
 
-@wrong("The bytes of one point stand together: x, y, z, then the next point.")
+@wrong("The bytes of one point are together: x, y, z, then the next point.")
 def axis_after_axis(P):
     cloud = finite(P)
     numbers = np.column_stack([cloud, np.zeros(len(cloud))])
     return np.frombuffer(numbers.T.astype("<f4").tobytes(), np.uint8)
 
 
-@wrong("The bytes of one point stand together: x, y, z, then the next point.")
+@wrong("The bytes of one point are together: x, y, z, then the next point.")
 def axis_after_axis_and_zeros_with_signs(P):
     x, y, z = finite(P).T
     return np.frombuffer(np.array([x, y, z, 0.0 * x], "<f4").tobytes(), np.uint8)
 
 
-@wrong("Each point has its own four bytes of 0: what stands at bytes 12 to 15 of yours?")
+@wrong("Each point has its own four bytes of 0: what is in your bytes 12 to 15?")
 def padding_after_the_last_point(P):
     return np.append(packed(finite(P), padding=0), np.zeros(4 * len(finite(P)), np.uint8))
 
@@ -138,6 +138,6 @@ def infinite_ones_kept(P):
     return packed(P[~np.isnan(P).any(axis=1)]).ravel()
 
 
-@wrong("(0, 0, 0) is a point of the base frame like others: what says that a point is a hole?")
+@wrong("(0, 0, 0) is a point of the base frame like any other: what marks a point as a hole?")
 def origin_for_a_hole(P):
     return packed(finite(P)[(finite(P) != 0.0).any(axis=1)]).ravel()

@@ -109,7 +109,7 @@ def one_partner_for_two(a, b, slop):
 
 
 @wrong(
-    "The first that asks gets the stamp of b, although a later one is nearer to it: which is nearest to that stamp?",
+    "You give a stamp of b to the first stamp of a that asks, though a later one is nearer: which is nearest to it?",
     next_best=(True, False),
 )
 def first_come_first_served(a, b, slop, next_best):
@@ -122,7 +122,7 @@ def first_come_first_served(a, b, slop, next_best):
     return j
 
 
-@wrong("A frame whose partner was lost must stay alone: what is slop for?")
+@wrong("A frame whose partner was lost must remain alone: what is slop for?")
 def no_bound(a, b, slop):
     return pairs(a, b, FAR, lambda x, y: np.abs(x - y))
 
@@ -137,12 +137,12 @@ def never_earlier(a, b, slop):
     return pairs(a, b, slop, lambda x, y: np.where(y >= x, y - x, FAR))
 
 
-@wrong("Where all stamps of b are too far, argmin is still a number, 0: what is asked for there?")
+@wrong("Where all stamps of b are too far, argmin still returns a number, 0: what should the answer be?")
 def far_ones_left_in_argmin(a, b, slop):
     return pairs(a, b, FAR, lambda x, y: np.where(np.abs(x - y) <= slop, np.abs(x - y), FAR))
 
 
-@wrong("The partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
+@wrong("Your partner lies far in the future: -900 is smaller than 3, but is it nearer to 0?")
 def signed_difference(a, b, slop):
     return pairs(a, b, slop, lambda x, y: x - y)
 
@@ -158,7 +158,7 @@ def last_of_the_nearest(a, b, slop):
     return np.where(last == len(b), -1, last)
 
 
-@wrong("Of stamps that are equally near only the first is the nearest: how many pairs does yours make of them?")
+@wrong("Of stamps that are equally near only the first is the nearest: how many pairs do you make of them?")
 def all_of_the_nearest(a, b, slop):
     j = np.full(len(a), -1)
     for i, k in np.ndindex(len(a), len(b)):
@@ -198,7 +198,7 @@ def stamps_in_32_bits(a, b, slop):
     return pairs(a.astype(np.int32), b.astype(np.int32), slop, lambda x, y: np.abs(x - y))
 
 
-@wrong("A stamp whose nearest one belongs to another stays alone: does yours get the next best?")
+@wrong("A stamp whose nearest one belongs to another remains alone: do you give it the next best?")
 def next_best(a, b, slop):
     """The nearest pair of all first, then the nearest of what is left."""
     j, free = np.full(len(a), -1), np.ones(len(b), bool)
@@ -208,7 +208,7 @@ def next_best(a, b, slop):
     return j
 
 
-@wrong("0 is the number of b's first stamp: what does Python take it for after `if` or `and`?")
+@wrong("0 is the index of b's first stamp: how does Python read it after `if` or `and`?")
 def first_one_taken_for_none(a, b, slop):
     j = pair_stamps(a, b, slop)
     return np.where(j == 0, -1, j)

@@ -157,7 +157,7 @@ def arc(a, b, first, second, sine=np.sin, divided=True):
     return (sine(first * omega) * a + sine(second * omega) * b) / (sine(omega) if divided else 1.0)
 
 
-STRAIGHT = "At a quarter of the way the turn is not a quarter: is the straight line between a and b the arc?"
+STRAIGHT = "A quarter of the way along, your rotation is not a quarter: is the straight line between a and b the arc?"
 
 
 @wrong(STRAIGHT, scaled=(unit, np.asarray))
@@ -170,7 +170,7 @@ def each_number_of_the_turn_on_its_own(*given):
     return with_turn(*given, lambda a, b, share: unit((1 - share) * a + share * b))
 
 
-LONG = "A small turn has become a large one the other way round: which of b and -b is nearer to a?"
+LONG = "A small rotation has become a large one the other way round: which of b and -b is nearer to a?"
 
 
 @wrong(LONG)
@@ -189,7 +189,7 @@ def the_last_one_before(stamps, positions, quaternions, t):
     return outside(stamps, t) or (positions[i], quaternions[i])
 
 
-OUTSIDE = "Nobody knows where the camera is after the last pose: what should a node say then?"
+OUTSIDE = "After the last pose, where the camera is is unknown: what should a node say then?"
 
 
 @wrong(OUTSIDE)
@@ -208,7 +208,7 @@ def unknown_at_the_ends(stamps, positions, quaternions, t):
     return pose_at(stamps, positions, quaternions, t if known else stamps[-1] + 1)
 
 
-@wrong("Outside the stamps both outputs keep their shapes: how many numbers has a place, and how many has a turn?")
+@wrong("Outside the stamps both outputs keep their shapes: how many numbers does a position have, and a rotation?")
 def one_nan_each(stamps, positions, quaternions, t):
     return pose_at(stamps, positions, quaternions, t) if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
 
@@ -227,7 +227,7 @@ def stamps_in_seconds(stamps, positions, quaternions, t):
         return pose_at(stamps / 1e9, positions, quaternions, t / 1e9)
 
 
-@wrong("The turns are right. np.interp makes floats of stamps, which keep 16 of 19 digits: what do you subtract first?")
+@wrong("The rotations are right. np.interp turns stamps into floats, with 16 of 19 digits: what do you subtract first?")
 def places_by_floats(stamps, positions, quaternions, t):
     place = np.array([np.interp(t, stamps, column, np.nan, np.nan) for column in positions.T])
     unknown = np.isnan(place).any()
@@ -245,13 +245,13 @@ def share_of_floats(stamps, positions, quaternions, t):
     return (1 - share) * positions[i] + share * positions[i + 1], arc(a, nearer(a, b), 1 - share, share)
 
 
-@wrong("The places are right. The turn is that of a published pose: which turn lies between the two poses?")
+@wrong("The positions are right. Your rotation is that of a published pose: which rotation lies between the two?")
 def turn_of_the_one_before(*given):
     return with_turn(*given, lambda a, b, share: b if share >= 1 else a)
 
 
 @wrong(
-    "At a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?",
+    "After a quarter of the time you are three quarters of the way: which pose has the share s, which 1 - s?",
     side=("left", "right"),  # at a stamp it goes on from the pose before, or from that one
 )
 def shares_exchanged(stamps, positions, quaternions, t, side):
@@ -260,9 +260,7 @@ def shares_exchanged(stamps, positions, quaternions, t, side):
     return outside(stamps, t) or pose_at(stamps, positions, quaternions, then)
 
 
-@wrong(
-    "The angle is that of the shorter way, but the sum still holds the other b: negate b, too.", smallest=(1e-6, 0.0)
-)
+@wrong("The angle is that of the shorter way, but the sum still has the other b: negate b, too.", smallest=(1e-6, 0.0))
 def only_the_angle_made_shorter(*given, smallest):
     def turn(a, b, share):
         angle = max(np.arccos(min(abs(a @ b), 1.0)), smallest)
@@ -273,32 +271,30 @@ def only_the_angle_made_shorter(*given, smallest):
     return with_turn(*given, turn)
 
 
-@wrong("There are poses between the first and the last: which two stand round t?")
+@wrong("There are poses between the first and the last: which two are on either side of t?")
 def from_the_first_to_the_last(stamps, positions, quaternions, t):
     return pose_at(stamps[[0, -1]], positions[[0, -1]], quaternions[[0, -1]], t)
 
 
-@wrong("Two turns are equal, yours is NaN: by 0 / 0, or as arccos of a dot b, which rounding lifts above 1?")
+@wrong("Two rotations are equal and yours is NaN: from 0 / 0, or from arccos of a dot b, rounded to just above 1?")
 def nan_between_equal_turns(stamps, positions, quaternions, t):
     i, _ = neighbours(stamps, t)
     p, q = pose_at(stamps, positions, quaternions, t)
     return p, q * (np.nan if abs(quaternions[i] @ quaternions[i + 1]) > 1.0 else 1.0)
 
 
-@wrong("Omega is the angle between a and b, half the angle of the turn: which of the two do your sines take?")
+@wrong("Omega is the angle between a and b, half the angle of the rotation: which of the two is in your sines?")
 def angle_of_the_turn(*given):
     return with_turn(*given, lambda a, b, s: arc(a, nearer(a, b), 1 - s, s, sine=lambda omega: np.sin(2 * omega)))
 
 
-@wrong(
-    "At s = 0 the turn must be a: what is the factor of a in yours then, and what should it be?", side=("left", "right")
-)
+@wrong("At s = 0 the rotation must be a: what is your factor of a then, and what should it be?", side=("left", "right"))
 def not_divided_by_the_sine(*given, side):
     return with_turn(*given, lambda a, b, share: arc(a, nearer(a, b), 1 - share, share, divided=False), side)
 
 
 @wrong(
-    "The places are right. At s = 0 the turn must be a: which of a and b has the factor 0 in yours?",
+    "The positions are right. At s = 0 the rotation must be a: to which of a and b do you give the factor 0?",
     side=("left", "right"),
 )
 def shares_of_the_turn_exchanged(*given, side):

@@ -103,19 +103,19 @@ def row_of(R, which):
     return row / np.linalg.norm(row)
 
 
-@wrong("The numbers are right and stand in another order: which place has w in (x, y, z, w)?")
+@wrong("The numbers are right but in another order: which place does w have in (x, y, z, w)?")
 def w_first(R):
     return np.roll(quaternion(R), 1)
 
 
-@wrong("Half a turn about y or z has w = 0 and x = 0, too: your row is zeros then. Which square is the largest?")
+@wrong("Half a turn about y or z has both w = 0 and x = 0: your row is zeros then. Which square is the largest?")
 def x_where_w_is_small(R):
     q = quaternion(R)
     row = q * q[3 if np.trace(R) > 0.0 else 0]
     return row / np.linalg.norm(row)
 
 
-@wrong("The axis and the angle say it, too, but what is the length?")
+@wrong("The axis and the angle describe the rotation, too, but what is the length?")
 def rotation_vector(R):
     q = quaternion(R)
     q = -q if q[3] < 0.0 else q
@@ -130,7 +130,7 @@ def whole_angle(R):
     return np.array([*(np.sin(angle) * np.array([x, y, z])), np.cos(angle)])
 
 
-@wrong("No turn has x = y = z = 0, and your row is zeros then: is w one of the four that you choose from?")
+@wrong("The identity has x = y = z = 0, and your row is zeros then: is w one of the four that you choose from?")
 def largest_of_x_y_z(R):
     q = quaternion(R)
     row = q * q[np.diagonal(R).argmax()]
@@ -142,7 +142,7 @@ def floor_under_w(R):
     return from_trace(R, least=1e-12)
 
 
-@wrong("Half a turn is not no turn, although R - R.T is 0 for both: what does R + R.T say of the axis?")
+@wrong("Half a turn is not the identity, although R - R.T is 0 for both: what does R + R.T say about the axis?")
 def axis_of_half_turns_lost(R):
     still = np.allclose(R, R.T)
     return np.array([0.0, 0.0, 0.0, 1.0]) if still else quaternion(R)
@@ -153,12 +153,12 @@ def row_not_of_length_1(R):
     return products(R)[np.diagonal(products(R)).argmax()]
 
 
-@wrong("Your row holds x x, x y, x z and x w: what is left of it for a turn round z, where x is 0?")
+@wrong("Your row is x x, x y, x z and x w: what is left of it for a turn about z, where x is 0?")
 def always_the_row_of_x(R):
     return row_of(R, 0)
 
 
-@wrong("Your row holds x w, y w, z w and w w: what is left of it after half a turn, where w is 0?")
+@wrong("Your row is x w, y w, z w and w w: what is left of it after half a turn, where w is 0?")
 def always_the_row_of_w(R):
     return row_of(R, 3)
 
@@ -168,13 +168,13 @@ def row_of_the_smallest(R):
     return row_of(R, np.diagonal(products(R)).argmin())
 
 
-@wrong("After half a turn R - R.T is 0, and has no signs: which entries say whether x and y have one sign?")
+@wrong("After half a turn R - R.T is 0 and has no signs: which entries say whether x and y have the same sign?")
 def signs_of_the_differences(R):
     q = np.sqrt(np.maximum(np.diagonal(products(R)), 0.0)) / 2.0
     return np.copysign(q, np.append([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]], 1.0))
 
 
-@wrong("An eigenvector's sign is arbitrary: which entries of R tell a turn round n from one round -n?")
+@wrong("An eigenvector's sign is arbitrary: which entries of R tell a turn about n from one about -n?")
 def axis_of_any_sign(R):
     values, vectors = np.linalg.eig(R)
     n = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
@@ -183,7 +183,7 @@ def axis_of_any_sign(R):
 
 
 @wrong(
-    "After half a turn 1 + trace is 0, and your smallest number stands for it: is w the largest of the four then?",
+    "After half a turn 1 + trace is 0, and you put your smallest number in its place: is w the largest of the four?",
     least=(1e-12, 1e-14, 1e-16),
 )
 def unit_with_a_floor_under_w(R, least):

@@ -113,7 +113,7 @@ def chosen(distance, allowed):
     return 1 + int(np.where(allowed, distance, np.inf).argmin()) if np.any(allowed) else 0
 
 
-@wrong("Your distance does not know that two features go together: what stands off the diagonal?")
+@wrong("Your distance ignores that two features vary together: what is off the diagonal?")
 def chosen_by_spread(features, mean, covariance, allowed):
     return chosen(((features - mean) ** 2 / np.diag(covariance)).sum(axis=1), allowed)
 
@@ -123,7 +123,7 @@ def chosen_although_forbidden(features, mean, covariance, allowed):
     return chosen(distances(features, mean, covariance), np.ones(len(features), bool)) if allowed.any() else 0
 
 
-@wrong("In features[allowed] the rows have new numbers. Which number has the piece in the image of pieces?")
+@wrong("In features[allowed] the rows have new numbers. Which number does the piece have in the image of pieces?")
 def chosen_among_the_allowed(features, mean, covariance, allowed):
     return 1 + int(distances(features[allowed], mean, covariance).argmin()) if allowed.any() else 0
 
@@ -133,7 +133,7 @@ def chosen_always(features, mean, covariance, allowed):
     return 1 + int(np.where(allowed, distances(features, mean, covariance), np.inf).argmin())
 
 
-@wrong("The square of (off @ inverse) holds the inverse twice: what is it to be multiplied by?")
+@wrong("The square of (off @ inverse) has the inverse twice: what should it be multiplied by?")
 def inverse_twice(features, mean, covariance, allowed):
     squared = (((features - mean) @ np.linalg.inv(covariance)) ** 2).sum(axis=1)
     return chosen(squared, allowed)
@@ -144,7 +144,7 @@ def none_is_minus_one(features, mean, covariance, allowed):
     return choose_region(features, mean, covariance, allowed) or -1
 
 
-@wrong("The diagonal holds variances, squares already, and two features go together: what is off it?")
+@wrong("The diagonal has variances, squares already, and two features vary together: what is off it?")
 def divided_by_variances(features, mean, covariance, allowed):
     return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)
 
@@ -180,12 +180,12 @@ def others_at_1000(features, mean, covariance, allowed):
     return int(squared.argmin()) + 1 if allowed.any() else 0
 
 
-@wrong("A spread of 0.1 should count for more than one of 10: do you multiply by the covariance, or divide?")
+@wrong("A spread of 0.1 should count more than one of 10: do you multiply by the covariance, or divide?")
 def covariance_without_its_inverse(features, mean, covariance, allowed):
     return chosen(((features - mean) @ covariance * (features - mean)).sum(axis=1), allowed)
 
 
-@wrong("A forbidden piece has distance 0 in yours, and wins: which distance never wins?")
+@wrong("You give a forbidden piece the distance 0, and it wins: which distance never wins?")
 def forbidden_ones_at_the_mean(features, mean, covariance, allowed):
     return 1 + int((distances(features, mean, covariance) * allowed).argmin()) if allowed.any() else 0
 
@@ -200,7 +200,7 @@ def row_in_place_of_the_number(features, mean, covariance, allowed):
     return max(choose_region(features, mean, covariance, allowed) - 1, 0)
 
 
-@wrong("You choose first, and ask then whether it is allowed: a worse region that is allowed is never chosen.")
+@wrong("You choose first and then ask whether it is allowed: a worse region that is allowed is never chosen.")
 def chosen_before_it_is_allowed(features, mean, covariance, allowed):
     off = features - mean
     k = int(np.argmin((off @ np.linalg.inv(covariance) * off).sum(axis=1)))

@@ -103,7 +103,7 @@ def kept_on_average(reference, other, tolerance):
     return np.abs(reference - other).mean() <= tolerance, *engine_contract(reference, other, tolerance)[1:]
 
 
-@wrong("NaN keeps no contract, and is neither above nor below a number: which step of yours lets it through?")
+@wrong("NaN keeps no contract and is neither above nor below a number: which of your steps lets it through?")
 def kept_unless_above(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance
     return not broken.any(), *engine_contract(reference, other, tolerance)[1:]
@@ -143,25 +143,25 @@ def kept_relative_to_the_logits(reference, other, tolerance):
     return kept, *engine_contract(reference, other, tolerance)[1:]
 
 
-@wrong("np.sort goes upwards: where do the two best of a pixel stand?")
+@wrong("np.sort sorts upwards: where are the two best of a pixel?")
 def margin_of_the_two_worst(reference, other, tolerance):
     lowest, next_one = np.sort(reference, axis=0)[:2]
     return *engine_contract(reference, other, tolerance)[:2], np.mean(next_one - lowest <= 2 * tolerance)
 
 
-@wrong("np.argmax takes NaN for the largest. What does the task say of a pixel that has one?")
+@wrong("np.argmax treats NaN as the largest. What does the task say about a pixel that has one?")
 def nan_for_the_best(reference, other, tolerance):
     kept, _, at_risk = engine_contract(reference, other, tolerance)
     return kept, np.mean(reference.argmax(axis=0) != other.argmax(axis=0)), at_risk
 
 
-@wrong("You take the best of a pixel's other logits. What does the task say of a pixel that has a NaN?")
+@wrong("You take the best of a pixel's other logits. What does the task say about a pixel that has a NaN?")
 def nan_for_the_worst(reference, other, tolerance):
     kept = engine_contract(reference, other, tolerance)[0]
     return kept, *nan_for_the_best(reference, np.where(np.isnan(other), -np.inf, other), tolerance)[1:]
 
 
-@wrong("NaN keeps no contract, and is neither above nor below a number: which step of yours lets it through?")
+@wrong("NaN keeps no contract and is neither above nor below a number: which of your steps lets it through?")
 def kept_unless_above_and_nan_for_the_best(reference, other, tolerance):
     broken = np.abs(reference - other) > tolerance
     return not broken.any(), *nan_for_the_best(reference, other, tolerance)[1:]
@@ -174,7 +174,7 @@ def classes_on_the_last_axis(reference, other, tolerance):
 
 
 @wrong(
-    "Off by exactly the tolerance is still kept, and a gap of exactly two is open: do you ask < or <=?",
+    "Off by exactly the tolerance still keeps it, and a gap of exactly two is open: do you use < or <=?",
     alike=(False, True),
 )
 def strictly_less(reference, other, tolerance, alike):

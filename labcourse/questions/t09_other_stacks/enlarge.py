@@ -84,7 +84,7 @@ def resize_rounded(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.minimum(np.round(i * old / n), old - 1))
 
 
-@wrong("You stretch between the outermost centres: does every old pixel get the same share of new ones?")
+@wrong("You interpolate between the outermost centres: does every old pixel get the same share of new ones?")
 def resize_corner_to_corner(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: np.linspace(0, old - 1, n).round())
 
@@ -121,13 +121,13 @@ def resize_by_shares(labels, size):
     return copied(labels, size[::-1], lambda i, n, old: (i + 0.5) / n * old)
 
 
-@wrong("np.repeat takes whole numbers of times: how do 2 rows become 5?")
+@wrong("np.repeat repeats a whole number of times: how do 2 rows become 5?")
 def resize_by_whole_factors(labels, size):
     W, H = size
     return labels.repeat(H // labels.shape[0], axis=0).repeat(W // labels.shape[1], axis=1)
 
 
-@wrong("Rows have a factor of their own, h / H: yours go by that of the columns.")
+@wrong("Rows have their own factor, h / H: you use that of the columns.")
 def resize_rows_as_columns(labels, size):
     W, w = size[0], labels.shape[1]
     return copied(labels, size[::-1], lambda i, n, old: np.minimum((2 * i + 1) * w // (2 * W), old - 1))

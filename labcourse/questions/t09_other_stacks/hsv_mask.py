@@ -118,7 +118,7 @@ def inside(hsv, lower, upper):
     return found
 
 
-@wrong("Try red, from 170 to 10: can any hue be above the one and below the other?")
+@wrong("Try red, from 170 to 10: can any hue be above one and below the other?")
 def mask_without_going_round(hsv, lower, upper):
     return between(hsv, lower, upper).all(axis=-1)
 
@@ -153,13 +153,13 @@ def mask_always_round(hsv, lower, upper):
     return ((h >= lower[0]) | (h <= upper[0])) & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
-@wrong("Only the hue goes round: a saturation from 200 to 100 holds nothing.")
+@wrong("Only the hue wraps around: a saturation from 200 to 100 contains nothing.")
 def all_three_go_round(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
     return np.where(lower > upper, above | below, above & below).all(axis=-1)
 
 
-@wrong("When the hue goes round, saturation and value do not: `or` is for the hue alone.")
+@wrong("When the hue wraps around, saturation and value do not: `or` is for the hue alone.")
 def all_three_go_with_the_hue(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
     return (above | below if lower[0] > upper[0] else above & below).all(axis=-1)
@@ -175,7 +175,7 @@ def all_three_bounds_sorted(hsv, lower, upper):
     return between(hsv, np.minimum(lower, upper), np.maximum(lower, upper)).all(axis=-1)
 
 
-@wrong("If both bounds are one hue, only that hue is inside: do you ask `>` or `>=`?")
+@wrong("If both bounds are the same hue, only that hue is inside: do you use `>` or `>=`?")
 def one_hue_goes_round(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     above, below = h >= lower[0], h <= upper[0]
@@ -189,17 +189,17 @@ def or_after_and(hsv, lower, upper):
     return above | below & rest if lower[0] > upper[0] else above & below & rest
 
 
-@wrong("There are three channels: which of them has no bounds in yours?")
+@wrong("There are three channels: for which of them do you test no bounds?")
 def value_forgotten(hsv, lower, upper):
     return hsv_mask(hsv, np.array([*lower[:2], 0]), np.array([*upper[:2], 255]))
 
 
-@wrong("A mask has a truth value per pixel, (H, W): along which axis do hue, saturation and value stand?")
+@wrong("A mask has a truth value per pixel, (H, W): which axis holds hue, saturation and value?")
 def all_along_the_rows(hsv, lower, upper):
     return inside(hsv, lower, upper).all(axis=0)
 
 
-@wrong("Where the hue goes round, one that equals a bound is inside, too: does yours leave the bounds out there?")
+@wrong("Where the hue wraps around, one that equals a bound is inside, too: do you leave the bounds out there?")
 def not_between_the_bounds(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     above, below = h >= lower[0], h <= upper[0]
@@ -217,7 +217,7 @@ def upper_hue_beyond_the_circle(hsv, lower, upper, kind):
     return (h >= lower[0]) & (h <= above) & rest
 
 
-@wrong("You move a bound by 180, from 170 to -10. A hue of 175 stays where it is: is it inside in yours?")
+@wrong("You move a bound by 180, from 170 to -10. A hue of 175 does not move: is it inside your bounds?")
 def lower_hue_below_0(hsv, lower, upper):
     h, rest = hsv[..., 0], between(hsv, lower, upper)[..., 1:].all(axis=-1)
     low = int(lower[0]) - 180 * (lower[0] > upper[0])
@@ -246,7 +246,7 @@ def half_width_without_the_circle(hsv, lower, upper):
     return near & between(hsv, lower, upper)[..., 1:].all(axis=-1)
 
 
-@wrong("A saturation or a value that equals its bound is inside, as in OpenCV: do you ask with < or with <=?")
+@wrong("A saturation or a value that equals its bound is inside, as in OpenCV: do you use < or <=?")
 def strict_but_for_the_hue(hsv, lower, upper):
     hue = inside(hsv, lower, upper)[..., 0]
     return hue & ((hsv[..., 1:] > lower[1:]) & (hsv[..., 1:] < upper[1:])).all(axis=-1)

@@ -125,7 +125,7 @@ def rows_without_their_filling(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, lambda c, v, u: 2 * (((c // block * H + v) * W + u) * block + c % block))
 
 
-@wrong("Each row is filled up to step bytes. Yours are filled up at the end of a whole block only.")
+@wrong("Each row is padded to step bytes. You expect padding only at the end of a whole block.")
 def filling_after_all_rows(buffer, C, H, W, block, step):
     def at(c, v, u):
         return c // block * H * step + 2 * ((v * W + u) * block + c % block)
@@ -133,13 +133,13 @@ def filling_after_all_rows(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, at)
 
 
-@wrong("The filling stands at a row's end: where does its first pixel begin?")
+@wrong("The padding is at a row's end: where does its first pixel begin?")
 def filling_in_front(buffer, C, H, W, block, step):
     spare = step - 2 * block * W
     return read(buffer, right_places(C, H, W, block, step) + spare).argmax(axis=0)
 
 
-@wrong("A block has H rows of `step` bytes. Where does yours begin the next one?")
+@wrong("A block has H rows of `step` bytes. Where do you begin the next one?")
 def blocks_without_the_rows_filling(buffer, C, H, W, block, step):
     def at(c, v, u):
         return 2 * (c // block * H * W * block + u * block + c % block) + v * step
@@ -147,22 +147,22 @@ def blocks_without_the_rows_filling(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, at)
 
 
-@wrong("Inside a block the scores of one pixel lie side by side. In yours a row of one class follows that of another.")
+@wrong("Inside a block the scores of one pixel are side by side. You read a row of one class after that of another.")
 def rows_of_classes_in_a_block(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, lambda c, v, u: (c // block * H + v) * step + 2 * (c % block * W + u))
 
 
-@wrong("A block is rows of pixels. Yours goes down the columns: which of v and u takes you `step` bytes on?")
+@wrong("A block is rows of pixels. You go down the columns: which of v and u moves you on by `step` bytes?")
 def columns_first(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, lambda c, v, u: (c // block * W + u) * step + 2 * (v * block + c % block))
 
 
-@wrong("`step` counts bytes. A score has two of them: how many bytes lie between two pixels of a row?")
+@wrong("`step` counts bytes. A score has two of them: how many bytes are there between two pixels of a row?")
 def places_in_a_row_as_bytes(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, lambda c, v, u: (c // block * H + v) * step + u * block + c % block)
 
 
-@wrong("A block is written with all its rows before the next one begins. Yours take turns row by row.")
+@wrong("A block is written with all its rows before the next one begins. You alternate between blocks row by row.")
 def blocks_row_by_row(buffer, C, H, W, block, step):
     blocks = -(-C // block)
     return best(
@@ -170,7 +170,7 @@ def blocks_row_by_row(buffer, C, H, W, block, step):
     )
 
 
-@wrong("You read plane after plane, as if each block held one class. What lies 2 bytes behind a score of class 0?")
+@wrong("You read plane after plane, as if each block held one class. What lies 2 bytes after a score of class 0?")
 def as_planes(buffer, C, H, W, block, step):
     return best(buffer, C, H, W, block, step, lambda c, v, u: (c * H + v) * step + 2 * u)
 
@@ -191,18 +191,18 @@ def cut_within_the_blocks(buffer, C, H, W, block, step):
     return scores[:, :C].reshape(-1, H, W).argmax(axis=0)
 
 
-@wrong("The numbers that fill up the last block may be large: leave them out by their place, not because they are NaN.")
+@wrong("The numbers that pad the last block may be large: leave them out by position, not because they are NaN.")
 def filled_up_classes_but_for_nan(buffer, C, H, W, block, step):
     scores = all_scores(buffer, C, H, W, block, step)
     return np.where(np.isnan(scores), -np.inf, scores).argmax(axis=0)
 
 
-@wrong("With 5 classes in blocks of 4, class 4 wins nowhere in yours: how many blocks are there?")
+@wrong("With 5 classes in blocks of 4, your class 4 never wins: how many blocks are there?")
 def full_blocks_alone(buffer, C, H, W, block, step):
     return read(buffer, right_places(max(C // block, 1) * block, H, W, block, step))[:C].argmax(axis=0)
 
 
-@wrong("You compare the classes of the first block alone: class `block` and all above it never win.")
+@wrong("You compare only the classes of the first block: class `block` and all above it never win.")
 def first_block_alone(buffer, C, H, W, block, step):
     return read(buffer, right_places(min(block, C), H, W, block, step)).argmax(axis=0)
 
@@ -228,12 +228,12 @@ def blocks_counted_last(buffer, C, H, W, block, step):
     return blocked(buffer, C, H, W, block, step).transpose(3, 0, 1, 2).reshape(-1, H, W)[:C].argmax(axis=0)
 
 
-@wrong("reshape takes the numbers in the order in which they lie: which axes must change places before it?")
+@wrong("reshape takes the numbers in the order in which they are stored: which axes must be swapped before it?")
 def reshaped_without_transposing(buffer, C, H, W, block, step):
     return blocked(buffer, C, H, W, block, step).reshape(-1, H, W)[:C].argmax(axis=0)
 
 
-@wrong("reshape takes the numbers in the order in which they lie: which axes must change places before it?")
+@wrong("reshape takes the numbers in the order in which they are stored: which axes must be swapped before it?")
 def pixels_reshaped_without_transposing(buffer, C, H, W, block, step):
     return blocked(buffer, C, H, W, block, step).reshape(H, W, -1)[..., :C].argmax(axis=-1)
 
@@ -243,24 +243,24 @@ def bytes_exchanged(buffer, C, H, W, block, step):
     return read(buffer, right_places(C, H, W, block, step), ">f2").argmax(axis=0)
 
 
-@wrong("You compare bytes. A score is two of them, and they are a float.", byte=(0, 1))
+@wrong("You compare bytes. A score is two bytes, which are one float.", byte=(0, 1))
 def single_bytes(buffer, C, H, W, block, step, byte):
     return buffer[right_places(C, H, W, block, step) + byte].argmax(axis=0)
 
 
-@wrong("astype makes a number of each byte. Which function of NumPy takes two bytes together as one number?")
+@wrong("astype turns each byte into a number. Which NumPy function reads two bytes together as one number?")
 def bytes_as_numbers(buffer, C, H, W, block, step):
     rows = buffer.astype(float).reshape(-1, H, step)[:, :, : 2 * block * W].reshape(-1, H, W, 2 * block)
     return rows.transpose(0, 3, 1, 2).reshape(-1, H, W)[:C].argmax(axis=0)
 
 
-@wrong("astype makes a number of each byte. Which function of NumPy takes two bytes together as one number?")
+@wrong("astype turns each byte into a number. Which NumPy function reads two bytes together as one number?")
 def bytes_as_scores(buffer, C, H, W, block, step):
     rows = buffer.reshape(-1, H, step)[:, :, : block * W].reshape(-1, H, W, block)
     return rows.transpose(0, 3, 1, 2).reshape(-1, H, W)[:C].argmax(axis=0)
 
 
-@wrong("At a pixel whose scores are all negative, none is above 0: with what do you begin?")
+@wrong("At a pixel whose scores are all negative, none is above 0: what do you begin with?")
 def the_best_begins_at_0(buffer, C, H, W, block, step):
     scores = read(buffer, right_places(C, H, W, block, step))
     return np.where((scores > 0).any(axis=0), scores.argmax(axis=0), 0)
@@ -272,7 +272,7 @@ def scores_of_the_best(buffer, C, H, W, block, step):
 
 
 @wrong(
-    "Two bytes, but of which type? As whole numbers they give what yours gives: where do the negative scores go?",
+    "Two bytes, but of which type? You read them as integers: where do the negative scores go?",
     kind=("<i2", "<u2"),
 )
 def whole_numbers(buffer, C, H, W, block, step, kind):

@@ -77,7 +77,7 @@ def blob_reshaped(bgr, multiple):
     return scaled(image.reshape(1, 3, *image.shape[:2]))
 
 
-@wrong("Which axis did you turn round, the channels' or the columns'?")
+@wrong("Which axis did you reverse, the channels or the columns?")
 def blob_mirrored(bgr, multiple):
     return scaled(planes(padded(bgr[:, ::-1], multiple)))
 
@@ -92,28 +92,28 @@ def blob_of_256(bgr, multiple):
     return (planes(padded(bgr[..., ::-1], multiple)) / 256.0).astype(np.float32)
 
 
-@wrong("A side that is a multiple already stays as it is: what do you add to 8 for a multiple of 4?")
+@wrong("A side that is already a multiple remains as it is: what do you add to 8 for a multiple of 4?")
 def room_for_one_more(bgr, multiple):
     return with_room(bgr, lambda n: (0, multiple - n % multiple))
 
 
-@wrong("New rows go below and new columns at the right, so that pixel (0, 0) stays where it is.")
+@wrong("New rows go below and new columns on the right, so that pixel (0, 0) does not move.")
 def room_all_round(bgr, multiple):
     return with_room(bgr, lambda n: (-n % multiple // 2, -n % multiple - -n % multiple // 2))
 
 
-@wrong("New rows go below and new columns at the right, so that pixel (0, 0) stays where it is.")
+@wrong("New rows go below and new columns on the right, so that pixel (0, 0) does not move.")
 def room_above_and_left(bgr, multiple):
     return with_room(bgr, lambda n: (-n % multiple, 0))
 
 
-@wrong("You cut rows or columns off. The network should see all of the image.")
+@wrong("You cut off rows or columns. The network should see the whole image.")
 def cut_to_a_multiple(bgr, multiple):
     H, W = (n // multiple * multiple for n in bgr.shape[:2])
     return scaled(planes(bgr[:H, :W, ::-1]))
 
 
-@wrong("The rows and columns that you add hold 0, not the last pixel once more.")
+@wrong("The rows and columns that you add contain 0, not the last pixel again.")
 def room_like_the_edge(bgr, multiple):
     return scaled(planes(padded(bgr, multiple, "edge")[..., ::-1]))
 
@@ -129,7 +129,7 @@ def room_of_the_remainder(bgr, multiple):
     return with_room(bgr, lambda n: (0, n % multiple))
 
 
-@wrong("White is byte 255 in every image: what becomes of a dark image in yours?")
+@wrong("White is byte 255 in every image: what do you do to a dark image?")
 def divided_by_the_largest(bgr, multiple):
     return (planes(padded(bgr[..., ::-1], multiple)) / max(1, bgr.max())).astype(np.float32)
 
@@ -142,6 +142,6 @@ def image_reshaped_before_it_is_padded(bgr, multiple):
     return blob
 
 
-@wrong("bgr[::-1] turns the first axis round: is that the channels'?")
+@wrong("bgr[::-1] reverses the first axis: is that the channels?")
 def blob_upside_down(bgr, multiple):
     return scaled(planes(padded(bgr[::-1], multiple)))

@@ -75,7 +75,7 @@ def measured_by_boxes(pieces):
     return measured(pieces, centroid=lambda vu: (vu.min(axis=0) + vu.max(axis=0))[::-1] / 2)
 
 
-@wrong("Count the piece's own pixels: a box holds others too.")
+@wrong("Count the piece's own pixels: a box contains others, too.")
 def measured_box_areas(pieces):
     return measured(pieces, area=lambda vu: np.prod(np.ptp(vu, axis=0) + 1))
 
@@ -99,7 +99,7 @@ def measured_without_the_smallest_number(pieces):
     return rearranged(pieces, np.arange(pieces.max())[int(pieces.min() > 0) :])
 
 
-@wrong("A centroid is a mean: what did you take?")
+@wrong("A centroid is a mean: what did you compute?")
 def measured_by_medians(pieces):
     return measured(pieces, centroid=lambda vu: np.median(vu, axis=0)[::-1])
 
