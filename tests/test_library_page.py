@@ -45,7 +45,7 @@ NIGHTLY = pytest.mark.nightly  # they train, as test_training does
         ("A model of your own", r"\(240, 320, 2\) \[0 1\]\nPerception\(.*\n\(240, 320, 7\) .*\nPerception\("),
         ("An exported network in a program of your own", r"equal labels: (100.00|99.99)%"),
         (
-            "Things of your own",
+            "Objects of your own",
             r"Perception\(.* grasps\)\n(\d+) objects in truth, \d+ found\n(Perception\(.* grasps\)\n){2}",
         ),
         (

@@ -61,7 +61,7 @@ TESTED = [
     ("runs README's two commands on a bare Debian", "make fresh"),
     ("both produced the same bytes from fixed seeds", "make everywhere"),
     ("Submissions run in a sandbox", "pytest tests/labgrader/sandbox"),
-    ("answers a recording of ROS 1 or ROS 2, without ROS", "pytest tests/labros/test_bags.py"),
+    ("answers a recording of ROS 1 or ROS 2; needs no ROS", "pytest tests/labros/test_bags.py"),
     ("the same masks and clouds in C++, Java and Octave", "make stacks"),
     ("runs the tests of ROS 2", "make test-ros2"),
     ("run on more machines with `--dask`", "pytest tests/labtrain/test_scale.py"),
