@@ -109,7 +109,7 @@ QUESTION = Question(
     points=4,
     canonical=one_of_two,
     forbidden=("scipy",),
-    outputs=("position", "turn"),
+    outputs=("position", "rotation"),
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
