@@ -136,7 +136,7 @@ def runs_as_they_come(n, group):
     return np.add.reduceat(np.add.reduceat(n, starts, axis=0), starts, axis=1)
 
 
-@wrong("The rows are merged and the columns are not: a prediction has a group, too.")
+@wrong("You merge the rows but not the columns: a prediction has a group, too.")
 def columns_cut_off(n, group):
     merged = np.stack([n[group == g].sum(axis=0) for g in range(group.max() + 1)])
     return merged[:, : len(merged)]

@@ -206,7 +206,7 @@ def pads_taken_as_level(P, T_base_grasp, *boxes):
     return in_boxes((P - T_base_grasp[:3, 3])[:, :2] @ T_base_grasp[:2, 0], y, z, *boxes)
 
 
-@wrong("x has two signs: what does x <= half say of a point far away on the negative side?")
+@wrong("x has two signs: what does x <= half say about a point far away on the negative side?")
 def pads_without_an_end(P, T_base_grasp, width, half, thickness, tips):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(np.maximum(x, 0.0), y, z, width, half, thickness, tips)
