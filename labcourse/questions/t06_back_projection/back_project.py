@@ -92,30 +92,30 @@ def always_along_z(depth, K, along_ray):
     return back_project(depth, K, False)
 
 
-@wrong("Yours takes every number for a distance along the ray: where along_ray is False, it is the point's z.")
+@wrong("You read every number as a distance along the ray: where along_ray is False, it is the point's z.")
 def always_along_the_ray(depth, K, along_ray):
     return back_project(depth, K, True)
 
 
-@wrong("The two cases are exchanged: which of them needs rays of length 1?")
+@wrong("You swapped the two cases: which of them needs rays of length 1?")
 def cases_exchanged(depth, K, along_ray):
     return back_project(depth, K, not along_ray)
 
 
-@wrong("Each pixel's ray has a length of its own: over which axis do x, y and z lie?")
+@wrong("Each pixel's ray has its own length: which axis holds x, y and z?")
 def one_length_for_all(depth, K, along_ray):
     q = plain_rays(depth.shape, K)
     return holes(depth) * q / (np.linalg.norm(q) if along_ray else 1.0)
 
 
-@wrong("The whole ray is made of length 1: x and y become shorter by the same factor as z.")
+@wrong("The whole ray is scaled to length 1: x and y become shorter by the same factor as z.")
 def z_alone_shortened(depth, K, along_ray):
     P = back_project(depth, K, False)
     P[..., 2] = back_project(depth, K, along_ray)[..., 2]
     return P
 
 
-@wrong("You divide by the square of the ray's length: where did the root go?")
+@wrong("You divide by the square of the ray's length: where is the root?")
 def squared_length(depth, K, along_ray):
     q = plain_rays(depth.shape, K)
     return holes(depth) * q / (length(q) ** 2 if along_ray else 1.0)
@@ -165,7 +165,7 @@ def holes_at_depth_zero(depth, K, along_ray):
     return P
 
 
-@wrong("The optical axis meets the image at (cx, cy), where x and y are 0: from where do you count u and v?")
+@wrong("The optical axis meets the image at (cx, cy), where x and y are 0: from which point do you count u and v?")
 def counted_from_the_first_pixel(depth, K, along_ray):
     return back_project(depth, K_of(K[0, 0], K[1, 1], 0.0, 0.0), along_ray)
 
@@ -182,17 +182,17 @@ def holes_without_z_alone(depth, K, along_ray):
     return np.dstack([np.nan_to_num(P[..., :2]), P[..., 2]])
 
 
-@wrong("np.meshgrid with indexing='ij' stands on its side, and reshape does not turn it: which axis is u?")
+@wrong("np.meshgrid with indexing='ij' is transposed, and reshape does not undo that: which axis is u?")
 def grid_on_its_side(depth, K, along_ray):
     return holes(depth) * rays(depth.shape, K, along_ray).swapaxes(0, 1).reshape(*depth.shape, 3)
 
 
-@wrong("An image of points is asked for, one at each pixel's place: what stands where there is no reading?")
+@wrong("The result is an image of points, one per pixel: what is the entry where there is no reading?")
 def list_of_points(depth, K, along_ray):
     return back_project(depth, K, along_ray)[depth > 0.0]
 
 
-@wrong("You took the length of (u, v, 1), which counts pixels. The ray is K^-1 (u, v, 1): how long is that?")
+@wrong("You took the length of (u, v, 1), which is in pixels. The ray is K^-1 (u, v, 1): how long is that?")
 def length_in_pixels(depth, K, along_ray):
     v, u = np.indices(depth.shape)
     pixels = np.stack([u, v, np.ones(depth.shape)], axis=-1)

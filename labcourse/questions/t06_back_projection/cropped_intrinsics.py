@@ -70,12 +70,12 @@ def added(K, left, top, scale):
     return cropped_intrinsics(K, -left, -top, scale)
 
 
-@wrong("left and top count old pixels, so take them off first; and corners stay together, not centres.")
+@wrong("left and top count old pixels, so subtract them first; and corners stay together, not centres.")
 def resized_first_about_centres(K, left, top, scale):
     return with_centre(K, scale, scale * K[0, 2] - left, scale * K[1, 2] - top)
 
 
-@wrong("Your half pixel has the wrong sign: the corner is at -1/2, so a centre u lies u + 1/2 behind it.")
+@wrong("Your half pixel has the wrong sign: the corner is at -1/2, so a centre u lies u + 1/2 after it.")
 def half_pixel_with_the_other_sign(K, left, top, scale):
     half = (1.0 - scale) / 2.0
     return with_centre(K, scale, scale * (K[0, 2] - left) + half, scale * (K[1, 2] - top) + half)

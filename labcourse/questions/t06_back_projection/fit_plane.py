@@ -113,13 +113,13 @@ def through_the_origin(P, sigma):
     return up(np.linalg.svd(P / sigma[:, None], full_matrices=False)[2][2], np.zeros(3))
 
 
-@wrong("The point through which the best plane goes is a mean, too: do all points count alike in it?")
+@wrong("The best plane passes through a mean of the points: do all points count alike in it?")
 def centre_without_weights(P, sigma):
     centre = P.mean(axis=0)
     return up(np.linalg.svd((P - centre) / sigma[:, None], full_matrices=False)[2][2], centre)
 
 
-@wrong("A point of a larger sigma is less sure, and must count less; yours counts more.")
+@wrong("A point with a larger sigma is less certain and must count less; in your answer it counts more.")
 def unsure_points_count_more(P, sigma):
     return fit_plane(P, sigma**-0.5)
 
@@ -130,7 +130,7 @@ def row_of_the_eigenvectors(P, sigma):
     return up(axes[0], centre)
 
 
-@wrong("c is gone only if you subtract the mean m from the points before you look for n; then c = n . m.")
+@wrong("c vanishes only if you subtract the mean m from the points before you look for n; then c = n . m.")
 def not_centred(P, sigma):
     return up(np.linalg.eigh(P.T / sigma**2 @ P)[1][:, 0], np.average(P, axis=0, weights=sigma**-2.0))
 
@@ -167,7 +167,7 @@ def first_axis_of_eig(P, sigma):
     return up(np.linalg.eig((P - centre).T * w @ (P - centre))[1][:, 0], centre)
 
 
-@wrong("The weights are in your mean: are they in the squares that the plane makes least, too?")
+@wrong("The weights are in your mean: are they also in the squares that the plane minimises?")
 def scatter_without_weights(P, sigma):
     centre = np.average(P, axis=0, weights=sigma**-2.0)
     return up(np.linalg.eigh((P - centre).T @ (P - centre))[1][:, 0], centre)

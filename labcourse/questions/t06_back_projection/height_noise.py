@@ -149,7 +149,7 @@ def turned_point_itself(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_
     return np.hypot(np.linalg.norm(noise[:3]), T_base_cam[2, :3] @ turned)
 
 
-@wrong("The noise is that of small turns. One radian is no small step for a difference.")
+@wrong("The noise is that of small turns. One radian is not a small step for a difference.")
 def differences_over_a_radian(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
     return height_noise(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, np.sin(1.0) * sigma_tilt)
 
@@ -177,7 +177,7 @@ def one_focal_length(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_til
     return height_noise(u, v, d, same, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt)
 
 
-@wrong("Two errors of independent signs do not cancel: square before you add.")
+@wrong("Two errors with independent signs do not cancel: square before you add.")
 def signed_stds_added(*arguments):
     return np.abs(np.sum(shares(*arguments)))
 
@@ -191,7 +191,7 @@ def ray_straight_ahead(*arguments):
     return np.linalg.norm(shares(*arguments, moves=straight))
 
 
-@wrong("You have the whole error of the point; only its component along the base frame's z is asked for.")
+@wrong("You have the whole error of the point; the task asks only for its component along the base frame's z.")
 def all_directions(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_tilt):
     return np.linalg.norm(jacobian(u, v, d, K) * (sigma_pixel, sigma_pixel, sigma_depth, sigma_tilt))
 
@@ -202,7 +202,7 @@ def deviations_turned(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sigma_ti
     return abs(T_base_cam[2, :3] @ np.linalg.norm(J * (sigma_pixel, sigma_pixel, sigma_depth, sigma_tilt), axis=1))
 
 
-FOUR_ERRORS = "Four things err: u and v move the point sideways, d along its ray, and the tilt turns it about x."
+FOUR_ERRORS = "There are four errors: u and v move the point sideways, d along its ray, and the tilt turns it about x."
 
 
 @wrong(FOUR_ERRORS, kept=((2,), (2, 3), (0, 2, 3), (1, 2, 3), (0, 1, 3), (3,)))
@@ -210,7 +210,7 @@ def some_errors_alone(*arguments, kept):
     return np.linalg.norm(shares(*arguments)[list(kept)])
 
 
-@wrong("A covariance holds squares: diag(sigma_p, sigma_p, sigma_d, sigma_t) is not yet S.")
+@wrong("A covariance contains squares: diag(sigma_p, sigma_p, sigma_d, sigma_t) is not yet S.")
 def deviations_taken_for_variances(u, v, d, K, T_base_cam, *sigmas):
     return np.linalg.norm(shares(u, v, d, K, T_base_cam, *np.sqrt(sigmas)))
 
@@ -221,7 +221,7 @@ def depth_along_a_unit_ray(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth, sig
     return np.linalg.norm(shares(u, v, d, K, T_base_cam, sigma_pixel, sigma_depth / length, sigma_tilt))
 
 
-@wrong("Noise is a difference of two points, and a translation changes no difference. Where does yours come in?")
+@wrong("Noise is a difference of two points, and a translation changes no difference. Where do you use it?")
 def translation_added(u, v, d, K, T_base_cam, *sigmas):
     J = np.vstack([jacobian(u, v, d, K), np.ones(4)])
     return np.linalg.norm(T_base_cam[2] @ J * (sigmas[0], *sigmas))

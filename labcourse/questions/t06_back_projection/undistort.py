@@ -118,7 +118,7 @@ def lens(k):
     return lambda r: 1.0 + k[0] * r**2 + k[1] * r**4
 
 
-@wrong("You bent the pixels a second time: the lens did it once, and you are to take it back.")
+@wrong("You distorted the pixels a second time: the lens did it once, and you should undo it.")
 def bent_again(pixels, K, k):
     return distort(pixels, K, k)
 
@@ -131,7 +131,7 @@ def radius_as_seen(pixels, K, k):
 
 
 @wrong(
-    "Each round divides the last guess again, so that the factors pile up. Which numbers are to be divided?",
+    "Each round divides the last guess again, so the factors pile up. Which numbers should be divided?",
     rounds=(10, 20, 50, 100),
 )
 def guess_divided_again(pixels, K, k, rounds):
@@ -159,12 +159,12 @@ def radius_in_pixels(pixels, K, k):
     return divided_again(pixels, K, lens(k), radius=np.diagonal(K)[:2])
 
 
-@wrong("The lens has two terms: r to the fourth bends, too, by k2. Where does it come into yours?")
+@wrong("The lens has two terms: r to the fourth bends, too, by k2. Where do you use it?")
 def without_k2(pixels, K, k):
     return divided_again(pixels, K, lens((k[0], 0.0)))
 
 
-@wrong("k1 stands beside r squared and k2 beside r to the fourth.")
+@wrong("k1 multiplies r squared, and k2 r to the fourth.")
 def powers_too_low(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r + k[1] * r**2)
 
@@ -179,17 +179,17 @@ def signs_exchanged(pixels, K, k):
     return distort(pixels, K, -k)
 
 
-@wrong("k2 stands beside r to the fourth: square r squared once more.")
+@wrong("k2 multiplies r to the fourth: square r squared once more.")
 def k2_beside_r_squared(pixels, K, k):
     return undistort(pixels, K, np.array([k[0] + k[1], 0.0]))
 
 
-@wrong("Rows have a focal length of their own: v = fy y_d + cy, and fy is the middle entry of K.")
+@wrong("Rows have their own focal length: v = fy y_d + cy, and fy is the middle entry of K.")
 def one_focal_length(pixels, K, k):
     return divided_again(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), lens(k))
 
 
-@wrong("A series is right for small r alone: put your pixels into the lens, do the given ones come out?")
+@wrong("A series is right only for small r: put your pixels into the lens, do the given ones come out?")
 def by_a_series(pixels, K, k):
     series = (-k[0], 3.0 * k[0] ** 2 - k[1])
     return distort(pixels, K, series)
@@ -210,6 +210,6 @@ def newton_with_a_wrong_slope(pixels, K, k):
     return c + f * x * np.where(seen > 0.0, r / np.where(seen > 0.0, seen, 1.0), 1.0)
 
 
-@wrong("k2 stands beside r to the fourth: which power of r does yours have?")
+@wrong("k2 multiplies r to the fourth: which power of r do you use?")
 def k2_beside_r_cubed(pixels, K, k):
     return divided_again(pixels, K, lambda r: 1.0 + k[0] * r**2 + k[1] * r**3)
