@@ -222,9 +222,3 @@ def axes_exchanged(P, T_base_grasp, *boxes):
 def heights_counted_upwards(P, T_base_grasp, *boxes):
     x, y, z = moved(P, np.linalg.inv(T_base_grasp))
     return in_boxes(x, y, -z, *boxes)
-
-
-@wrong("The frame's z points from the palm to the tips: these are at z = tips. Where are they in yours?")
-def tips_above_the_origin(P, T_base_grasp, width, half, thickness, tips):
-    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
-    return in_boxes(x, y, z, width, half, thickness, -tips)
