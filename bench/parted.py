@@ -46,14 +46,20 @@ def most(numbers: np.ndarray) -> int:
     return int(counts[1:].argmax() + 1) if counts[1:].any() else 0
 
 
-def main(scenes: int, first: int) -> None:
-    """Print for whole and parted things how many there were, were found as one piece, and have one number."""
-    engine, counts = open_engine(load_model(weights_path("unet_rgbd"))), Counter()
+def counted(engine, scenes: int, first: int) -> Counter:
+    """For whole and parted things how many there were, were found as one piece, and have one number on both parts."""
+    counts = Counter()
     for seed in range(first, first + scenes):
         frame = data_gen.render(data_gen.sample_scene(seed, CONFIGS[(seed - first) % 3]), (640, 480))
-        for parted, whole, same in judged(frame.instances, segment_instances(engine, frame).instances):
+        for parted, whole, same in judged(frame.instances, segment_instances(engine, frame, classes=False).instances):
             kind = "parted" if parted else "whole"
             counts += Counter({(kind, "all"): 1, (kind, "one piece"): int(whole), (kind, "one number"): int(same)})
+    return counts
+
+
+def main(scenes: int, first: int) -> None:
+    """Print the counts."""
+    counts = counted(open_engine(load_model(weights_path("unet_rgbd"))), scenes, first)
     for kind in ("whole", "parted"):
         print(kind, *(f"{what}: {counts[kind, what]}" for what in ("all", "one piece", "one number")))
 

@@ -22,6 +22,21 @@ def test_the_thing_under_the_pixel_is_shown_with_its_grasp_and_the_table_with_a_
     assert axes.get_title().startswith("0 pixels; no grasp: no thing was found") and not axes.patches
 
 
+def test_a_second_pair_of_sliders_parts_what_was_found_as_one():
+    with World(scene(box("left", 0.5, 0.08), box("right", 0.55, -0.09, (0.04, 0.05, 0.1)))) as world:
+        frame = world.render()
+    (u, v), (not_u, not_v) = ((int(x.mean()) for x in np.nonzero(frame.instances == k)[::-1]) for k in (1, 2))
+    sizes = [np.count_nonzero(frame.instances == k) for k in (1, 2)]
+    explorer = pick_a_thing(frame, Pipeline(find_objects=lambda frame: (frame.instances > 0).astype(int)), at=(u, v))
+    both, one = (
+        explorer.figure(part=part, not_u=not_u, not_v=not_v).axes[0].get_title().partition(" pixels")[0]
+        for part in (False, True)
+    )
+    assert int(both) == sum(sizes) and int(one) == sizes[0]
+    (axes,) = explorer.figure(part=True, not_u=0, not_v=0).axes
+    assert axes.get_title() and "(0, 0) is not on the thing" in axes.get_title()
+
+
 @pytest.mark.parametrize(
     "side, sigma, found",
     [(36, 0.0, 2), (36, 14.0, 2), (36, 16.0, 1), (10, 0.0, 1), (12, 4.0, 1), (14, 4.0, 2)],
