@@ -69,7 +69,7 @@ def check_file(path: Path | str | None = None, start: Start = subprocess_worker.
     empty = [name for name, text in texts.items() if text.strip() in ("", course().no_text)]
     if empty or not names:
         said = f"still empty: {', '.join(empty)}." if empty else "none of them is empty."
-        print(f"{path.name}, {state}, has {counted(len(texts), 'text')} that a person grades; {said}")
+        print(f"{path.name}, {state}, has {counted(len(texts), 'written answer')}, graded by hand; {said}")
     for name in not_saved(names, cells) if state == "as it is saved" else ():
         print(f"The {name} that you ran last is not in the file: save the notebook (Ctrl+S), then run this cell again.")
     return right == len(names) if names else not empty

@@ -98,7 +98,7 @@ def terminal_lines(found: Found, path: Path) -> Sequence[str]:
         return []
     count = sum(map(len, people.values()))
     what = "1 group of answers is" if count == 1 else f"{count} groups of answers are"
-    lines = [f"{what} alike beyond what the task forces: {path}"]
+    lines = [f"{what} more alike than the task requires: {path}"]
     for names, groups in list(people.items())[:MOST_NAMED]:
         said = (
             in_words(names)

@@ -51,9 +51,9 @@ def test_every_solution_is_right_as_it_is_saved(topic):
 def test_a_lab_of_texts_alone_is_right_when_none_is_empty(capsys):
     lab, solution = (ROOT / folder / "10_capstone" / "10_capstone.ipynb" for folder in ("labs", "solutions"))
     assert not check_file(lab)
-    assert "has 6 texts that a person grades; still empty: question, labels," in capsys.readouterr().out
+    assert "has 6 written answers, graded by hand; still empty: question, labels," in capsys.readouterr().out
     assert check_file(solution)
-    assert "has 6 texts that a person grades; none of them is empty" in capsys.readouterr().out
+    assert "has 6 written answers, graded by hand; none of them is empty" in capsys.readouterr().out
 
 
 def test_an_answer_that_calls_a_wrong_one_gets_the_kits(tmp_path, capsys):
@@ -80,7 +80,7 @@ def test_a_lab_of_texts_alone_is_checked_under_any_name_and_other_notebooks_are_
     path = tmp_path / "This notebook.ipynb"
     path.write_bytes((ROOT / "labs/10_capstone/10_capstone.ipynb").read_bytes())
     assert not check_file(path)
-    assert "texts that a person grades; still empty: " in capsys.readouterr().out
+    assert "written answers, graded by hand; still empty: " in capsys.readouterr().out
     path.write_text(json.dumps({"cells": [], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
     with pytest.raises(ValueError, match="calls no check"):
         check_file(path)

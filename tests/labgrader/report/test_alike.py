@@ -275,7 +275,7 @@ def test_the_page_shows_both_marks_what_they_share_and_lets_nothing_run(labs, tm
     assert any("union = " in line for line in marked) and not any(line.startswith("def iou") for line in marked)
     assert (tmp_path / "alike.csv").read_text().splitlines()[1].startswith("iou,ada,'=ben,1.00,")
     assert "None." in alike_page(lab, [], Found()) and terminal_lines(Found(), Path("x")) == []
-    assert terminal_lines(found, Path("alike.html"))[0].startswith("1 group of answers is alike")
+    assert terminal_lines(found, Path("alike.html"))[0].startswith("1 group of answers is more alike")
 
 
 def test_twenty_with_one_answer_are_one_group_of_the_page_and_others_are_others(labs):
