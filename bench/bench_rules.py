@@ -3,8 +3,8 @@
 Simulated pictures (`bench/rules.py`): things along the edges of a table that a camera bends, things that the picture's
 border cuts off, full bins that fill the picture, and messy tables with an arm over them; noise grows with the square of
 distance. The rules are given the true things, so that what is lost is lost by the rules alone and by no network. The
-rules before, which took a table for a plane and touched nothing, kept 42, 30, 25 and 40 of the same things, in the order
-of the table, and refused the same arms.
+rules before, for which a table was a plane and nothing touched it, kept 42, 30, 25 and 40 of the same things, in the
+order of the table, and refused the same arms.
 """
 
 from collections import Counter

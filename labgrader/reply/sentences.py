@@ -17,7 +17,7 @@ from labgrader.comparison import Case, Problem, alike, as_expected, as_numpy, co
 from labgrader.question import Property, Question
 from labgrader.reply.errors import explain
 from labgrader.reply.finding import IDLE, REPAIRS, WATCHES, Finding
-from labgrader.reply.listed import recognise, recognise_parts
+from labgrader.reply.listed import equal_parts, recognise, recognise_parts
 from labgrader.reply.messages import Marked, marked, said
 from labgrader.reply.relations import View, related, wrong_sign
 
@@ -92,6 +92,7 @@ def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sent
     pairs = wrong_ones_first(question, cases, outputs)
     values_are_right = bool(pairs) and alike(question, pairs[0][0].expected, pairs[0][1])
     yield from found_in_the_program(question, pieces, findings, values_are_right)
+    yield from listed_parts(question, cases, outputs, alone=False)
     if not pairs or values_are_right:
         return
     yield from outputs_exchanged(question, cases, outputs)
@@ -163,8 +164,25 @@ def listed(question: Question, cases: Sequence[Case], outputs: Sequence[object])
     """The hint of the listed misconception that gives these outputs, or one of several in its place."""
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
-    for k, misconception in recognise_parts(question, cases, outputs):
-        yield Sentence("misconception", f"Output {k + 1} of {len(parts(cases[0].expected))}: {misconception.hint}")
+    yield from listed_parts(question, cases, outputs, alone=True)
+
+
+def listed_parts(question, cases, outputs, alone: bool) -> Iterator[Sentence]:
+    """The hints of what gives one output of several.
+
+    alone: of an output that alone is wrong in the case that is shown; else of the others. Where another output is wrong
+    there, too, or this one is right, a mark in the program tells more, and a hint may speak of what is not seen.
+    """
+    found = list(recognise_parts(question, cases, outputs))
+    if not found:
+        return
+    case, got = wrong_ones_first(question, cases, outputs)[0]
+    shown = [parts(case.expected)], [parts(got)]
+    count = len(shown[0][0])
+    wrong = [k for k in range(count) if not equal_parts(question, k, *shown)]
+    for k, misconception in found:
+        if (wrong == [k]) == alone:
+            yield Sentence("misconception", f"Output {k + 1} of {count}: {misconception.hint}")
 
 
 # ----------------------------------------------------------------------------------- the student's own program

@@ -10,7 +10,7 @@ import torch
 from labgrader.comparison import Problem, as_numpy, compare, expected_cases
 from labgrader.question import Misconception, Property, Question, Untold, wrong
 from labgrader.reply.judge import judge, outputs_of, verdict
-from labgrader.reply.sentences import Sentence, recognise
+from labgrader.reply.sentences import Sentence, at_once, recognise
 
 
 def iou(n):
@@ -277,6 +277,10 @@ def test_a_mistake_in_one_of_several_outputs_is_recognised_beside_the_others():
     assert judge(both, lambda n: (n.max(), n.mean()), seed=3).hint == "Output 1 of 2: the largest is no sum"
     assert judge(both, lambda n: (n.min(), n.max()), seed=3).hint == "Output 2 of 2: the largest is no mean"
     assert judge(both, lambda n: (n.sum(), n.max()), seed=3).hint == "the largest is no mean"
+    cases = expected_cases(both, 3)
+    for answer, is_alone in ((lambda n: (n.max(), n.mean()), True), (lambda n: (n.min(), n.max()), False)):
+        sentence = at_once(both, cases, outputs_of(answer, [case.args for case in cases])[0])
+        assert (sentence is not None) == is_alone, "with another output wrong beside it, the program is looked at first"
     assert "largest" not in judge(both, lambda n: (n.min(), n.mean()), seed=3).hint
 
 

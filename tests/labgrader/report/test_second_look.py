@@ -9,11 +9,11 @@ from labgrader.program.slice import Program
 from labgrader.run.run import Limits, Run, public_cases
 from labgrader.sandbox.sandbox import fresh_worker
 
-WRONG_AXIS = """import numpy as np
+NO_AXIS = """import numpy as np
 
 def iou(n):
     tp = np.diagonal(n)
-    return tp / (n.sum(axis=0) + n.sum(axis=0) - tp)
+    return tp / (n.sum(axis=0) + n.sum() - tp)
 """
 FORGES = """import json, sys
 import numpy as np
@@ -34,11 +34,11 @@ def run_of(source: str) -> Run:
 
 
 def test_the_students_line_is_told():
-    with run_of(WRONG_AXIS) as answer:
+    with run_of(NO_AXIS) as answer:
         told = explained(answer, answer.judge(public_cases(answer.question))[0])
     assert told.named and "axis" in told.hint
     *case, line, marks = told.shown.split("\n")
-    assert case[0].startswith("iou(") and "line 5" in line and marks.split() == ["^", "^"]
+    assert case[0].startswith("iou(") and "line 5" in line and marks.split() == ["^^^^^^^"]
 
 
 @pytest.mark.parametrize("source", [FORGES, LEAVES, "def iou(n):\n    while True: pass\n", "def iou("])
@@ -49,7 +49,7 @@ def test_what_cannot_be_believed_or_does_not_come_is_no_finding(source):
 
 
 def test_a_list_of_numbers_is_an_array_for_the_grader_as_for_the_check():
-    source = WRONG_AXIS.replace("axis=0) - tp", "axis=1) - tp").replace("return tp", "return list(tp").rstrip() + ")\n"
+    source = NO_AXIS.replace("sum() - tp", "sum(axis=1) - tp").replace("return tp", "return list(tp").rstrip() + ")\n"
     with run_of(source) as answer:
         judged, outputs = answer.judge(public_cases(answer.question))
     assert judged.passed and isinstance(outputs[0], np.ndarray)
