@@ -2,7 +2,7 @@
 
 Old (0bcca9f) beside new in one run, CPU ms of one thread on a slower machine, scene 600,000 of `test`: `refine` of the
 U-Net's probabilities 14 and 13 at 320x240, 107 and 110 at 640x480, 279 and 216 at 1280x720; a frame to grasps with the
-U-Net and the CRF 81 and 82 at 320x240, 323 and 321 at 640x480; of `--anything` what finds things, 809 and 505 at 640x480.
+U-Net and the CRF 81 and 82 at 320x240, 323 and 321 at 640x480; finding things for `--anything` 809 and 505 at 640x480.
 """
 
 import numpy as np
