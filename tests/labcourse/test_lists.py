@@ -76,19 +76,10 @@ def test_a_solution_runs_with_answers_that_return_lists_or_tuples(path: Path, co
     changed = tmp_path / "solutions" / path.stem / path.name
     changed.parent.mkdir(parents=True)
     changed.write_text(json.dumps(notebook), encoding="utf-8")
-    words = [
-        "-q",
-        "-p",
-        "tests.notebooks",
-        "-p",
-        "no:cacheprovider",
-        "--nbval",
-        "--nbval-current-env",
-        "--nbval-cell-timeout",
-        "500",
-    ]
+    # The settings of pyproject.toml are not found from a folder elsewhere: nbval is asked for once, by tests.notebooks.
+    words = "-q -p no:nbval -p tests.notebooks -p no:cacheprovider --nbval --nbval-current-env --nbval-cell-timeout 500"
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", *words, "--rootdir", ROOT, changed],
+        [sys.executable, "-m", "pytest", *words.split(), "--rootdir", ROOT, changed],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
