@@ -232,7 +232,9 @@ def _grown(table: Table, points, least: float) -> Table:
     P = points[seen]
     Q, curved = transform_points(table.T_table_frame, P), table.slack(P, CURVED)
     powers = _powers(Q[:, :2])
-    level = ~_upright(table, points)[seen]
+    heights = np.full(seen.shape, np.nan)
+    heights[seen] = Q[:, 2]
+    level = ~_upright(heights, points)[seen]
     for _ in range(GROWS):
         inside, height = table.over(P)
         on = inside & (np.abs(height) < table.slack(P, THICK))
@@ -251,9 +253,8 @@ def _grown(table: Table, points, least: float) -> Table:
     return table
 
 
-def _upright(table: Table, points) -> Bool[np.ndarray, "h w"]:
+def _upright(height: Float[np.ndarray, "h w"], points) -> Bool[np.ndarray, "h w"]:
     """Where a surface is steep: the face of a thing beside a table crosses its height, and is no piece of it."""
-    height = table.over(points.reshape(-1, 3))[1].reshape(points.shape[:2])
     upright = np.zeros(height.shape, bool)
     for axis, length in enumerate(height.shape):
         back, ahead = (np.clip(np.arange(length) + by, 0, length - 1) for by in (-ACROSS, ACROSS))
