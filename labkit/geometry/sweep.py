@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 
 from labkit.frame import RGBDFrame
 from labkit.geometry.calibration import sheet_pose
+from labkit.geometry.depth_units import resized_K
 from labkit.geometry.projection import invert_transform, pixel_rays
 from labkit.geometry.sheet import Sheet
 from labkit.support.validation import check_K, check_rgb, check_same_size, check_T, require
@@ -93,7 +94,7 @@ def view_of_sheet(
     scale = min(1.0, WIDEST / max(height, width))
     size = round(scale * width), round(scale * height)
     small = cv2.resize(straight, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else straight
-    return View(small, _scaling(size[0] / width, size[1] / height) @ K, invert_transform(T_cam_sheet), misfit)
+    return View(small, resized_K(K, (width, height), size), invert_transform(T_cam_sheet), misfit)
 
 
 def frame_from_views(views: Sequence[View], progress: Callable = lambda heights: heights) -> RGBDFrame:
@@ -320,13 +321,11 @@ def changed_places(first: View, others, depth, colours, other_colours, gains) ->
     """
     h, w = colours.shape[:2]
     H, W = depth.shape
-    half = _scaling(w / W, h / H)
     small = cv2.resize(depth, (w, h), interpolation=cv2.INTER_NEAREST)
     differs, looked = [], []
     for view, seen, gain in zip(others, other_colours, gains, strict=True):
-        uv, visible = _reprojected(
-            small, half @ first.K, half @ view.K, invert_transform(view.T_base_cam) @ first.T_base_cam
-        )
+        K, K_other = (resized_K(one.K, (W, H), (w, h)) for one in (first, view))
+        uv, visible = _reprojected(small, K, K_other, invert_transform(view.T_base_cam) @ first.T_base_cam)
         there = cv2.remap(seen, uv, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(OUTSIDE,) * 3)
         visible &= there[..., 0] > OUTSIDE / 2.0
         differs.append(visible & (np.abs(colours - np.maximum(there, 0.0) * gain).mean(axis=-1) > OTHER_COLOUR))
