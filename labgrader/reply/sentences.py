@@ -8,7 +8,7 @@ does it lack; and at last, which cases are wrong. What is said of an exception i
 
 import copy
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,23 +76,24 @@ def in_form(cases: Sequence[Case], outputs: Sequence[object]) -> list[object]:
     ]
 
 
-def known_at_once(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
-    """What `at_once` chooses from, of outputs in their form."""
-    yield from listed(question, cases, outputs)
+def known_at_once(question, cases, outputs, pieces=()) -> Generator[Sentence, None, list[Sentence]]:
+    """What `at_once` chooses from, of outputs in their form; returns what `listed` keeps for later."""
+    later = yield from listed(question, cases, outputs)
     yield from exceptions(question, cases, outputs, pieces)
     for name, view in views_of(question, cases, outputs):
         if says := wrong_sign(view):
             yield Sentence("relation", name + says)
+    return later
 
 
 def sentences(question, cases, outputs, pieces=(), findings=()) -> Iterator[Sentence]:
     """All sentences that are true of an answer, the surest first; arguments are those of `diagnose`."""
     outputs = in_form(cases, outputs)
-    yield from known_at_once(question, cases, outputs, pieces)
+    later = yield from known_at_once(question, cases, outputs, pieces)
     pairs = wrong_ones_first(question, cases, outputs)
     values_are_right = bool(pairs) and alike(question, pairs[0][0].expected, pairs[0][1])
     yield from found_in_the_program(question, pieces, findings, values_are_right)
-    yield from listed_parts(question, cases, outputs, alone=False)
+    yield from later
     if not pairs or values_are_right:
         return
     yield from outputs_exchanged(question, cases, outputs)
@@ -160,29 +161,28 @@ def out_of_time(cases: Sequence[Case], right: Sequence[bool], shown: int, got: P
 # ------------------------------------------------------------------------------------------ misconceptions
 
 
-def listed(question: Question, cases: Sequence[Case], outputs: Sequence[object]) -> Iterator[Sentence]:
-    """The hint of the listed misconception that gives these outputs, or one of several in its place."""
+def listed(
+    question: Question, cases: Sequence[Case], outputs: Sequence[object]
+) -> Generator[Sentence, None, list[Sentence]]:
+    """The hint of the listed misconception that gives these outputs, or of what gives the one that alone is wrong.
+
+    That is, of several outputs, in the case that is shown. Returns the hints of what gives one of the others: where
+    another output is wrong there, too, or this one is right, a mark in the program tells more, and a hint may speak of
+    what is not seen.
+    """
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
-    yield from listed_parts(question, cases, outputs, alone=True)
-
-
-def listed_parts(question, cases, outputs, alone: bool) -> Iterator[Sentence]:
-    """The hints of what gives one output of several.
-
-    alone: of an output that alone is wrong in the case that is shown; else of the others. Where another output is wrong
-    there, too, or this one is right, a mark in the program tells more, and a hint may speak of what is not seen.
-    """
     found = list(recognise_parts(question, cases, outputs))
     if not found:
-        return
+        return []
     case, got = wrong_ones_first(question, cases, outputs)[0]
     shown = [parts(case.expected)], [parts(got)]
     count = len(shown[0][0])
     wrong = [k for k in range(count) if not equal_parts(question, k, *shown)]
-    for k, misconception in found:
-        if (wrong == [k]) == alone:
-            yield Sentence("misconception", f"Output {k + 1} of {count}: {misconception.hint}")
+    hints = {k: Sentence("misconception", f"Output {k + 1} of {count}: {m.hint}") for k, m in found}
+    if len(wrong) == 1 and wrong[0] in hints:
+        yield hints.pop(wrong[0])
+    return list(hints.values())
 
 
 # ----------------------------------------------------------------------------------- the student's own program
