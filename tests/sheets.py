@@ -7,6 +7,7 @@ from functools import cache
 
 import cv2
 import numpy as np
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from labkit.geometry.sheet import Sheet
@@ -68,3 +69,10 @@ def poses(rng, count=12, tilt=40.0):
         )
         for _ in range(count)
     ]
+
+
+def save(path, picture, orientation=1):
+    """A JPEG as a phone writes it: the sensor's pixels, and how it was held."""
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(picture).save(path, quality=95, exif=exif)

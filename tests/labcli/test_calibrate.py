@@ -7,7 +7,6 @@ import numpy as np
 import pypdfium2
 import pytest
 import sheets
-from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from labcli.cameras import read_intrinsics
@@ -37,13 +36,6 @@ def test_the_sheet_is_printed_at_true_size(paper):
     assert (dark[-1] - dark[0]) * mm == pytest.approx(RULER_MM, abs=0.4)
 
 
-def save(path, picture, orientation=1):
-    """A JPEG as a phone writes it: the sensor's pixels, and how it was held."""
-    exif = Image.Exif()
-    exif[0x0112] = orientation
-    Image.fromarray(picture).save(path, quality=95, exif=exif)
-
-
 @pytest.fixture(scope="module")
 def shots():
     """Photographs of the printed page, warped and seen through a lens."""
@@ -59,7 +51,7 @@ def shots():
 def folder(tmp_path, shots):
     """A folder of nine good photographs."""
     for i, picture in enumerate(shots):
-        save(tmp_path / f"{i}.jpg", picture)
+        sheets.save(tmp_path / f"{i}.jpg", picture)
     return tmp_path
 
 
@@ -83,21 +75,21 @@ def test_portrait_among_landscape_is_turned_back(folder, labkit, shots):
     labkit("calibrate", folder)
     before = focal(folder)
     for i, orientation in ((0, 6), (1, 8), (2, 3)):
-        save(folder / f"{i}.jpg", shots[i], orientation)
+        sheets.save(folder / f"{i}.jpg", shots[i], orientation)
     labkit("calibrate", folder)
     assert focal(folder) == pytest.approx(before, rel=1e-6)
     for i, picture in enumerate(shots):
-        save(folder / f"{i}.jpg", picture, 6)
+        sheets.save(folder / f"{i}.jpg", picture, 6)
     labkit("calibrate", folder)
     portrait = read_intrinsics(str(folder / "camera.json"))
     assert portrait.size == sheets.SIZE[::-1] and portrait.K[1, 1] == pytest.approx(before, abs=1.0)
 
 
 def test_what_is_of_no_use_is_named_and_left_out(folder, labkit, shots, capsys):
-    save(folder / "cat.jpg", np.full_like(shots[0], 90))
-    save(folder / "zoom.jpg", cv2.resize(shots[0], (800, 600)))
-    save(folder / "cut.jpg", np.ascontiguousarray(shots[0].transpose(1, 0, 2)))
-    save(folder / "blurred.jpg", cv2.GaussianBlur(shots[3], (0, 0), 2.2))
+    sheets.save(folder / "cat.jpg", np.full_like(shots[0], 90))
+    sheets.save(folder / "zoom.jpg", cv2.resize(shots[0], (800, 600)))
+    sheets.save(folder / "cut.jpg", np.ascontiguousarray(shots[0].transpose(1, 0, 2)))
+    sheets.save(folder / "blurred.jpg", cv2.GaussianBlur(shots[3], (0, 0), 2.2))
     (folder / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0nothing")
     (folder / ".DS_Store").write_bytes(b"x")
     (folder / "IMG_1.HEIC").write_bytes(b"x")
@@ -118,7 +110,7 @@ def test_what_is_of_no_use_is_named_and_left_out(folder, labkit, shots, capsys):
 
 def test_too_few_leave_nothing_behind(tmp_path, labkit, shots, capsys):
     for i in range(4):
-        save(tmp_path / f"{i}.jpg", shots[i])
+        sheets.save(tmp_path / f"{i}.jpg", shots[i])
     before = sorted(tmp_path.iterdir())
     assert labkit("calibrate", tmp_path) == 2
     assert "at least 6 photographs" in capsys.readouterr().err and sorted(tmp_path.iterdir()) == before
@@ -137,7 +129,7 @@ def test_a_sheet_that_was_measured_moves_the_arms_camera(tmp_path, labkit, shots
     T_hand_sheet[:3, 3] = -0.09, -0.12, 0.05
     lines = ["name,x,y,z,qx,qy,qz,qw"]
     for i, T_cam_sheet in enumerate(sheets.poses(rng, 8, tilt=30.0)):
-        save(tmp_path / f"{i}.jpg", sheets.photograph(T_cam_sheet, rng))
+        sheets.save(tmp_path / f"{i}.jpg", sheets.photograph(T_cam_sheet, rng))
         arm = T_base_cam @ T_cam_sheet @ np.linalg.inv(T_hand_sheet)
         numbers = [*arm[:3, 3], *Rotation.from_matrix(arm[:3, :3]).as_quat()]
         lines.append(f"{i}.jpg," + ",".join(f"{x:.6f}" for x in numbers))

@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import pytest
 import sheets
-from PIL import Image
 
 from labcli import photos
 from labcli.cameras import read_intrinsics
@@ -25,12 +24,6 @@ def fewer_heights(monkeypatch):
     monkeypatch.setattr(sweep, "HEIGHTS", np.arange(-0.04, 0.121, 0.02))
 
 
-def save(path, picture, orientation=1):
-    exif = Image.Exif()
-    exif[0x0112] = orientation
-    Image.fromarray(picture).save(path, quality=95, exif=exif)
-
-
 @pytest.fixture(scope="module")
 def shots():
     rng = np.random.default_rng(4)
@@ -42,7 +35,7 @@ def here(tmp_path, shots):
     """shots/ with five photographs of the sheet, and camera.json beside it."""
     (tmp_path / "shots").mkdir()
     for i, picture in enumerate(shots):
-        save(tmp_path / "shots" / f"{i}.jpg", picture)
+        sheets.save(tmp_path / "shots" / f"{i}.jpg", picture)
     camera = {"width": 640, "height": 480, "fx": 520.0, "fy": 523.0, "cx": 325.0, "cy": 236.0}
     (tmp_path / "camera.json").write_text(json.dumps({**camera, "coeffs": list(sheets.LENS), "exif_orientation": 1}))
     return tmp_path
@@ -64,11 +57,11 @@ def test_photographs_become_a_frame_that_perceive_reads(here, make, shots, capsy
     """The sheet's plane is at z = 0 of what the files say, to 5 mm; what does not belong is named."""
     rng = np.random.default_rng(6)
     folder = here / "shots"
-    save(folder / "3.jpg", shots[3], orientation=3)  # the phone was held upside down; its sensor saw the same
-    save(folder / "cat.jpg", np.full_like(shots[0], 90))
+    sheets.save(folder / "3.jpg", shots[3], orientation=3)  # the phone was held upside down; its sensor saw the same
+    sheets.save(folder / "cat.jpg", np.full_like(shots[0], 90))
     zoomed = np.diag([1.25, 1.25, 1.0]) @ sheets.K
-    save(folder / "zoom.jpg", sheets.photograph(sheets.pose((38, 10)), rng, K=zoomed))
-    save(folder / "large.jpg", cv2.resize(shots[0], (800, 600)))
+    sheets.save(folder / "zoom.jpg", sheets.photograph(sheets.pose((38, 10)), rng, K=zoomed))
+    sheets.save(folder / "large.jpg", cv2.resize(shots[0], (800, 600)))
     (folder / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0nothing")
     assert make() == 0
     said = capsys.readouterr().out
@@ -105,7 +98,7 @@ def test_a_second_frame_joins_the_first(here, make, capsys):
 
 def test_too_few_leave_nothing_behind(here, make, capsys):
     (here / "shots" / "0.jpg").unlink()
-    save(here / "shots" / "1.jpg", np.full((480, 640, 3), 90, np.uint8))
+    sheets.save(here / "shots" / "1.jpg", np.full((480, 640, 3), 90, np.uint8))
     assert make() == 2
     said = capsys.readouterr().err
     assert "at least 5 photographs" in said and "1.jpg: no sheet found" in said and "hand's width apart" in said
@@ -115,7 +108,7 @@ def test_too_few_leave_nothing_behind(here, make, capsys):
 def test_photographs_from_one_place_tell_no_depth(here, make, capsys):
     rng = np.random.default_rng(1)
     for i in range(5):
-        save(here / "shots" / f"{i}.jpg", sheets.photograph(sheets.pose((30, 0.1 * i)), rng))
+        sheets.save(here / "shots" / f"{i}.jpg", sheets.photograph(sheets.pose((30, 0.1 * i)), rng))
     assert make() == 2
     assert "from several places" in capsys.readouterr().err and not (here / "data").exists()
 
@@ -180,7 +173,7 @@ def test_from_a_phones_photographs_to_a_grasp(tmp_path, labkit, monkeypatch, cap
     moved = photograph(700_004, moved=2)
     (tmp_path / "shots").mkdir()
     for i, picture in enumerate([*shots.pictures[:2], moved.pictures[2], *shots.pictures[3:]]):
-        save(tmp_path / "shots" / f"{i}.jpg", picture)
+        sheets.save(tmp_path / "shots" / f"{i}.jpg", picture)
     (fx, _, cx), (_, fy, cy) = shots.K[:2].tolist()
     camera = {"width": 1280, "height": 960, "fx": fx, "fy": fy, "cx": cx, "cy": cy, "coeffs": list(shots.distortion)}
     (tmp_path / "camera.json").write_text(json.dumps(camera))
