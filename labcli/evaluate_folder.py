@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from tqdm.auto import tqdm
 
 from labcli.cameras import read_intrinsics
-from labcli.perceive import on_table
+from labcli.perceive import on_own_table
 from labcli.pictures import NOTHING_SAID, Reading, Shot, camera_file, depth_beside, pictures_in, read_numbers, read_shot
 from labcli.report import PAGE, figures
 from labkit.frame import RGBDFrame
@@ -124,7 +124,7 @@ class TrueThings(Sequence):
 
 
 def judge(things: TrueThings, find: Finder) -> list[Judged]:
-    """Find the things of each picture on the table that its depth shows, and score them.
+    """Find the things of each picture on the table that its depth shows, or pose/NAME.txt says, and score them.
 
     In a picture without a table nothing is found, which counts, and is said.
     """
@@ -132,7 +132,7 @@ def judge(things: TrueThings, find: Finder) -> list[Judged]:
     for index, frame in enumerate(tqdm(things, desc="pictures", unit="picture")):
         found, said = np.zeros(frame.depth.shape, np.int32), ""
         try:
-            seen, _ = on_table(replace(frame, instances=None))
+            seen = on_own_table(replace(frame, instances=None), things.colors[index])
         except ValueError as error:
             said = f"nothing was looked for: {error}"
         else:

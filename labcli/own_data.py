@@ -10,8 +10,8 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from labcli.cameras import read_intrinsics
-from labcli.perceive import on_table, taken_for_target
-from labcli.pictures import NOTHING_SAID, Reading, camera_file, depth_beside, pictures_in, read_shot
+from labcli.perceive import on_own_table, taken_for_target
+from labcli.pictures import NOTHING_SAID, Reading, camera_file, depth_beside, pictures_in, pose_beside, read_shot
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import back_project_to_base
 from labkit.labels import BACKGROUND, CLASSES, IGNORE, SURFACE, TARGET
@@ -28,9 +28,9 @@ class PictureFolder(Sequence):
     known of its unit and size, and of the camera's file. A mask has its picture's name and holds the kit's classes, 0
     to 3, or 255 where nobody knows. If all masks together hold 0 and one other value alone, such as 255 or 1, that
     value is the target, as in `labkit perceive --mask`. camera.json (or .yaml, .txt) is anything that `labkit perceive
-    --intrinsics` reads. The table is found in each depth picture, and the base frame laid on it. If no mask has a pixel
-    of surface, 0 does not say what is table: there what lies on the table's plane is surface, and what has no depth is
-    ignored.
+    --intrinsics` reads. The table is found in each depth picture, and the base frame laid on it, unless pose/NAME.txt
+    says where the camera was, as `labkit photos` writes it, with the table at z = 0. If no mask has a pixel of surface,
+    0 does not say what is table: there what lies on the table's plane is surface, and what has no depth is ignored.
 
     An item is an RGBDFrame with labels. All pictures are read once when the folder is opened: on stderr stands which
     are left out and why, what looks wrong about the others, and the share of each class. Raises FileNotFoundError or
@@ -60,7 +60,7 @@ class PictureFolder(Sequence):
         counts = np.zeros(256, np.int64)
         for color in tqdm(found, desc=f"checking {self.folder}", unit="picture", disable=not ranks.is_main()):
             try:
-                frame = self._with_surface(on_table(self._read(color))[0])
+                frame = self._with_surface(on_own_table(self._read(color), color))
             except (ValueError, OSError) as error:
                 why = f"{color} is left out: {error}"
                 _say(why)
@@ -76,6 +76,8 @@ class PictureFolder(Sequence):
         shares = zip(CLASSES, counts / max(1, counts[: len(CLASSES)].sum()), strict=False)
         shares = ", ".join(f"{name} {share:.1%}" for name, share in shares)
         _say(f"{self.folder}: {len(self.pictures)} of {len(found)} pictures; of the labelled pixels {shares}")
+        if posed := sum(pose_beside(color) is not None for color in self.pictures):
+            _say(f"{self.folder}: pose/ says where the camera was for {posed} of them, with the table at z = 0")
         if not self.says_surface:
             _say(f"{self.folder}: no mask has a pixel of surface, 1: what is 0 on the table's plane is taken for it")
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from labcli.documents import numbers_of, parsed, text_of
-from labcli.pictures import Shot, read_frame, read_numbers  # noqa: F401, labs look for read_frame here
+from labcli.pictures import Shot, pose_beside, read_frame, read_numbers  # noqa: F401, labs look for read_frame here
+from labcli.poses import read_pose
 from labkit.frame import RGBDFrame, read_image
 from labkit.geometry import Plane, Table, back_project, base_on_table, find_tables, invert_transform
 from labkit.geometry.depth_units import LIKELY
@@ -114,6 +115,18 @@ def on_table(frame: RGBDFrame, table_z: float = 0.0) -> tuple[RGBDFrame, Plane]:
     T = base_on_table(tables[0].plane)
     T[2, 3] += table_z
     return replace(frame, T_base_cam=T, table_z=table_z), tables[0].plane
+
+
+def on_own_table(frame: RGBDFrame, color: Path) -> RGBDFrame:
+    """A frame of a folder of pictures in its base frame, with the table at z = 0.
+
+    The pose is that of pose/NAME.txt beside color/NAME.png, as `labkit photos` writes it, where that is there; else the
+    table is found as in `on_table`, which raises ValueError if there is none, as does a file that is no pose.
+    """
+    beside = pose_beside(color)
+    if beside is None:
+        return on_table(frame)[0]
+    return replace(frame, T_base_cam=read_pose(str(beside), color).in_base(frame)[0], table_z=0.0)
 
 
 def _why_none(frame: RGBDFrame) -> str:

@@ -194,7 +194,7 @@ def describe(table: Table, written: list[Path]) -> str:
     """Say what was found, and how to go on."""
     frame = table.frame
     tilt = np.degrees(np.arcsin(np.clip(-frame.T_base_cam[2, 2], -1.0, 1.0)))
-    camera, pose, depth, color = written
+    camera, _, depth, color = written
     return "\n".join(
         [
             *table.said,
@@ -202,6 +202,6 @@ def describe(table: Table, written: list[Path]) -> str:
             f"camera: {frame.T_base_cam[2, 3]:.3f} m over the sheet, looking {tilt:.0f} degrees down",
             f"depth is known at {(frame.depth > 0.0).mean():.0%} of the pixels",
             *(f"wrote {path}" for path in written),
-            f"next: labkit perceive {color} {depth} --intrinsics {camera} --camera-pose {pose} --anything",
+            f"next: labkit perceive {color} {depth} --intrinsics {camera} --anything",
         ]
     )

@@ -228,6 +228,12 @@ def depth_beside(color: Path) -> Path:
 DEPTH_ENDINGS = (".png", ".tiff", ".tif", ".pfm", ".npy", ".npz", ".exr")
 
 
+def pose_beside(color: Path) -> Path | None:
+    """The file with a picture's camera pose, pose/NAME.txt beside color/NAME.png, None if there is none."""
+    path = color.parent.parent / "pose" / f"{color.stem}.txt"
+    return path if color.parent.name == "color" and path.is_file() else None
+
+
 def camera_file(folder: Path) -> Path | None:
     """The file with the camera of a folder's pictures, None if there is none."""
     return next((path for name in CAMERA_FILES if (path := folder / name).is_file()), None)

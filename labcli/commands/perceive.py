@@ -18,7 +18,10 @@ def perceive(
     ],
     camera_pose: Annotated[
         str | None,
-        typer.Option(help='Pose of the camera in the base frame: "x y z qx qy qz qw", a 4x4 matrix, or a file.'),
+        typer.Option(
+            help='Pose of the camera in the base frame: "x y z qx qy qz qw", a 4x4 matrix, or a file; by default '
+            "pose/NAME.txt beside color/NAME.png, if it is there."
+        ),
     ] = None,
     plane: Annotated[
         Literal["auto"] | None,
@@ -72,7 +75,7 @@ def perceive(
 
     from labcli import perceive as own
     from labcli.cameras import read_intrinsics
-    from labcli.pictures import Reading, read_shot
+    from labcli.pictures import Reading, pose_beside, read_shot
     from labcli.poses import read_pose
     from labcli.report import save
     from labkit.labels import TARGET
@@ -88,6 +91,9 @@ def perceive(
     if instances and (mask is None or target is not None):
         raise ValueError("instances: expected --mask FILE beside it, and no --target; each value is one")
     check_writable(out)  # before anything that takes its time
+    if camera_pose is None and plane is None and (beside := pose_beside(color)):
+        camera_pose = str(beside)
+        typer.echo(f"camera_pose: {beside}, which lies beside the picture; --plane auto finds the table instead")
     pose = read_pose(camera_pose, color) if camera_pose else None
     shot = read_shot(
         color, depth, read_intrinsics(intrinsics, color, camera_name), Reading(depth_scale, aligned, camera_name)

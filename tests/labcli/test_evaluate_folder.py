@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from bench import outlines
 from labcli import evaluate_folder as own
 from labcli.cli import app
+from labcli.perceive import on_table
 from labkit.instance_metrics import InstanceScores
 from labkit.labels import OBSTACLE, SURFACE, TARGET
 from labkit.learning.things import instance_finder
@@ -98,7 +99,7 @@ def test_a_network_gives_things_by_its_classes(folder):
     true = np.where(frame.instances == 65535, 0, frame.instances)
     depth = frame.depth.copy()
     depth[::7] = 0.0
-    frame, _ = own.on_table(own.replace(frame, depth=depth))
+    frame, _ = on_table(own.replace(frame, depth=depth))
 
     def network(rgb):
         classes = np.where(true == 300, OBSTACLE, np.where(true > 0, TARGET, SURFACE))

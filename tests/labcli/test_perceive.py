@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import data_gen
 from data_gen import DepthSensor
-from labcli import cameras, perceive, report
+from labcli import cameras, evaluate_folder, perceive, report
 from labcli.cli import app
 from labcli.own_data import PictureFolder
 from labcli.pictures import Reading, read_shot
@@ -73,8 +74,6 @@ def test_with_the_table_fitted_the_targets_are_where_the_simulator_has_them(shot
 
 
 def test_a_given_pose_gives_the_grasps_of_the_pipeline_itself(shot, tmp_path):
-    from scipy.spatial.transform import Rotation
-
     T = shot.frame.T_base_cam
     pose = " ".join(map(str, [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()]))
     mask = str(shot.folder / "mask.png")
@@ -303,6 +302,32 @@ def test_a_folder_of_ones_own_pictures_is_a_data_set(shot, own, capsys):
         PictureFolder(own)
     with pytest.raises(FileNotFoundError, match="color/, depth/ and mask/"):
         PictureFolder(own / "mask")
+
+
+def test_a_pose_beside_a_picture_of_a_folder_is_taken(shot, own, tmp_path, capsys):
+    """pose/NAME.txt, as `labkit photos` writes it: perceive, train and evaluate read it, and say so."""
+    T = np.eye(4)
+    T[:3, 3] = (0.0, 0.0, -shot.spec.table.z)
+    T = T @ shot.frame.T_base_cam
+    (own / "pose").mkdir()
+    (own / "pose" / "a.txt").write_text(" ".join(map(str, [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()])))
+    assert np.allclose(PictureFolder(own)[0].T_base_cam, T, atol=1e-6)
+    assert "pose/ says where the camera was for 1 of them" in capsys.readouterr().err
+    seen = []
+    evaluate_folder.judge(
+        evaluate_folder.TrueThings(own), lambda frame: seen.append(frame) or seen[0].depth.astype(int) * 0
+    )
+    assert np.allclose(seen[0].T_base_cam, T, atol=1e-6) and seen[0].table_z == 0.0
+    arguments = ["perceive", own / "color" / "a.png", own / "depth" / "a.png", "--intrinsics", shot.K, "--mask"]
+    arguments = [*map(str, arguments), str(own / "mask" / "a.png"), "--out", str(tmp_path / "out")]
+    said = CliRunner().invoke(app, arguments).output
+    assert f"camera_pose: {own / 'pose' / 'a.txt'}, which lies beside the picture" in said.replace("\n", "")
+    assert np.allclose(json.loads((tmp_path / "out" / "grasps.json").read_text())["T_base_cam"], T, atol=1e-6)
+    said = CliRunner().invoke(app, [*arguments, "--plane", "auto"]).output
+    assert "lies beside" not in said and "lie on one plane" in said
+    (own / "pose" / "a.txt").write_text("nothing")
+    with pytest.raises(ValueError, match="camera_pose: expected"):
+        PictureFolder(own)
 
 
 @pytest.mark.parametrize("value", [1, 2, 3, 200, 255, 3000])
