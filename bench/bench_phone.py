@@ -4,34 +4,42 @@ Simulated photographs (`data_gen.phone`) of scenes of `any` that nothing was tra
 exposure by picture and by place, blur, noise, JPEG, a hand that rolls; a fifth of the things white, a third of the
 tables plain. The sheet is found at 1280 x 960, poses are those that it gives, and the sweep (`labkit.geometry.sweep`)
 runs at 640 x 480. Beside it the same views drawn without lens and noise, with exact depth and poses. As one piece: a
-thing's IoU with something found is over 0.5. False: most pixels of what is found lie on no thing. In brackets: 95 %
-intervals (Wilson). No weights were trained on such depth; the sweep's constants were chosen on seeds 700,001, 700,003
-and 700,004 and on the real sets. The last table is of real photographs of a table (`../shared/real/views`), whose poses
-are a tracker's and whose depth is a Kinect's; where they are not, it is left out.
-`python -m bench.bench_phone 40` takes 40 scenes.
+thing's IoU with something found is over 0.5. False: most pixels of what is found lie on no thing. Lifts: the simulated
+Panda tries what is planned for a click in the middle of the largest target in view (as `labkit perceive --anything
+--at`). Heaps: scenes of `clutter`, of which nothing was trained on either. In brackets: 95 % intervals, of shares by
+Wilson, of other numbers by drawing the scenes again. No weights were trained on such depth; the sweep's constants were
+chosen on seeds 700,001, 700,003 and 700,004 and on the real sets. The last table is of real photographs of a table
+(`../shared/real/views`), whose poses are a tracker's and whose depth is a Kinect's; where they are not, it is left out.
+`python -m bench.bench_phone 40 10 kept.jsonl` takes 40 scenes and 10 heaps, and keeps what it has in a file, from which
+it goes on.
 """
 
+import json
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from bench.measure import table
+from bench.bench_things import middle
+from bench.measure import resampled, table
 from data_gen.phone import Shots, photograph
+from labcli.evaluation import lift_anew
 from labcli.perceive import perceive
 from labkit.frame import RGBDFrame
 from labkit.geometry import back_project, base_on_table, find_tables, invert_transform, nearest_rotation
 from labkit.geometry.sweep import LEAST_VIEWS, View, sweep, view_of_sheet
 from labkit.instance_metrics import InstanceScores, pool, score_instances
-from labkit.learning.network import load_model, weights_path
-from labkit.learning.things import instance_finder, segment_instances
+from labkit.labels import TARGET
+from labkit.learning.things import instance_finder
 from labkit.metrics import wilson_interval
 from labkit.pipeline import Pipeline
 
-FIRST, SCENES = 700_000, 20
+FIRST, SCENES, HEAPS = 700_000, 20, 5
 NEAR = 0.01  # metres
+LEAST_CLICKED = 200  # pixels of a target that somebody can click on
 REAL = Path(__file__).resolve().parents[2] / "shared" / "real" / "views"
 REAL_K = np.array([[525.0, 0.0, 320.0], [0.0, 525.0, 240.0], [0.0, 0.0, 1.0]])
 ON_TABLE, ON_THINGS = 0.012, (0.02, 0.3)  # metres over the table
@@ -39,52 +47,107 @@ ON_TABLE, ON_THINGS = 0.012, (0.02, 0.3)  # metres over the table
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """What was found in one frame: scores of its things, false ones, and whether the best grasp is on a thing."""
+    """What was found in one frame: scores of its things, false ones, where the best grasp is, and how a lift ended.
+
+    grasp: "on", "off" or "none". lift: "lifted" or why not; "" where no target is in view.
+    """
 
     scores: InstanceScores
     false: int
     grasp: str
+    lift: str
 
 
-def main(scenes: int = SCENES) -> str:
-    """Photograph scenes and score both kinds of depth; returns the tables."""
-    network = load_model(weights_path("unet_rgbd"))
-    errors, without, poses, ways = [], 0, [], {"photographs": [], "exact": []}
-    for seed in range(FIRST, FIRST + int(scenes)):
-        shots = photograph(seed)
-        views = [view_of_sheet(picture, shots.K, shots.distortion) for picture in shots.pictures]
-        without += sum(view is None for view in views)
-        poses += [pose_error(shots, i, view) for i, view in enumerate(views) if view is not None]
-        ways["exact"].append(look(network, shots.frame, shots))
-        seen = [view for view in views if view is not None]
-        if views[0] is None or len(seen) < LEAST_VIEWS:
-            empty = np.zeros_like(shots.frame.instances)
-            scores = score_instances(shots.frame.instances, empty)
-            ways["photographs"].append(Looked(scores, 0, "none"))
-            continue
-        depth = sweep(seen).depth
-        frame = replace(shots.frame, rgb=views[0].rgb, depth=depth, T_base_cam=shots.T_base_sheet @ views[0].T_base_cam)
-        errors.append(depth_errors(depth, shots.frame))
-        ways["photographs"].append(look(network, frame, shots))
-        print(seed, *(f"{way}: {looked_[-1].scores.over(0.5)}" for way, looked_ in ways.items()), file=sys.stderr)
-    count = int(scenes) * len(shots.pictures)
-    metres, degrees = np.median(poses, axis=0)
-    head = (
-        f"{scenes} scenes, {count} photographs; no sheet was found in {without}. Poses are off by "
-        f"{1e3 * metres:.2f} mm and {degrees:.3f} degrees in the median."
-    )
-    parts = [
-        head,
-        table("depth of photographs | known | median error, mm | within 10 mm of what is known", depth_rows(errors)),
-        table(
-            "depth | things as one piece | found | false per scene | foreground IoU | best grasp on a thing, off, none",
-            [row(way, looked_) for way, looked_ in ways.items()],
-        ),
-    ]
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene by both kinds of depth: photographs, those without a sheet, errors of poses (m, degrees) and depth.
+
+    depth: for "things" and "table" the share known, median error and share within 10 mm; None without a frame.
+    """
+
+    photographs: int
+    without: int
+    poses: list[tuple[float, float]]
+    depth: dict[str, tuple[float, float, float]] | None
+    ways: dict[str, Looked]
+
+
+def main(scenes: int = SCENES, heaps: int = HEAPS, kept: str = "") -> str:
+    """Photograph scenes and score both kinds of depth; returns the tables. kept: a file to go on from."""
+    find = instance_finder()
+    results = {
+        config: [scene(config, seed, find, kept) for seed in range(FIRST, FIRST + int(count))]
+        for config, count in (("any", scenes), ("clutter", heaps))
+    }
+    parts = [part for config, looked in results.items() if looked for part in tables(config, looked)]
     if REAL.is_dir():
         header = "real views | table known | table within 10 mm, of all | things known | within 15 mm, of all"
         parts.append(table(header, [real(folder) for folder in sorted(REAL.iterdir()) if folder.is_dir()]))
     return "\n\n".join(parts)
+
+
+def scene(config: str, seed: int, find: Callable, kept: str = "") -> Scene:
+    """Photograph and judge a scene, or take it from a file of those that were judged, and write it there."""
+    lines = Path(kept).read_text().splitlines() if kept and Path(kept).is_file() else []
+    for line in map(json.loads, lines):
+        if [line.pop("config"), line.pop("seed")] == [config, seed]:
+            ways = {
+                way: Looked(**one | {"scores": InstanceScores(**one["scores"])})
+                for way, one in line.pop("ways").items()
+            }
+            return Scene(ways=ways, **line)
+    found = judged(photograph(seed, config), find)
+    if kept:
+        with Path(kept).open("a") as file:
+            file.write(json.dumps({"config": config, "seed": seed, **asdict(found)}) + "\n")
+    print(
+        config,
+        seed,
+        *(f"{way}: {one.scores.over(0.5)}, {one.lift};" for way, one in found.ways.items()),
+        file=sys.stderr,
+    )
+    return found
+
+
+def judged(shots: Shots, find: Callable) -> Scene:
+    """Look at a scene by photographs, and by exact depth."""
+    views = [view_of_sheet(picture, shots.K, shots.distortion) for picture in shots.pictures]
+    seen = [view for view in views if view is not None]
+    poses = [pose_error(shots, i, view) for i, view in enumerate(views) if view is not None]
+    ways, depth = {}, None
+    if views[0] is None or len(seen) < LEAST_VIEWS:
+        scores = score_instances(shots.frame.instances, np.zeros_like(shots.frame.instances))
+        ways["photographs"] = Looked(scores, 0, "none", "no frame" if clicked(shots) else "")
+    else:
+        swept = sweep(seen).depth
+        pose = shots.T_base_sheet @ views[0].T_base_cam
+        depth = depth_errors(swept, shots.frame)
+        ways["photographs"] = look(find, replace(shots.frame, rgb=views[0].rgb, depth=swept, T_base_cam=pose), shots)
+    ways["exact"] = look(find, shots.frame, shots)
+    return Scene(len(views), len(views) - len(seen), poses, depth, ways)
+
+
+def tables(config: str, scenes: Sequence[Scene]) -> list[str]:
+    """What is said of the scenes of one kind: a sentence, and two tables."""
+    photographs, without = (sum(getattr(one, name) for one in scenes) for name in ("photographs", "without"))
+    metres, degrees = np.median([pose for one in scenes for pose in one.poses], axis=0)
+    name = {"any": "scenes", "clutter": "heaps"}[config]
+    head = (
+        f"{len(scenes)} {name}, {photographs} photographs; no sheet was found in {share(without, photographs)}. Poses "
+        f"are off by {1e3 * metres:.2f} mm and {degrees:.3f} degrees in the median."
+    )
+    header = "things as one piece | of those that exact depth finds | found | false per scene | foreground IoU"
+    return [
+        head,
+        table(
+            f"{name}: depth of photographs | known | median error, mm | within 10 mm of what is known",
+            depth_rows(scenes),
+        ),
+        table(
+            f"{name}: depth | {header} | best grasp on a thing (off, none) | target lifted after a click",
+            [row(way, scenes) for way in ("photographs", "exact")],
+        ),
+    ]
 
 
 def pose_error(shots: Shots, i: int, view: View) -> tuple[float, float]:
@@ -100,39 +163,100 @@ def depth_errors(depth, true: RGBDFrame) -> dict[str, tuple[float, float, float]
     known, off = depth > 0.0, np.abs(depth - true.depth)
     where = {"things": true.instances > 0, "table": true.labels == 1}
     return {
-        name: (known[mask].mean(), float(np.median(off[known & mask])), (off[known & mask] < NEAR).mean())
+        name: tuple(map(float, (known[mask].mean(), np.median(off[known & mask]), (off[known & mask] < NEAR).mean())))
         for name, mask in where.items()
     }
 
 
-def depth_rows(errors: list[dict]) -> list[list]:
+def depth_rows(scenes: Sequence[Scene]) -> list[list]:
     """Means over scenes."""
-    means = {name: np.mean([scene[name] for scene in errors], axis=0) for name in errors[0]}
-    return [[name, f"{k:.0%}", f"{1e3 * off:.1f}", f"{near:.0%}"] for name, (k, off, near) in means.items()]
+    rows = []
+    for name in ("things", "table"):
+        numbers = np.array([one.depth[name] for one in scenes if one.depth])
+        known, off, near = (around(numbers[:, i], np.mean) for i in range(3))
+        rows.append(
+            [name, percent(*known), "{:.1f} ({:.1f} to {:.1f})".format(*(1e3 * x for x in off)), percent(*near)]
+        )
+    return rows
 
 
-def look(network, frame: RGBDFrame, shots: Shots) -> Looked:
-    """Find things in a frame, and plan grasps of them."""
-    true = shots.frame.instances
-    found = segment_instances(network, frame).instances
-    false = sum((true[found == number] > 0).mean() <= 0.5 for number in np.unique(found[found > 0]))
-    pipeline = Pipeline(find_objects=instance_finder(network), workspace="table")
+def look(find: Callable, frame: RGBDFrame, shots: Shots) -> Looked:
+    """Find things in a frame, plan grasps of them, and let the arm try what a click on a target gives."""
+    true, pose, table_z = shots.frame.instances, frame.T_base_cam, frame.table_z
     bare = replace(frame, labels=None, instances=None)
-    seen = perceive(bare, pipeline, T_base_cam=frame.T_base_cam, table_z=frame.table_z).perception
-    if not seen.plan.grasps:
-        return Looked(score_instances(true, found), int(false), "none")
-    under = true.ravel()[seen.pixels[seen.plan.grasps[0].target]]
-    return Looked(score_instances(true, found), int(false), "on" if np.mean(under > 0) > 0.5 else "off")
+    things = find(bare)
+    found = things.instances
+    false = sum((true[found == number] > 0).mean() <= 0.5 for number in np.unique(found[found > 0]))
+    pipeline = Pipeline(find_objects=lambda _: things, workspace="table")
+    seen = perceive(bare, pipeline, T_base_cam=pose, table_z=table_z).perception
+    grasp = "none"
+    if seen.plan.grasps:
+        under = true.ravel()[seen.pixels[seen.plan.grasps[0].target]]
+        grasp = "on" if np.mean(under > 0) > 0.5 else "off"
+    at, lift = clicked(shots), ""
+    if at is not None:
+        asked = perceive(bare, pipeline, T_base_cam=pose, table_z=table_z, at=at).perception
+        lift = lifted(shots, asked, shots.spec.objects[true[at[1], at[0]] - 1].name)
+    return Looked(score_instances(true, found), int(false), grasp, lift)
 
 
-def row(way: str, looked: list[Looked]) -> list:
+def clicked(shots: Shots) -> tuple[int, int] | None:
+    """The middle of the target that shows most of itself, if one can be clicked on."""
+    true = shots.frame.instances
+    targets = true[shots.frame.labels == TARGET]
+    number = np.bincount(targets, minlength=1).argmax()
+    return middle(true == number) if np.count_nonzero(targets == number) >= LEAST_CLICKED else None
+
+
+def lifted(shots: Shots, perception, name: str) -> str:
+    """Let the arm try in the scene that was photographed: "lifted" if the thing of that name is up, else why not."""
+    result = lift_anew(replace(shots.spec, robot=True), perception)
+    return "lifted" if result.success and result.name == name else f"{result.reason} {result.name or ''}".strip()
+
+
+def row(way: str, scenes: Sequence[Scene]) -> list:
     """One way's row of the table of things."""
+    looked, exact = [one.ways[way] for one in scenes], [one.ways["exact"] for one in scenes]
     s = pool([one.scores for one in looked])
-    low, high = wilson_interval(s.over_half, s.true)
-    grasps = ", ".join(str(sum(one.grasp == place for one in looked)) for place in ("on", "off", "none"))
-    pieces = f"{s.over_half} of {s.true} ({s.over_half / s.true:.0%}; {low:.0%} to {high:.0%})"
-    false = sum(one.false for one in looked) / len(looked)
-    return [way, pieces, s.found, f"{false:.1f}", f"{s.foreground_iou:.2f}", grasps]
+    both = [
+        a > 0.5
+        for one, of in zip(looked, exact, strict=True)
+        for a, b in zip(one.scores.iou, of.scores.iou, strict=True)
+        if b > 0.5
+    ]
+    grasps = [one.grasp for one in looked]
+    tried = [one.lift for one in looked if one.lift]
+    false = around([one.false for one in looked], np.mean)
+    foreground = around(
+        [one.scores.foreground for one in looked], lambda counts: counts[:, 0].sum() / counts[:, 1].sum()
+    )
+    return [
+        way,
+        share(s.over_half, s.true),
+        "" if way == "exact" else share(sum(both), len(both)),
+        s.found,
+        "{:.1f} ({:.1f} to {:.1f})".format(*false),
+        "{:.2f} ({:.2f} to {:.2f})".format(*foreground),
+        f"{share(grasps.count('on'), len(grasps))} ({grasps.count('off')}, {grasps.count('none')})",
+        share(tried.count("lifted"), len(tried)) if tried else "",
+    ]
+
+
+def share(count: int, of: int) -> str:
+    """A share with its 95 % interval, as "54 of 92 (59%; 48% to 68%)"."""
+    low, high = wilson_interval(count, of)
+    return f"{count} of {of} ({count / of:.0%}; {low:.0%} to {high:.0%})"
+
+
+def around(numbers, statistic: Callable) -> tuple[float, float, float]:
+    """A statistic of scenes' numbers and its 95 % interval."""
+    numbers = np.array(numbers)
+    return (float(statistic(numbers)), *resampled(numbers, statistic))
+
+
+def percent(value: float, low: float, high: float) -> str:
+    """As "64% (60% to 68%)"."""
+    return f"{value:.0%} ({low:.0%} to {high:.0%})"
 
 
 def real(folder: Path) -> list:

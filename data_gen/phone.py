@@ -32,6 +32,7 @@ class Shots:
 
     pictures: RGB, `SIZE`. K, distortion: the phone's. T_base_cam: true poses, in the robot's base frame. T_base_sheet:
     of the printed sheet. frame: what an exact depth camera with half the first picture's pixels, and no lens, sees.
+    spec: the scene, without a robot.
     """
 
     pictures: list[UInt8[np.ndarray, "H W 3"]]
@@ -40,6 +41,7 @@ class Shots:
     T_base_cam: list[Float[np.ndarray, "4 4"]]
     T_base_sheet: Float[np.ndarray, "4 4"]
     frame: RGBDFrame
+    spec: SceneSpec
 
 
 def with_sheet(spec: SceneSpec, rng: np.random.Generator) -> SceneSpec:
@@ -99,7 +101,7 @@ def photograph(seed: int, config: str = "any", count: int = 7, moved: int | None
     T_base_sheet = np.eye(4)
     T_base_sheet[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     T_base_sheet[:3, 3] = x, y, spec.table.z
-    return Shots(pictures, K, lens, poses, T_base_sheet, frame)
+    return Shots(pictures, K, lens, poses, T_base_sheet, frame, spec)
 
 
 @contextmanager
