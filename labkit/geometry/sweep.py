@@ -5,6 +5,7 @@ agree. They agree in two ways. Patterns agree however each was exposed (normalis
 tell the height sharply, where there is a pattern. Colours agree once exposures are matched, and tell the height roughly
 wherever another colour is near: the middle of a white mug does not lie on the table, for at that height some of the
 photographs show table. Where neither tells, neighbours (semi-global matching, Hirschmueller 2008) and the table decide.
+Depth is unknown where a piece seems to rise from the table and nothing proves it, and where parallax is too small.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,6 +35,9 @@ TABLE, NEAR_TABLE = 0.02, 0.004  # by so much the table's own height is cheaper,
 SMALL_STEP, LARGE_STEP = 0.02, 0.25  # price of a height that differs from the neighbour's by one step, by more
 COLOUR_STEP = 12.0  # grey levels between neighbours over which a large step costs half
 SURE = 0.5  # certainty under which depth is not known
+FLAT = 0.012  # metres from the table: what lies beyond must be proven
+PROOF, PROVEN = 0.4, 0.3  # by so much a height must be cheaper than the table's, at so large a share of a raised piece
+COARSE = 0.03  # metres: where one pixel of the widest parallax means more, depth is not known
 LEAST_FITTED, REFLECTION = 50, 15  # points that exposure is fitted to; side of a window of these, 120 pixels wide
 DARK, BRIGHT = 8.0, 247.0  # grey levels beyond which a sensor tells no exposure
 HIDDEN = 0.015  # metres that a point must lie behind another to be hidden by it
@@ -141,12 +145,36 @@ def sweep(views: Sequence[View], progress: Callable = lambda heights: heights) -
     total = _upsampled(_smoothed(by_pattern, by_colour, colours), (W, H))
     total += by_pattern
     k = total.argmin(axis=0)
-    depth = depth_at(first, _between(total, k))
+    height = _between(total, k)
+    depth = depth_at(first, height)
     certainty = _certainty(patterns.weight, by_pattern, by_colour, k)
     known = (certainty > SURE) & (k > 0) & (k < len(HEIGHTS) - 1) & np.isfinite(depth)
+    known &= ~_unproven(known & (np.abs(height) > FLAT), total[np.abs(HEIGHTS).argmin()] - total.min(axis=0) >= PROOF)
+    known &= depth**2 <= COARSE * first.K[0, 0] * _widest(views)
     depth = np.where(known, depth, 0.0).astype(np.float32)
     changed = changed_places(first, others, depth, colours, other_colours, gains)
     return Swept(depth, np.where(known, certainty, 0.0).astype(np.float32), changed)
+
+
+def _unproven(raised: Bool[np.ndarray, "H W"], proof: Bool[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+    """Pixels that seem to rise from the table, cost hardly more on it, and belong to a piece of which the same is true.
+
+    The middle of a plain object agrees at many heights, but its rim proves one, and the piece is kept whole. At the
+    picture's border, and in plain gaps between objects, nothing proves the height that the best paths happened to give.
+
+    >>> raised = np.array([[True, True, True, False, True, True]])
+    >>> _unproven(raised, np.array([[True, False, False, False, False, False]])).tolist()
+    [[False, False, False, False, True, True]]
+    """
+    count, number = cv2.connectedComponents(raised.astype(np.uint8), connectivity=4)
+    pixels, proven = (np.bincount(number[raised & which], minlength=count) for which in (True, proof))
+    return raised & ~proof & (proven < PROVEN * pixels)[number]
+
+
+def _widest(views: Sequence[View]) -> float:
+    """Metres from the first camera to the farthest of the others: z^2 / (b f) is what a pixel means at depth z."""
+    C = np.array([view.T_base_cam[:3, 3] for view in views])
+    return float(np.linalg.norm(C - C[0], axis=1).max())
 
 
 def plane_homography(first: View, other: View, height: float) -> Float[np.ndarray, "3 3"]:
