@@ -323,9 +323,9 @@ def not_finite(expected, got) -> Problem | None:
     if not bad.any():
         return None
     what = "NaN" if np.isnan(got[bad] if got.shape else got).all() else "NaN or infinite"
-    return Problem(
-        "finite", f"{np.count_nonzero(bad)} of {got.size} values are {what}" if got.shape else f"it is {what}"
-    )
+    count = np.count_nonzero(bad)
+    verb = "is" if count == 1 else "are"
+    return Problem("finite", f"{count} of {got.size} values {verb} {what}" if got.shape else f"it is {what}")
 
 
 def wrong_values(question: Question, expected: object, got: object) -> Problem | None:

@@ -24,6 +24,7 @@ from labgrader.question import Question
 MISSED = 0.001
 FEW = 16  # entries of an array that are simplified one by one; of larger ones the first and the last of each axis
 SAMPLES = 60  # values of a kind that no excluded simplification changes
+NEAR = 0.05  # of a range: so near to one of its ends a float is to come
 Change = Callable[[np.ndarray], np.ndarray]
 
 ENTRIES: dict[str, Change] = {"0": np.zeros_like, "|x|": np.abs, "-|x|": lambda x: -np.abs(x)}
@@ -84,9 +85,11 @@ def fits(kind: Kind, name: str) -> bool:
 
 
 def ends(kind: Kind) -> dict[str, Change]:
-    """Cut where a kind goes on, at half of its largest number and twice its smallest; fewer digits, if they count."""
+    """Cut where a kind goes on: half way to its largest number, just before it, at twice its smallest; fewer digits."""
     most = min(kind.most, LARGE)
     found = {"half of the largest": lambda x: np.clip(x, -most / 2, most / 2)}
+    if np.isfinite(kind.most):
+        found["nine tenths of the largest"] = lambda x: np.clip(x, -0.9 * kind.most, 0.9 * kind.most)
     if kind.least > 0:
         found["twice the smallest"] = lambda x: np.maximum(x, 2 * kind.least)
     if kind.digits > 7:
@@ -120,11 +123,16 @@ def changed_at(change: Change, place: tuple, x: np.ndarray) -> np.ndarray:
 
 def on_axes(kind: Kind, x: np.ndarray) -> dict[str, Change]:
     """What makes the order along an axis, or all of it but the first, count for nothing."""
-    pairs = itertools.product(ALONG.items(), enumerate(named_axes(kind, x)))
-    return {
+    named = [(k, axis) for k, axis in enumerate(named_axes(kind, x)) if x.shape[k] > 1]
+    found = {
         f"{name} along {axis}": (lambda x, change=change, k=k: change(x, k))
-        for (name, change), (k, axis) in pairs
-        if x.shape[k] > 1
+        for (name, change), (k, axis) in itertools.product(ALONG.items(), named)
+    }
+    longest = {axis: kind.length(axis)[1] for _, axis in named if not axis.startswith("...")}
+    return found | {
+        f"all but the last of {longest[axis]} along {axis}": (lambda x, k=k: np.take(x, range(x.shape[k] - 1), k))
+        for k, axis in named
+        if kind.axes.count(axis) == 1 and not axis.isdecimal() and x.shape[k] == longest.get(axis)
     }
 
 
@@ -274,12 +282,26 @@ def edges(kind: Kind) -> dict[str, Callable[[object], bool]]:
         found[f"{axis} = {longest}" + " or more" * (last is None)] = lambda v, j=from_end, n=longest: (
             np.shape(v)[j] >= n
         )
-    if kind.whole:
-        top = min(kind.most, 1000)
+    if not kind.whole:
+        found |= near_ends(kind)
+    else:
+        top = kind.most - round(NEAR * (kind.most - kind.least)) if np.isfinite(kind.most) else 1000
         found[f"{kind.least:g}"] = lambda v: bool((np.asarray(v) == kind.least).any())
         found[f"{top:g}"] = lambda v: bool((np.asarray(v)[~np.isin(v, kind.also)] >= top).any())
     for value in kind.also:
         found[f"{value:g}"] = lambda v, e=value: bool((np.isnan(v) if np.isnan(e) else np.asarray(v) == e).any())
+    return found
+
+
+def near_ends(kind: Kind) -> dict[str, Callable[[object], bool]]:
+    """The ends of a range of floats, each with the question whether a value comes near it."""
+    margin, found = NEAR * (kind.most - kind.least), {}
+    if np.isfinite(kind.least):
+        low = kind.least + min(margin, kind.least) if kind.least > 0 else kind.least + margin
+        found[f"{low:g} or less"] = lambda v: bool((np.asarray(v)[~np.isin(v, kind.also)] <= low).any())
+    if np.isfinite(kind.most):
+        high = kind.most - margin if np.isfinite(margin) else NEAR * kind.most
+        found[f"{high:g} or more"] = lambda v: bool((np.asarray(v)[~np.isin(v, kind.also)] >= high).any())
     return found
 
 

@@ -164,7 +164,7 @@ def outside(found: re.Match, args: dict) -> str:
     if index == course().ignored and holding:
         return f"The ignored pixels of {holding[0]}, labelled {index}, are used as an index: leave them out first."
     if index < 0:
-        return f"The index {index} counts from the end, and there are only {size} entries along axis {axis}."
+        return f"The index {index} counts from the end, and axis {axis} has length {size}."
     if index == size:
         of = " and ".join(name for name, a in arrays(args).items() if a.ndim > axis and a.shape[axis] == size)
         along = f"axis {axis}{' (as long as that of ' + of + ')' if of else ''}"
@@ -174,7 +174,7 @@ def outside(found: re.Match, args: dict) -> str:
     ]
     lengths = [which for which, n in others if index < n]
     if lengths:
-        return f"Axis {axis} has only {size} entries; an index up to {index} fits {lengths[0]}: are two axes swapped?"
+        return f"Axis {axis} has length {size}; an index up to {index} fits {lengths[0]}: are two axes swapped?"
     return f"An index of {index} into an axis of {size}: what does the index count, and what does this array hold?"
 
 
@@ -185,22 +185,34 @@ def shapes_do_not_fit(found: re.Match, args: dict) -> str:
     a, b = (tuple(int(n) for n in text.split(",") if n) for text in found.groups())
     said = " and ".join(f"{shape}{whose(shape, args)}" for shape in (a, b))
     masked = [(one, other) for one, other in ((a, b), (b, a)) if len(one) == 1 < len(other) and whose(other, args)]
-    if masked and masked[0][0][0] not in masked[0][1] and masked[0][0][0] < np.prod(masked[0][1]):
+    if masked and masked[0][0][0] not in masked[0][1] and masked[0][0][0] <= np.prod(masked[0][1]):
         one, other = masked[0]
-        return f"{one[0]} numbers, perhaps what a mask left, meet shape {other}{whose(other, args)}: mask both alike."
+        made = "perhaps what a mask left" if one[0] < np.prod(other) else "as a mask or ravel puts them in a row"
+        again = "mask both alike" if one[0] < np.prod(other) else "treat both alike"
+        return f"{one[0]} numbers, {made}, meet shape {other}{whose(other, args)}: {again}."
     if len(a) != len(b):
         return f"Shapes {said} do not fit: is an axis missing, as [..., None] or keepdims=True gives it?"
     if sorted(a) == sorted(b):
         return f"Shapes {said} have the same lengths in another order: which one has its axes swapped?"
     unlike = [(m, n) for m, n in zip(a, b, strict=True) if m != n and 1 not in (m, n)]
     m, n = unlike[0] if unlike else (a[0], b[0])
-    return f"Shapes {said} do not fit: one has {m} entries where the other has {n}. Which of the two did you expect?"
+    return f"Shapes {said} do not fit: one has length {m} where the other has {n}. Which of the two did you expect?"
 
 
 def whose(shape: tuple[int, ...], args: dict) -> str:
     """Whose shape it is, in brackets."""
     names = [name for name, a in arrays(args).items() if a.shape == shape]
     return f" (the shape of {' and '.join(names)})" if names else ""
+
+
+@when(r"ValueError: non-broadcastable output .*? \(([\d,]*)\) doesn't match the broadcast shape \(([\d,]*)\)")
+def written_in_place(found: re.Match, args: dict) -> str:
+    """Something of one shape put into a place of another, as by |= or +=."""
+    place, put = (tuple(int(n) for n in text.split(",") if n) for text in found.groups())
+    if (0 in place) != (0 in put):
+        which = "The left" if 0 in place else "The right"
+        return f"{which} side is empty here: does a slice end before it begins? A bound below 0 counts from the end."
+    return f"The place on the left has shape {place}, and what you put there makes it {put}. Print both sides' shapes."
 
 
 @when(r"ValueError: cannot reshape array of size (\d+) into shape \(([\w,-]*)\)")
@@ -273,7 +285,7 @@ TABLE = {
         "An index must be integers or booleans: is it the right one? If so, use .astype(int), or a comparison."
     ),
     r"IndexError: boolean index did not match .*?axis (\d+); .*?is (\d+) but .*?is (\d+)": (
-        "A mask with {3} entries along axis {1} selects from an array with {2}: whose mask is it?"
+        "A mask of length {3} along axis {1} selects from an array of length {2}: whose mask is it?"
     ),
     r"IndexError: too many indices.*?(\d+)-dimensional, but (\d+)": (
         "{2} indices for an array with {1} axes: which argument has how many axes? Print its shape."

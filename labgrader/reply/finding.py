@@ -25,7 +25,7 @@ WATCHES = {
 # What has no effect: `unread` is told before repairs, `unused` where nothing else names a mistake.
 IDLE = {
     "unread": "Your function never reads the marked argument. What is it for in this task?",
-    "unused": "Nothing uses what the marked line computes. Where does it belong?",
+    "unused": "Nothing uses what the marked line computes. Is it left over, or where does it belong?",
 }
 # Kinds of repairs, and what is said of each: with the marked part written otherwise, every case is right. Of repairs
 # that change equally much, the kind that stands first here is told. A copy comes first, since nothing else explains
@@ -34,6 +34,7 @@ IDLE = {
 REPAIRS = {
     "copy": "A later line changes this array, although you still need its old values. Where is a copy needed?",
     "line too many": "Without the marked line every case is right. What should it do, and what does it really do?",
+    "branch": "Without the marked branch every case is right. When does it run, and what is different then?",
     "too much": "The marked part should not be there: every case is right without it. What is it for?",
     "condition": "The marked condition lacks a part, or has one too many. What must hold there?",
     "option": "The marked option is wrong, or should not be there. What does it do, and what happens without it?",
@@ -49,6 +50,7 @@ REPAIRS = {
     "brackets": "Brackets are missing here, or are misplaced. What has to be computed first?",
     "constant": "The marked place{s} need{es} another number. Which one?",
     "slice": "The marked place{s} need{es} another slice. Where does it begin and end, and in which direction?",
+    "part": "Not all of the marked part is meant here. Which of its entries, rows or columns are?",
     "type": "The marked place{s} need{es} another dtype. Which numbers must it be able to hold?",
     "function": "The marked place{s} need{es} a similar function. What does yours do, and what should it do?",
     "transpose": "Rows and columns are the wrong way round at the marked place{s}.",

@@ -39,11 +39,22 @@ def idle_parts(function: ast.FunctionDef) -> list[tuple[str, ast.AST]]:
     outside = {name for node in inside if isinstance(node, ast.Global | ast.Nonlocal) for name in node.names}
     alone = [node for node in inside if isinstance(node, ast.Assign) and len(node.targets) == 1]
     values = [
-        node for node in alone if isinstance(node.targets[0], ast.Name) and node.targets[0].id not in read | outside
+        node
+        for node in alone
+        if isinstance(node.targets[0], ast.Name) and node.targets[0].id not in read | outside and computes(node.value)
     ]
     repeated = [n.value for n in alone if is_repeated(n.value) and is_repeated(n.value.left.elts[0])]
     found = {"aliased": repeated, "unread": arguments, "unused": values}
     return [(kind, node) for kind, nodes in found.items() for node in nodes]
+
+
+def computes(node: ast.AST) -> bool:
+    """Whether an expression is more than a name, a number, a length or a shape, whose line may well be left over."""
+    if isinstance(node, ast.Call):
+        return getattr(node.func, "id", "") not in ("len", "int", "float") or any(map(computes, node.args))
+    if isinstance(node, ast.Attribute | ast.Subscript):
+        return computes(node.value)
+    return not isinstance(node, ast.Name | ast.Constant)
 
 
 def is_repeated(node: ast.AST) -> bool:

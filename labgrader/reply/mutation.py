@@ -192,6 +192,9 @@ def of_block(place: Place) -> Iterator[Mutation]:
         above, below = block[:i], block[i + 1 :]
         if len(block) > 1 and not is_docstring(statement):
             yield mutation("line too many", 1, above + below, statement)
+        if isinstance(statement, ast.If) and statement.orelse:
+            yield mutation("branch", 1, [*above, *statement.orelse, *below], statement)
+            yield mutation("branch", 1, [*above, *statement.body, *below], statement.orelse[0])
         if isinstance(statement, ast.Break | ast.Continue):
             other = ast.Continue() if isinstance(statement, ast.Break) else ast.Break()
             yield mutation("loop", 1, [*above, ast.copy_location(other, statement), *below], statement)

@@ -92,7 +92,7 @@ AROUND = (
     ("reciprocal", 2, "1 / _"),
     ("new axis", 2, "_[None] | _[:, None] | _[..., None] | _[:, None, None] | _[:, :, None]"),
     ("reversed", 2, "_[::-1] | _[:, ::-1] | _[..., ::-1]"),
-    ("slice", 2, "_[1:] | _[:-1] | _[0] | _[-1] | _[:, 0] | _[:, -1] | _[..., 0] | _[:3] | _[:3, :3] | _[..., :3]"),
+    ("part", 2, "_[1:] | _[:-1] | _[0] | _[-1] | _[:, 0] | _[:, -1] | _[..., 0] | _[:3] | _[:3, :3] | _[..., :3]"),
     (
         "sum",
         2,
@@ -256,6 +256,9 @@ def conditions(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
             rest = without(node.values, i)
             make = partial(changed, node, values=rest) if len(rest) > 1 else the(rest[0])
             yield Recipe("condition", f"without {i}", 1, make, (value,))
+    if isinstance(node, ast.IfExp):
+        yield Recipe("branch", "else alone", 1, the(node.orelse), (node.body,))
+        yield Recipe("branch", "without else", 1, the(node.body), (node.orelse,))
     masks = ast.BitAnd | ast.BitOr | ast.Invert
     if isinstance(node, ast.Name):
         yield Recipe("condition", "None", 2.5, template("_ is not None", node))

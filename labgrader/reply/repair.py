@@ -40,6 +40,7 @@ MORE_S = 0.05  # on a case beside those on which it is searched: what takes long
 MORE_COST = 0.5  # repairs that change so much more than the smallest are looked for, too
 LEFT_OUT = (
     "line too many",
+    "branch",
     "too much",
     "call too many",
     "moved",

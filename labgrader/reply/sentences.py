@@ -305,5 +305,6 @@ def which_cases(cases: Sequence[Case], right: Sequence[bool]) -> Sentence:
         drawn = "What does the case above have that they do not: a size, a number, a direction?"
         says = f"{unusual if cases[shown].edge else drawn} Which of your lines depends on it?"
         return Sentence("case", f"All usual hand-made cases are right. {says}")
-    others = f" {sum(right)} of {len(cases)} cases are right." if any(right) else ""
+    verb = "is" if sum(right) == 1 else "are"
+    others = f" {sum(right)} of {len(cases)} cases {verb} right." if any(right) else ""
     return Sentence("case", f"Do the case above by hand, and print what each of your lines gives for it.{others}")

@@ -7,6 +7,7 @@ says nothing unless a wrong output hangs on it. Like `repair`, this runs in a wo
 import ast
 import contextlib
 import itertools
+import sys
 from collections.abc import Sequence
 from types import FrameType, TracebackType
 
@@ -18,6 +19,7 @@ from labgrader.reply.alarm import ENDS, limited
 from labgrader.reply.finding import Finding, Span
 
 MOST_S = 1.0  # CPU seconds of all watches together
+MOST_TRACED_S = 0.3  # of a call whose lines are looked at one by one
 
 
 def watch(pieces: Sequence[tuple[str, str]], name: str, cases: Sequence[tuple[tuple, object]], right) -> list[Finding]:
@@ -148,7 +150,37 @@ def written_argument(program: LiveProgram, cases: Sequence[tuple[tuple, object]]
             program.answer(*locked)
         except ValueError as error:
             where = own_place(program, error.__traceback__) if "read-only" in str(error) else None
-            return Finding("writes", where[0], (where[1],)) if where else None
+            return (
+                Finding("writes", where[0], (line_that_changes(program, args, where[0], where[1]),)) if where else None
+            )
         except Exception:
             return None
     return None
+
+
+def line_that_changes(program: LiveProgram, args: tuple, piece: int, written: Span) -> Span:
+    """The line of a piece after which an argument is no longer what it was; `written` where it is in that line.
+
+    A line may well write what is there already, as np.fill_diagonal(n, n.diagonal()) does.
+    """
+    given, file, last, found = copied(args), program.files[piece], [0], []
+
+    def step(frame: FrameType, event: str, _):
+        if frame.f_code.co_filename != file:
+            return None
+        if not found and last[0] and altered(args, given):
+            found.append(last[0])
+        last[0] = frame.f_lineno
+        return step
+
+    before = sys.gettrace()
+    sys.settrace(step)
+    try:
+        with contextlib.suppress(*ENDS), limited(MOST_TRACED_S):
+            program.answer(*given)
+    finally:
+        sys.settrace(before)
+    if not found or written.line <= found[0] <= written.last_line:
+        return written
+    text = program.pieces[piece][1].split("\n")[found[0] - 1]
+    return Span(found[0], len(text) - len(text.lstrip()), found[0], len(text.encode()))

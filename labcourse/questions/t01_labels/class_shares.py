@@ -41,7 +41,10 @@ QUESTION = Question(
     by_hand=(
         (np.array([[[1, 1], [0, 3]]], np.uint8), 5),
         (np.array([[[1, 255, 255], [1, 1, 0]], [[0, 0, 0], [0, 255, 0]]], np.uint8), 3),
-        (np.tile(np.array([[0, 1, 1, 1, 2, 255], [0, 0, 2, 0, 0, 2]], np.uint8)[:, None], (1, 25, 4)), 3),  # many
+        (
+            np.tile(np.array([[0, 1, 1, 1, 2, 255], [0, 0, 2, 0, 0, 2]], np.uint8)[:, None], (1, 300, 60)),
+            3,
+        ),  # more than 16 bits count
         (np.array([[[1, 255, 255], [1, 1, 0]], [[0, 0, 0], [0, 0, 0]]], np.uint8), 3),
         (np.array([[[0]]], np.uint8), 1),
     ),

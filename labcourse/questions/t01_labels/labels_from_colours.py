@@ -160,6 +160,11 @@ def red_alone(rgb, palette):
     return last_of(matches(rgb, palette)[..., 0])
 
 
+@wrong("Only the last channel tells in yours. If you shift or multiply bytes into one number: can a byte hold it?")
+def packed_into_a_byte(rgb, palette):
+    return last_of(matches(rgb, palette)[..., 2])
+
+
 @wrong("np.isin asks whether a number occurs anywhere in the colour: is [0, 0, 255] the same as [255, 0, 0]?")
 def channels_in_any_order(rgb, palette):
     return last_of((rgb[:, :, None, :, None] == palette[:, None, :]).any(axis=-1).all(axis=-1))

@@ -66,7 +66,9 @@ QUESTION = Question(
         (np.array([[-1]], np.int32), np.array([[2]], np.uint8)),
         (np.array([[-1, 0, 16777217]], np.int32), np.array([[1, 0], [3, 2]], np.uint8)),
         (
-            np.array([[(1 << 17) + 1, (1 << 18) + 2, (1 << 19) + 3, 0]], np.int32),  # 17 to 19 bits are too few
+            np.array(
+                [[(1 << 17) + 1, (1 << 18) + 2, (1 << 19) + 3, 999_999, 0]], np.int32
+            ),  # 17 to 19 bits are too few
             (np.arange(3, 1_000_003) // 3 % 4).astype(np.uint8)[:, None],
         ),
     ),

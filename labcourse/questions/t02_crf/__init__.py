@@ -36,6 +36,8 @@ def labelled_model(rng, H=4, W=6, C=3, size=1.0):
     """Draw labels among which neighbours often agree, the last class at both ends of the image, and a model."""
     y = np.minimum(rng.integers(0, C + 1, (H, W)), C - 1)
     y[0, 0] = y[-1, -1] = C - 1
+    if C == MOST_CLASSES:  # else hardly any pixel has one of the last
+        y[1] = C - 1
     return y.astype(np.uint8), *model(rng, H, W, C, size)
 
 
@@ -44,7 +46,7 @@ LABELLED_MODELS = (
     labelled_model,
     partial(labelled_model, H=1, W=LONG, C=1),
     partial(labelled_model, H=LONG, W=1, C=2),
-    partial(labelled_model, H=3, W=3, C=MOST_CLASSES, size=4e5),
+    partial(labelled_model, H=3, W=3, C=MOST_CLASSES, size=6e5),
     partial(labelled_model, H=3, W=3, size=1e-3),
 )
 

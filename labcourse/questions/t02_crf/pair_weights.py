@@ -37,14 +37,14 @@ QUESTION = Question(
         "image": colours(free=("reversed along 3", "unique along 3")),  # channels count alike
         "lam": number(0.0, 1000.0, says="0 to 1000"),
         "sigma_I": number(0.5, 1000.0, says="0.5 to 1000"),
-        "sigma_p": number(0.5, 100.0, says="0.5 to 100"),
+        "sigma_p": number(0.5, 100.0, says="0.5 to 100", free=("nine tenths*",)),
     },
     inputs=(
         _image,
         _image,
-        partial(_image, shape=(1, LONG), lam=(600.0, 1000.0)),
-        partial(_image, shape=(LONG, 1), sigma_I=(600.0, 1000.0)),
-        partial(_image, shape=(3, 3), sigma_p=(90.0, 100.0)),
+        partial(_image, shape=(1, LONG), lam=(960.0, 1000.0)),
+        partial(_image, shape=(LONG, 1), sigma_I=(960.0, 1000.0)),
+        partial(_image, shape=(3, 3), sigma_p=(96.0, 100.0)),
     ),
     random_cases=5,
     by_hand=(

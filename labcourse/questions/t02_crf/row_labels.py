@@ -36,6 +36,13 @@ def _row(rng, n=7, C=5, size=1.0):
     return np.clip(size * psi, -1e6, 1e6), np.clip(size * w, 0.0, 1e6)
 
 
+def _many_classes(rng):
+    """Draw a row of as many classes as there may be; in its middle the last one is by far the cheapest."""
+    psi, w = _row(rng, C=MOST_CLASSES)
+    psi[3, -1] = psi.min() - 5.0
+    return psi, w
+
+
 def _row_that_its_end_decides(rng):
     """Draw a row of two classes in which each pixel but the last prefers one, by so little that all take the other."""
     psi = np.zeros((LONG, 2))
@@ -59,7 +66,7 @@ QUESTION = Question(
         _row,
         _row,
         _row_that_its_end_decides,
-        partial(_row, C=MOST_CLASSES),
+        _many_classes,
         partial(_row, size=5e5),
         partial(_row, size=1e-3),
     ),
@@ -76,9 +83,9 @@ QUESTION = Question(
         (np.array([[0.0, 1.0], [1.0, 0.0]]), np.array([0.0])),
         (np.array([[0.0, 1.0], [5.0, 0.1]]), np.array([10.0])),
         # Large and small costs, large and small weights.
-        (np.array([[9e5, 6e5]]), np.zeros(0)),
+        (np.array([[-9.2e5, -9.8e5]]), np.zeros(0)),
         (np.array([[4e-4, 2e-4]]), np.zeros(0)),
-        (np.array([[0.0, 9e5], [7e5, 0.0]]), np.array([8e5])),
+        (np.array([[0.0, 9.9e5], [9.5e5, 0.0]]), np.array([9.7e5])),
         (np.array([[0.0, 9e-4], [3e-4, 0.0]]), np.array([4e-4])),
     ),
     edges=9,

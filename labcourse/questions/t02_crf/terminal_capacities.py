@@ -44,7 +44,7 @@ QUESTION = Question(
         _model_with_strokes,
         partial(_strokes, shape=(1, LONG), size=1.0, large=(1.0, 1.1)),
         partial(_strokes, shape=(LONG, 1), size=4e5, large=(1.0, 1e4)),
-        partial(_strokes, shape=(4, 4), size=4e5, large=(6e5, 1e6)),
+        partial(_strokes, shape=(4, 4), size=4e5, large=(9.6e5, 1e6)),
     ),
     by_hand=(
         (np.array([[[2.0, 5.0]]]), np.array([[255]], np.uint8), 100.0),

@@ -28,7 +28,7 @@ QUESTION = Question(
     inputs=(
         _probabilities,
         partial(_probabilities, shape=(1, LONG), C=1),
-        partial(_probabilities, shape=(LONG, 1), C=4, eps=(0.6, 0.999)),
+        partial(_probabilities, shape=(LONG, 1), C=4, eps=(0.96, 0.999)),
         partial(_probabilities, shape=(2, 2), C=MOST_CLASSES, eps=(1e-12, 1.5e-12)),
     ),
     by_hand=(

@@ -66,7 +66,7 @@ SMOOTHED_PIXELS = {"z": LOGITS, "y": labels("..."), "s": array("", 0.0, 0.99, dt
 SMOOTHED_DRAWS = (
     random_smoothed_pixels,
     partial(pixels_of, shape=(), C=4),
-    partial(pixels_of, shape=(LONG,), C=3, s=(0.6, 0.99)),
+    partial(pixels_of, shape=(LONG,), C=3, s=(0.95, 0.99)),
     partial(pixels_of, shape=(3, 3, 4), C=3),
     partial(pixels_of, shape=(5,), C=MOST_CLASSES, size=4e5),
     partial(pixels_of, shape=(3,), C=2),

@@ -45,23 +45,27 @@ _SIDES = dict.fromkeys("HW", (1, 400))
 
 def _row_or_column(rng, shape):
     """Draw a long row or column whose pixels vote for places near them, and large cells."""
-    votes = np.where(rng.random((*shape, 1)) < 0.1, rng.choice([-1e6, 1e6]), rng.normal(size=(*shape, 2)))
+    votes = np.where(rng.random((*shape, 1)) < 0.1, rng.choice([-1e6, 1e6], (*shape, 1)), rng.normal(size=(*shape, 2)))
     votes[..., shape.index(1) ^ 1 == 0] = 0.0
-    return rng.random(shape), votes, int(rng.integers(1, 101)), int(rng.integers(1, 20))
+    foreground = rng.random(shape)
+    foreground[-1, -1] = 0.9
+    return foreground, votes, int(rng.integers(1, 101)), int(rng.integers(1, 20))
 
 
 QUESTION = Question(
     reference=group,
     kinds={
         # Whatever is no more than half is alike; so is whatever leads out of the largest picture.
-        "foreground": array("H W", 0.0, 1.0, lengths=_SIDES, says=("0..1", "1 to 400"), free=("whole", "0 to NaN")),
+        "foreground": array(
+            "H W", 0.0, 1.0, lengths=_SIDES, says=("0..1", "1 to 400"), free=("whole", "0 to NaN", "nine tenths*")
+        ),
         "votes": array(
             "H W 2",
             -1e6,
             1e6,
             lengths=_SIDES,
             says="-1e6 to 1e6",
-            free=("16 bits", "float16's range", "half of the largest"),
+            free=("16 bits", "float16's range", "half of the largest", "nine tenths*"),
         ),
         "cell": count(1, 100, says="1 to 100"),
         "least": count(1, 1000, says="1 to 1000"),
@@ -81,7 +85,7 @@ QUESTION = Question(
         (np.array([[0.5, 0.51], [0.4, 0.9]]), np.zeros((2, 2, 2)), 1, 1),
         (np.zeros((2, 3)), np.ones((2, 3, 2)), 2, 1),  # nobody votes
         (np.ones((50, 50)), np.zeros((50, 50, 2)), 1, 1),  # 289 things, each of nine pixels or fewer
-        (np.ones((30, 25)), pointing((30, 25), dict.fromkeys(np.ndindex(30, 25), (12, 15)))[1], 3, 1000),
+        (np.ones((31, 31)), pointing((31, 31), dict.fromkeys(np.ndindex(31, 31), (15, 15)))[1], 3, 1000),
         (np.ones((1, 400)), np.zeros((1, 400, 2)), 100, 1),
         (np.array([[0.5001]]), np.zeros((1, 1, 2)), 1, 1),
         (np.array([[0.9]]), np.zeros((1, 1, 2)), 1, 255),

@@ -45,7 +45,7 @@ QUESTION = Question(
     inputs=(
         random_votes,
         random_votes,
-        partial(_scattered_things, shape=(1, LONG), size=500.0, beta=(600.0, 1000.0), numbers=range(256)),
+        partial(_scattered_things, shape=(1, LONG), size=500.0, beta=(960.0, 1000.0), numbers=range(256)),
         partial(_scattered_things, shape=(LONG, 1), size=5e5, beta=(10.0, 1000.0)),
         partial(_scattered_things, shape=(20, 20), size=0.1, beta=(0.01, 0.011)),
     ),

@@ -25,6 +25,13 @@ def _frames_alike(rng):
     return (n + rng.integers(0, 30, (MOST_FRAMES, 2, 2)),)
 
 
+def _ends_unlike(rng):
+    """Draw a hundred frames of which the first and the last count most, each by another class."""
+    n = rng.integers(1, 50, (MOST_FRAMES, 3, 3))
+    n[0, 0, 1:], n[-1, 1:, 0] = rng.integers(3000, 9000, (2, 2))
+    return (n,)
+
+
 def _many_classes(rng):
     """Draw two to four frames of up to 255 classes, with up to all the pixels that there may be."""
     n = np.exp(rng.uniform(0.0, np.log(MOST_COUNTED), (int(rng.integers(2, 5)), MOST_CLASSES, MOST_CLASSES)))
@@ -35,6 +42,8 @@ MOST_FRAMES = 100
 _ONE_PIXEL = np.array(
     [[[5, 0, 1], [1, 2, 0], [0, 0, 0]], [[9, 1, 0], [0, 2, 0], [0, 0, 0]], [[4, 2, 0], [1, 7, 0], [0, 0, 0]]]
 )
+# Beside so many pixels float32 forgets those of the other frames.
+_ONE_HUGE = np.array([[[MOST_COUNTED, 7], [0, MOST_COUNTED - 999]], [[3, 1], [2, 1]], [[1, 1], [5, 1]]])
 
 
 QUESTION = Question(
@@ -50,7 +59,7 @@ QUESTION = Question(
             free=("reversed along F",),
         )
     },
-    inputs=(counts_of_frames, _frames_alike, counts_of_frames, _many_classes, counts_of_frames),
+    inputs=(counts_of_frames, _frames_alike, counts_of_frames, _many_classes, _ends_unlike),
     by_hand=(
         (np.array([[[255, 0], [1, 3]], [[4, 5], [0, 6]]]),),
         (
@@ -60,8 +69,9 @@ QUESTION = Question(
         (_ONE_PIXEL,),  # one pixel is called class 2
         (np.array([[[30_000, 2_000], [0, 500]]] * 3),),  # no frame differs; more pixels than 16 bits count
         (np.array([[[3]], [[5]]]),),  # one class
+        (_ONE_HUGE,),
     ),
-    edges=1,
+    edges=2,
     random_cases=6,
     atol=1e-7,  # a hundred frames of a million pixels may differ by little more
     points=3,
@@ -76,7 +86,12 @@ def score_is_a_share(n_frames, out):
 
 @holds("frames that are all alike have a standard error of 0")
 def alike_frames_say_the_same(n_frames, out):
-    return np.isclose(out[1], 0.0, atol=1e-6) if (n_frames == n_frames[0]).all() else out[1] >= 0.0
+    return np.isclose(out[1], 0.0, atol=1e-6) or not (n_frames == n_frames[0]).all()
+
+
+@holds("a standard error is not negative")
+def error_is_not_negative(n_frames, out):
+    return out[1] >= 0.0
 
 
 # ---------------------------------------------------------------------------------------------------- wrong answers

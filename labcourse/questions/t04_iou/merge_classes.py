@@ -158,6 +158,12 @@ def old_rows(n, group):
     return old_columns(n.T, group).T
 
 
+@wrong("Row g belongs to group g: yours are in the order in which groups first occur.")
+def groups_as_they_first_occur(n, group):
+    order = np.array(list(dict.fromkeys(group.tolist())))
+    return merge_classes(n, group)[np.ix_(order, order)]
+
+
 @wrong("You sort the classes and cut: what the classes of one group have in common is a sum.")
 def sorted_and_cut(n, group):
     G, order = group.max() + 1, np.argsort(group)

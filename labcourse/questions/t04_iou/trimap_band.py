@@ -82,6 +82,11 @@ def banded(y, width, steps, differs=np.not_equal):
     return np.any([differs(n, y) & (n != 255) for n in near], axis=0)
 
 
+@wrong("A class may have any number from 0 to 254: over which of them does your loop go?", count=(2, 3, 4, 5, 10, 20))
+def few_classes(y, width, count):
+    return trimap_band(y, width) & (y < count)
+
+
 @wrong("An image of one class has no edge: beyond its border there is no class, not class 0.")
 def border_is_an_edge(y, width):
     return trimap_band(np.pad(y, width), width)[width:-width, width:-width]

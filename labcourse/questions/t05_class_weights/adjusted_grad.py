@@ -47,7 +47,8 @@ def _any_pixels(rng, shape, C):
 
 def _rare_classes(rng, least, most):
     """Logits that a tau of any size leaves a few units apart, where it shifts those of rare classes by far."""
-    shares = np.exp(rng.uniform(-12.0, 0.0, 3))
+    shares = np.exp(rng.uniform(-12.0, -4.0, 3))
+    shares[rng.integers(3)] = 1.0
     shares, tau = shares / shares.sum(), float(rng.uniform(least, most))
     y = rng.integers(0, 3, (2, 6), np.uint8)
     return rng.normal(size=(2, 6, 3)) - tau * np.log(shares), y, shares, tau
@@ -57,16 +58,16 @@ SHAPES = ((3, 3, 4), 2), ((40,), MOST_CLASSES), ((), 3)
 QUESTION = Question(
     reference=adjusted_grad,
     kinds={
-        "z": array("... C", says=("however large", "C from 1 to 255")),
+        "z": array("... C", -1e6, 1e6, says=("-1e6 to 1e6", "C from 1 to 255")),
         "y": labels("..."),
         "shares": SHARES,
         "tau": number(0.0, 2000.0, says="0 to 2000"),
     },
     inputs=(
+        *(partial(_any_pixels, shape=shape, C=C) for shape, C in SHAPES),
         _pixels,
         partial(_rare_classes, least=0.0, most=3.0),
-        partial(_rare_classes, least=1000.0, most=2000.0),
-        *(partial(_any_pixels, shape=shape, C=C) for shape, C in SHAPES),
+        partial(_rare_classes, least=1900.0, most=2000.0),
     ),
     by_hand=(
         (np.zeros((1, 2)), np.array([1], np.uint8), np.array([0.9, 0.1]), 1.0),  # the softmax is the shares

@@ -47,8 +47,9 @@ QUESTION = Question(
         (np.array([1, 255, 0]), 0.5),
         (np.array([3, 40]), 0.0),
         (np.array([7]), 3.0),
+        (np.array([10**12, 9 * 10**11, 0]), 20.0),
     ),
-    edges=1,
+    edges=2,
     atol=1e-30,  # weights are small where a power is high; float32 has none much smaller
     random_cases=6,
     forbidden=("sklearn",),

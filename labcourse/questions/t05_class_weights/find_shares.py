@@ -48,7 +48,7 @@ def _slow(rng):
     """Logits that say little, so that the guess still moves in the last of many rounds."""
     w, shares = draw_weights(rng, 2), draw_shares(rng, 2)
     z = rng.normal(0.0, 0.3, (30, 2)) + np.log(w * shares) + rng.choice([0.0, 1e5])
-    return z, w, shares, int(rng.choice([60, MOST_ROUNDS]))
+    return z, w, shares, int(rng.choice([97, MOST_ROUNDS]))
 
 
 MOST_ROUNDS = 100
@@ -56,7 +56,9 @@ SHAPES = ((3, 3, 4), 3), ((40,), MOST_CLASSES)
 QUESTION = Question(
     reference=find_shares,
     kinds={
-        "z": array("... C", says=("however large", "C from 1 to 255"), free=("reversed along ...*", "transposed")),
+        "z": array(
+            "... C", -1e6, 1e6, says=("-1e6 to 1e6", "C from 1 to 255"), free=("reversed along ...*", "transposed")
+        ),
         "w": array("C", 0.1, 25.0, says="0.1 to 25"),
         "shares": SHARES,
         "rounds": count(1, MOST_ROUNDS, says="1 to 100"),
@@ -67,12 +69,12 @@ QUESTION = Question(
         (np.array([[0.0, 0.0]]), np.array([1.0, 9.0]), np.array([0.9, 0.1]), 1),  # weights alone
         (_THREE, np.ones(2), np.array([0.5, 0.5]), 1),  # a mean of probabilities
         (_THREE, np.ones(2), np.array([0.9, 0.1]), 1),
-        (_THREE, np.ones(2), np.array([0.9, 0.1]), 2),  # the second round begins with the network's logits, too
+        (_THREE, np.ones(2), np.array([0.96, 0.04]), 2),  # the second round begins with the network's logits, too
         (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), 3),
         (_THREE + 1000.0, np.array([1.0, 4.0]), np.array([0.8, 0.2]), 1),  # exp overflows
         (SURE, np.array([0.5, 4.0, 1.0]), np.array([0.6, 0.1, 0.3]), 2),  # with one maximum for both, exp gives 0
         (np.array([3.0]), np.array([2.0]), np.ones(1), 2),
-        (_THREE, np.array([1.0, 4.0]), np.array([0.8, 0.2]), MOST_ROUNDS),
+        (_THREE, np.array([6.0, 24.0]), np.array([0.8, 0.2]), MOST_ROUNDS),
     ),
     edges=2,
     random_cases=8,

@@ -60,7 +60,7 @@ QUESTION = Question(
         # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
         (np.array([0.4]), np.array([True]), 0.5),
-        (np.array([SURE, 0.5]), np.array([True, True]), 1.0),  # weight 999,999,999
+        (np.array([SURE, *[0.5] * 19]), np.ones(20, bool), 1.0),  # weight 999,999,999
     ),
     edges=2,
     random_cases=12,

@@ -78,9 +78,10 @@ QUESTION = Question(
         (K_SMALL @ (STRAIGHT_DOWN * [1.04, 0.96, 1.0]), K_SMALL),  # unequally long: their mean is 1
         (K_SMALL @ ASKEW, K_SMALL),  # each is turned by 3 degrees towards the other: the closest pair is in the middle
         (K_OF_WIDTHS @ FROM_THE_LEFT, K_OF_WIDTHS),
-        (-2.5e5 * K_SMALL @ STRAIGHT_DOWN, K_SMALL),  # the first once more
+        (-2.5e5 * K_SMALL @ STRAIGHT_DOWN, K_SMALL),  # the first twice more
+        (2.5e5 * K_SMALL @ STRAIGHT_DOWN, K_SMALL),
     ),
-    edges=2,
+    edges=3,
     random_cases=8,
     points=3,
 )

@@ -44,7 +44,7 @@ K_LARGE = K_of(200.0, 400.0, 100.0, 0.0)  # the small camera with a hundred time
 QUESTION = Question(
     reference=undistort,
     kinds={
-        "pixels": array("N 2", -6000.0, 10_000.0, says="-6000 to 10000"),
+        "pixels": array("N 2", -5000.0, 6000.0, says="-5000 to 6000"),
         "K": intrinsics(free=("*at ?2, *",)),  # the row 0 0 1
         "k": array(
             "2",
@@ -63,8 +63,8 @@ QUESTION = Question(
         (np.array([[2.0, 1.0]]), K_SMALL, np.array([0.0, 0.0])),
         # 0.9 (1 + 0.4 * 0.81 + 0.1 * 0.6561) = 1.250649
         (
-            np.array([[-4002.596, 3000.0], [1000.0, 5501.298]]),
-            K_of(4000.0, 2000.0, 1000.0, 3000.0),
+            np.array([[-4502.596, 3000.0], [500.0, 5501.298]]),
+            K_of(4000.0, 2000.0, 500.0, 3000.0),
             np.array([0.4, 0.1]),
         ),
         # 0.5 (1 - 0.3 / 4 + 0.1 / 16) = 0.465625

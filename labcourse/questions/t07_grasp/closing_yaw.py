@@ -51,9 +51,10 @@ QUESTION = Question(
         (np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]), 0.0),  # long along the diagonal
         (np.array([[5.0, -2.0, 1.0], [-2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]), -7.0),  # more than a whole turn away
         (np.array([[5.0, 2.0, 1.0], [2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]), 1000.0),  # and as far as the statement allows
+        (np.array([[3.0, 2.0, 1.0], [2.0, 3.0, 0.0], [1.0, 0.0, 3.0]]), -1000.0),
         (np.diag([1.0, 4.0, 0.5]), 7.8537),  # hardly less than a quarter turn off, which few digits hide
     ),
-    edges=2,
+    edges=3,
     random_cases=10,
     atol=1e-4,
     points=3,

@@ -45,16 +45,17 @@ QUESTION = Question(
         (_upright(0.375, 0.5), 0.125, 0.25, 0.0625, 0.03125),  # only its upper part was seen
         (_upright(-0.5, -0.25), -0.5, 0.5, 0.0625, 0.03125),  # a table below the robot's base
         (_upright(0.125, 0.1875)[:2], 0.125, 0.25, 0.0625, 0.03125),
-        (np.array([[-0.5, -0.75, 0.25]]), 0.125, 0.25, 0.0625, 0.03125),  # one point, behind the robot
+        (np.array([[-0.5, -0.75, 9.25]]), 9.5, 0.25, 0.0625, 0.03125),  # one point, behind the robot
         (_upright(-0.0625, 0.125), 0.0, 0.5, 0.0, 0.0),  # a table at 0, and no air above it
         (_upright(0.0, 0.25), -0.125, 0.0, 0.125, 0.0625),  # a hand without fingers
-        (_upright(5.0, 9.0), 5.0, 1.0, 0.0625, 0.03125),  # the largest numbers
-        (_upright(-8.0, -7.875), -8.0, 0.25, 1.0, 1.0),
+        (_upright(0.0625, 0.75), 0.625, 0.25, 0.0625, 0.03125),  # tall, and most of it seems to be below the table
+        (_upright(5.0, 9.75), 5.0, 1.0, 0.0625, 0.03125),  # the largest numbers
+        (_upright(-9.875, -9.75), -9.875, 0.25, 1.0, 1.0),
         (_upright(-0.1234, 0.3456), -0.2345, 0.1737, 0.12345, 0.0123456),  # few digits do not hold these
         (_upright(-0.1234, 0.0456), -0.1268, 0.5, 0.12345, 0.0123456),
         (np.vstack([_upright(-1.0, -0.5), np.full((299, 3), -0.75), [[0.5, 0.1, -0.4375]]]), -1.0, 0.25, 0.125, 0.0),
     ),
-    edges=9,
+    edges=10,
     random_cases=16,
     rtol=1e-5,
 )
@@ -71,6 +72,21 @@ def palm_is_above(P, table_z, palm, tips, clearance, z):
 @wrong("The centroid knows neither the table nor the palm: how low may the tips go, and what stops them?")
 def height_of_centroid(P, table_z, palm, tips, clearance):
     return P[:, 2].mean()
+
+
+BY_CONDITION = "You choose one bound by a condition. The tips may go below none of the three: which of them counts?"
+
+
+@wrong(BY_CONDITION)
+def palm_where_the_top_is_far_above_the_table(P, table_z, palm, tips, clearance):
+    low, top = P[:, 2].min(), P[:, 2].max()
+    return (top - palm if top > table_z + palm else max(low, table_z + clearance)) + tips
+
+
+@wrong(BY_CONDITION)
+def palm_where_the_thing_is_tall(P, table_z, palm, tips, clearance):
+    low, top = P[:, 2].min(), P[:, 2].max()
+    return (top - palm if top - low > palm else max(low, table_z + clearance)) + tips
 
 
 @wrong("A bottle is taller than the fingers are long: what does its top meet?")

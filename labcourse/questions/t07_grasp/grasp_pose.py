@@ -26,15 +26,19 @@ def _any_directions(rng):
     """Draw where a hand is, where it goes, and about where it closes: to any side, of any length, a degree apart."""
     R, angle = rotation(rng), rng.uniform(0.02, np.pi - 0.02)
     approach, closing = R[:, 0], np.cos(angle) * R[:, 0] + np.sin(angle) * R[:, 1]
-    return rng.uniform(-1.0, 1.0, 3), approach * 10 ** rng.uniform(-3, 5), closing * 10 ** rng.uniform(-3, 5)
+    return rng.uniform(-1.0, 1.0, 3), approach * 10 ** rng.uniform(-3, 6), closing * 10 ** rng.uniform(-3, 6)
 
 
 QUESTION = Question(
     reference=grasp_pose,
     kinds={
         "position": array("3", **PLACES, says=WITHIN),
-        "approach": array("3", form=lambda rng, _: _any_directions(rng)[1], says=("not all 0", "any lengths")),
-        "closing": array("3", form=lambda rng, _: _any_directions(rng)[2], says="not along the approach"),
+        "approach": array("3", form=lambda rng, _: _any_directions(rng)[1], says="of lengths 1e-3 to 1e6"),
+        "closing": array(
+            "3",
+            form=lambda rng, _: _any_directions(rng)[2],
+            says="at least a degree away from the approach, and from its opposite",
+        ),
     },
     inputs=_any_directions,
     by_hand=(
@@ -44,10 +48,11 @@ QUESTION = Question(
         (np.array([0.4, 0.1, 0.2]), np.array([0.6, 0.0, -0.8]), np.array([1.0, 0.0, 0.0])),
         (np.array([-0.4, 0.1, -0.2]), np.array([-1.0, 2.0, 2.0]), np.array([-3.0, 0.0, 3.0])),  # upwards
         (np.array([0.5, 0.1, 0.02]), np.array([0.0, 0.0, -2.0]), np.array([3.0, 0.0, 4.0])),
-        (np.array([9.0, -8.0, -7.0]), np.array([1e6, -4e5, 1e6]), np.array([-1e6, 1e6, 3e4])),  # the largest numbers
+        (np.array([9.5, -9.5, -7.0]), np.array([8e5, -4e5, 4e5]), np.array([-7e5, 7e5, 3e4])),  # the largest numbers
+        (np.array([0.5, 0.2, 0.1]), np.array([0.0, 0.0, -1e-3]), np.array([2e-5, 0.0, 1e-3])),  # the smallest ones
         (np.array([0.4, -0.1, 0.2]), np.array([0.0, -0.5, 0.0]), np.array([-0.25, 0.25, 0.0])),  # level
     ),
-    edges=4,
+    edges=5,
     random_cases=10,
     atol=1e-5,
     points=4,
@@ -56,7 +61,7 @@ QUESTION = Question(
 )
 
 
-@holds("the third column, z, is the direction of the approach")
+@holds("the third column, z, is the direction of the approach, of length 1")
 def z_is_the_approach(position, approach, closing, T):
     return np.allclose(T[:3, 2], approach / np.linalg.norm(approach), atol=1e-4)
 

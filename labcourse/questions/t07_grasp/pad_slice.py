@@ -71,8 +71,12 @@ QUESTION = Question(
         (np.array([[0.2, -0.4, 1.3], [0.5, -0.55, 0.7], [0.4, -0.05, 0.8]]), TURNED, 0.25),
         (np.array([[0.0, -1.0, 0.0], [0.1, 3.0, 0.0], [0.9, 7.0, 0.0]]), np.diag([-1.0, 1.0, -1.0, 1.0]), 0.5),
         (np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.0]]), FACING_X, 0.0),  # what lies in the middle is touched
-        (np.array([[9.0, 1.75, 0.5], [-7.0, 1.0, 0.5], [0.0, 5.0, 0.5]]), FACING_X, 1.0),  # the largest numbers
-        (np.array([[1.5, 1.123415, 0.5], [2.0, 1.0, 0.5]]), FACING_X, 0.12342),  # few digits do not hold these
+        (np.array([[9.25, 1.95, 0.5], [-9.25, 1.0, 0.5], [0.0, 5.0, 0.5]]), FACING_X, 1.0),  # the largest numbers
+        (
+            np.array([[1.5, 1.123418, 0.5], [2.0, 1.0, 0.5], [2.5, 1.123422, 0.5]]),
+            FACING_X,
+            0.12342,
+        ),  # few digits do not hold these
         (np.tile(_L, (60, 1)), FACING_X, 0.25),
     ),
     edges=7,
@@ -116,6 +120,19 @@ def mean_for_the_middle(P, T_base_grasp, half):
 def x_for_y(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     return middle_and_width(x[np.abs(y) <= half])
+
+
+@wrong("A pad is wide along x, and says nothing of z: which points beside its middle do you leave out?")
+def within_half_of_the_closing_axis(P, T_base_grasp, half):
+    x, y, z = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[np.hypot(x, z) <= half])
+
+
+@wrong("Your extremes begin at 0, as if a point lay there: of which points alone are they to be?")
+def extremes_that_begin_at_0(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    y = y[np.abs(x) <= half]
+    return middle_and_width(np.append(y, 0.0))
 
 
 @wrong("Cut the points in the grasp frame: does a pad know where the base's axes point?")

@@ -65,14 +65,22 @@ _FINE = (
     (0.25, 0.05, 0.1, 0.12342),
 )
 _HALF_OFF = transform(FACING_X[:3, :3], [2.00042, -1.00037, 0.50046])
-_FAR = np.array([[0.9, 1.4, 0.9], [-0.9, -1.4, -3.0], [1.1, 1.4, 0.9]])
-_HIGH_UP = transform(TURNED[:3, :3], [-7.0, -7.0, 7.0])
+_FAR = np.array([[0.9, 1.4, 0.9], [-0.5, -1.4, -3.0], [1.1, 1.4, 0.9]])
+_HIGH_UP = transform(TURNED[:3, :3], [-7.5, -7.5, 9.5])
+
+MOST_POINTS = 80_000  # of a scene of 320 x 240 pixels
 
 
 QUESTION = Question(
     reference=points_in_fingers,
     kinds={
-        "P": array("N 3", **PLACES, lengths={"N": (0, None)}, says=("N may be 0", WITHIN), free=("reversed along N",)),
+        "P": array(
+            "N 3",
+            **PLACES,
+            lengths={"N": (0, MOST_POINTS)},
+            says=("N from 0 to 80,000", WITHIN),
+            free=("reversed along N",),
+        ),
         "T_base_grasp": poses(free=(LAST_ROW,)),
         "width": number(0.01, 1.0, says="0.01 to 1"),
         "half": LENGTH,
@@ -85,7 +93,7 @@ QUESTION = Question(
         (np.array(_IN[:1]), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
-        (np.tile(_IN + _OUT, (300, 1)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # as many points as a cloud has
+        (np.resize(10 * _IN + _OUT, (MOST_POINTS, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # more than 16 bits count
         *((moved(_BESIDE, T).T.round(6), T, 0.48, 0.22, 0.28, 0.12) for T in (FROM_BELOW, TURNED, TURNED_OVER)),
         (np.array([[0.0, 0.6, 0.0], [0.0, 0.4, 0.0]]), np.diag([-1.0, 1.0, -1.0, 1.0]), 1.0, 0.25, 0.25, 0.1),
         (np.array([[2.125, 1.0, 0.5], [2.0, 1.0, 0.375]]), FACING_X, 0.25, 0.0, 0.0, 0.0),  # lines for fingers

@@ -32,7 +32,7 @@ QUESTION = Question(
         (FACING_X, np.array([2.03, 1.02, 0.4])),
         (FACING_X, np.array([1.97, 0.98, 0.5])),
         (TURNED, np.array([0.56, -0.28, 1.06])),
-        (transform(np.diag([-1.0, 1.0, -1.0]), [8.0, -9.0, 7.0]), np.array([0.0, 9.0, -7.0])),
+        (transform(np.diag([-1.0, 1.0, -1.0]), [8.0, -9.0, 7.0]), np.array([0.0, 9.5, -9.5])),
         (FROM_BELOW, np.array([-0.47, 0.31, -1.06])),  # off by (0.03, 0.06, -0.06)
     ),
     edges=3,

@@ -27,11 +27,11 @@ def _depth_message(rng, padding=None, is_bigendian=None):
     return np.hstack([rows, filler]).ravel(), height, width, 2 * width + padding, is_bigendian
 
 
-def _counted(height, width):
-    """Pixels 1, 2, 3 ..., each row of them filled up by six bytes."""
-    rows = np.full((height, width + 3), 9, "<u2")
+def _counted(height, width, step):
+    """Pixels 1, 2, 3 ..., each row of them filled up to so many bytes."""
+    rows = np.full((height, step // 2), 9, "<u2")
     rows[:, :width] = 1 + np.arange(height * width).reshape(height, width)
-    return rows.view(np.uint8).ravel(), height, width, 2 * width + 6, 0
+    return rows.view(np.uint8).ravel(), height, width, step, 0
 
 
 QUESTION = Question(
@@ -51,7 +51,7 @@ QUESTION = Question(
         (np.array([255, 255, 0, 0], np.uint8), 1, 2, 4, 0),  # the largest number is one
         (np.array([3, 232, 0, 1, 7, 255, 254, 0, 0, 7, 128, 0, 0, 128, 7], np.uint8), 3, 2, 5, 1),
         (np.array([0, 2], np.uint8), 1, 1, 2, 1),
-        *(_counted(*shape) for shape in ((1, 4000), (4000, 1))),  # no count of these fits into a byte
+        *(_counted(*shape) for shape in ((1, 4000, 10_000), (4000, 1, 8))),  # no count of these fits into a byte
     ),
     edges=4,
     random_cases=6,

@@ -189,7 +189,7 @@ def the_last_one_before(stamps, positions, quaternions, t):
     return outside(stamps, t) or (positions[i], quaternions[i])
 
 
-OUTSIDE = "After the last pose, where the camera is is unknown: what should a node say then?"
+OUTSIDE = "Before the first pose and after the last, nobody knows where the camera is: what should a node say then?"
 
 
 @wrong(OUTSIDE)

@@ -54,7 +54,8 @@ _SPREADS = (
     1e6 * np.array([[9.0, -1.2, 3.0], [-1.2, 1.0, 0.6], [3.0, 0.6, 4.0]]),
 )
 _FIVE = 1e3 * np.array([[4.0, 3.0, -2.0], [3.0, 4.0, -2.0], [-2.0, 0.0, -4.0], [0.0, -2.0, 4.0], [4.0, -2.0, 0.0]])
-_AWAY = np.array([8e5, -7e5, 9e5])
+_VERY_FAR = 1e9 * np.array([[6.8, -6.8, 0.0], [-5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, -10.0, 1.0]])
+_AWAY = np.array([9e6, -9.5e6, 9.7e6])
 
 
 # The nearest allowed is number 288, which no byte holds; the nearest, 289, is not allowed.
@@ -64,8 +65,8 @@ _MANY = (np.abs(np.arange(LONG) - 288.0)[:, None] * (1.0, -0.5, 2.0), np.zeros(3
 QUESTION = Question(
     reference=choose_region,
     kinds={
-        "features": array("n 3"),
-        "mean": array("3"),
+        "features": array("n 3", -1e10, 1e10, says="-1e10 to 1e10"),
+        "mean": array("3", -1e7, 1e7, says="-1e7 to 1e7"),
         "covariance": array(
             "3 3", form=lambda rng, _: _covariance(rng) * rng.choice([1e-8, 1.0, 1e12]), says="symmetric and invertible"
         ),
@@ -89,7 +90,7 @@ QUESTION = Question(
             np.diag([1.0, 4.0, 1.0]),
             np.array([False, True, True]),
         ),  # a forbidden one at the mean
-        (1e10 * _LINE[::-1], np.zeros(3), np.eye(3), np.array([True, False, True])),  # all very far away
+        (_VERY_FAR, np.zeros(3), np.eye(3), np.array([True, False, True, True])),  # all very far away
         _MANY,
         *(_star(mean, 1.0, first) for mean in (_AWAY, -_AWAY) for first in (True, False)),
         *((_FIVE, np.zeros(3), spread, np.ones(5, bool)) for spread in _SPREADS),

@@ -77,7 +77,7 @@ QUESTION = Question(
             1 / 128,
         ),
         (_logits((4, 1), (1, 1.5)), _logits((3.5, 1.5), (1, 1.25)), 0.5),
-        (_logits((1e6, -7e5), (3e5, 1e6)), _logits((3e5, -1e5), (1e6, 1e6)), 1e6),  # the largest numbers
+        (_logits((1e6, -7e5), (3e5, 1e6)), _logits((5e4, -1e5), (1e6, 1e6)), 1e6),  # the largest numbers
         (2**18 * _BEST_AND_SECOND, 2**18 * _BEST_AND_SECOND - np.float32(0.25), 0.25),
         (_logits((0, 1.5e-6, 5), (1, 0, -5)), _logits((1.005e-6, 1.5e-6, 5), (1, 0, -5)), 1e-6),  # and the smallest
         (_DIGITS, _DIGITS.copy(), 1e-6),

@@ -21,7 +21,7 @@ EXCEPTIONS = [
     (lambda: np.zeros((3, 2))[0, 4], "an index up to 4 fits axis 0 of P: are two axes swapped?"),
     (lambda: np.zeros(2)[4], "An index of 4 into an axis of 2"),  # P's first axis is no other one
     (lambda: np.zeros(3)[1.5], "must be integers or booleans"),
-    (lambda: np.zeros(3)[np.ones(4, bool)], "A mask with 4 entries along axis 0"),
+    (lambda: np.zeros(3)[np.ones(4, bool)], "A mask of length 4 along axis 0"),
     (lambda: np.zeros(3)[0, 1], "2 indices for an array with 1 axes"),
     (lambda: np.float64(3)[0], "single number"),
     (lambda: np.zeros((5, 3)) + np.zeros((3, 5)), "(the shape of P)"),
@@ -54,6 +54,11 @@ EXCEPTIONS = [
     (lambda: {}[3], "no such key"),
     (lambda: int(np.nan), "is float() meant?"),
     (lambda: int("inf"), "is float() meant?"),
+    (lambda: np.zeros((1, 3))[:, :2].__iadd__(np.zeros((0, 2))), "The right side is empty here"),
+    (
+        lambda: np.zeros(2).__iadd__(np.zeros((3, 2))),
+        "The place on the left has shape (2,), and what you put there makes",
+    ),
 ]
 
 
@@ -85,8 +90,9 @@ OF_A_LINE = [
     (lambda: int(np.float64(np.nan)), "int(u.mean())", "The mean of nothing is NaN"),
     (lambda: np.stack([np.zeros(256), np.zeros(4)]), "n = np.stack([np.bincount(i) for i in y])", "with a 255 in it"),
     (lambda: np.zeros(7) == np.zeros((5, 3)) + np.zeros(7)[:7], "a == b", "mask both alike"),
+    (lambda: np.zeros(15) == np.zeros((5, 3)) + np.zeros(15), "a == b", "15 numbers, as a mask or ravel puts them"),
     (lambda: np.ones((1, 3)) + np.ones(4), "n = n[:k] + n[k + 1 :]", "+ concatenates lists. With arrays"),
-    (lambda: np.zeros((5, 3)) + np.zeros((4, 3)), "a + b", "one has 5 entries where the other has 4"),
+    (lambda: np.zeros((5, 3)) + np.zeros((4, 3)), "a + b", "one has length 5 where the other has 4"),
 ]
 
 

@@ -110,7 +110,7 @@ def test_nan_is_right_where_the_reference_has_it_and_nowhere_else():
     assert compare(PLAIN, expected, expected.copy()) is None
     assert compare(PLAIN, expected, np.array([0.5, 0.0, np.inf])).kind == "values"
     assert compare(PLAIN, expected, np.array([0.5, np.nan, -np.inf])).kind == "values"
-    assert compare(PLAIN, expected, np.array([np.nan, np.nan, np.inf])).says == "1 of 3 values are NaN"
+    assert compare(PLAIN, expected, np.array([np.nan, np.nan, np.inf])).says == "1 of 3 values is NaN"
     assert compare(PLAIN, np.float64(1), np.inf).says == "it is NaN or infinite"
 
 
@@ -189,7 +189,7 @@ def itself(n):
         (lambda n: np.zeros(len(n)).view(AlwaysEqual), "values", "2 of 2 values are wrong"),
         (lambda n: iou(n) * 1.01, "values", "2 of 2 values are wrong"),
         (lambda n: iou(n) * 9, "values", "2 of 2 values are wrong"),
-        (lambda n: np.where(np.arange(len(n)) == 1, np.nan, iou(n)), "finite", "1 of 2 values are NaN"),
+        (lambda n: np.where(np.arange(len(n)) == 1, np.nan, iou(n)), "finite", "1 of 2 values is NaN"),
         (lambda n: n[7], "exception", "IndexError: index 7 is out of bounds"),
         (lambda n, m: n, "exception", "missing 1 required positional argument: 'm'"),
     ],
@@ -297,7 +297,7 @@ def test_a_case_in_which_a_listed_mistake_tells_nothing_is_left_out():
 
 def test_right_cases_are_counted_in_whatever_form_they_come():
     says = judge(PLAIN, lambda n: tuple(iou(n) * (1 if len(n) == 2 else 9)), seed=3).hint
-    assert says.endswith("1 of 6 cases are right.")
+    assert says.endswith("1 of 6 cases is right.")
 
 
 def test_a_wrong_sign_is_told_without_a_look_at_the_program():

@@ -122,6 +122,8 @@ def test_at_most_two_places_are_offered_to_choose_from():
     [
         ("def f(a, b):\n    return a", ["unread"]),
         ("def f(a, b):\n    c = a * b\n    return a", ["unused"]),
+        ("def f(a, b):\n    c = len(a)\n    n, m = b.shape[0], 1\n    return a + b", []),  # may well be left over
+        ("def f(a, b):\n    c = len(a + b)\n    return a + b", ["unused"]),
         ("def f(a, b):\n    c = a * b\n    c += 1\n    return c", []),
         ("def f(a, b):\n    def g(x):\n        return x + b\n    return g(a)", []),
         ("def f(a, b):\n    for _ in range(3):\n        a = a + b\n    return a", []),

@@ -42,6 +42,8 @@ FOUND = [
     (shares, N, "def f(n):\n    s = n.sum()\n    return n * (1 / s)", [("division", "1 / s")]),
     (shares, N, "def f(n):\n    n /= max(n.sum(), 1)\n    return n", [("writes", "n /= max(n.sum(), 1)")]),
     (shares, N, "def f(n):\n    n.sort()\n    return shares(n)\n", [("writes", "n.sort()")]),
+    # A line that writes what is there already is right.
+    (shares, N, "def f(n):\n    n[0] = n[0]\n    n += 1\n    return n / n.sum()", [("writes", "n += 1")]),
 ]  # fmt: skip
 SILENT = [
     (mean_or_nan, (np.ones(3), np.zeros(0)), "def f(n):\n    return n.sum() / np.float64(n.size)"),  # NaN on purpose
