@@ -10,8 +10,8 @@ import typer
 def check(lab: Annotated[Path, typer.Argument(help="A saved lab, a notebook file.")]) -> None:
     """Check a saved lab as the grader will, on public cases; exit status 1 if an answer is wrong.
 
-    Answers run in the grader's sandbox where there is one (Linux), else with your rights, which is said before: a
-    stranger's notebook is not for such a machine.
+    Answers run in the grader's sandbox if there is one (Linux). Otherwise they run with your own
+    rights, after a warning: do not check a stranger's notebook on such a machine.
     """
     from labgrader.file_check import LIMITS, check_file
 

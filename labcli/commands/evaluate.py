@@ -11,7 +11,10 @@ from labcli.commands.options import Aligned, CameraName, Dask, DepthScale, Model
 
 def evaluate(
     folder: Annotated[
-        Path | None, typer.Argument(help="Your own pictures: color/, depth/ and mask/ of numbered things; else scenes.")
+        Path | None,
+        typer.Argument(
+            help="Your own pictures: color/, depth/ and mask/ of numbered objects; random scenes if omitted."
+        ),
     ] = None,
     scenes: Annotated[int, typer.Option(help="How many scenes; each is one trial.", min=1)] = 100,
     first_seed: Annotated[int, typer.Option(help="Seed of the first scene; the others follow.", min=0)] = 900_000,
@@ -32,7 +35,7 @@ def evaluate(
     worst: Annotated[int, typer.Option(help="Show this many of the worst in OUT/worst.html.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for worst.html.")] = Path("out"),
     anything: Annotated[
-        bool, typer.Option("--anything", help="With FOLDER: objects of any class, told apart.")
+        bool, typer.Option("--anything", help="With FOLDER: score objects of any class, each separately.")
     ] = False,
     depth_scale: DepthScale = None,
     aligned: Aligned = False,
@@ -42,7 +45,7 @@ def evaluate(
 ) -> None:
     """Score masks and lifts over random scenes: IoU by class, and how often the arm lifts a target.
 
-    With FOLDER, score how well the things in pictures of your own are told apart, and nothing is simulated.
+    With FOLDER, score how well the objects in your own pictures are separated; nothing is simulated.
     """
     options = inspect.signature(evaluate).parameters
     given = {name for name, value in locals().items() if name in options and value != options[name].default}

@@ -17,7 +17,7 @@ def grade(
     new_round: Annotated[
         bool,
         typer.Option(
-            "--new-round", help="Draw a new seed and grade everybody with it; otherwise late work joins the old round."
+            "--new-round", help="Draw a new seed and grade everyone with it; otherwise late work joins the old round."
         ),
     ] = False,
     workers: Annotated[
@@ -31,13 +31,13 @@ def grade(
         tuple[str, str] | None,
         typer.Option(help="A group of wrong answers, see class.html, and the comment they all see."),
     ] = None,
-    everybody: Annotated[str | None, typer.Option(help="A question whose points everybody gets.")] = None,
+    everybody: Annotated[str | None, typer.Option(help="A question for which everyone gets full points.")] = None,
     drop: Annotated[str | None, typer.Option(help="A question that does not count.")] = None,
-    points: Annotated[str | None, typer.Option(help="A question and what it is worth now, such as iou=3.")] = None,
+    points: Annotated[str | None, typer.Option(help="A question and its new points, such as iou=3.")] = None,
     partial: Annotated[str | None, typer.Option(help="A question whose outputs count separately.")] = None,
     reason: Annotated[str, typer.Option(help="Why; kept in changes.json, and shown to students.")] = "",
-    undo: Annotated[str | None, typer.Option(help="A question whose change is undone.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Also grade again what has not changed.")] = False,
+    undo: Annotated[str | None, typer.Option(help="A question whose change should be undone.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Grade again even what has not changed.")] = False,
     tidy: Annotated[
         bool, typer.Option("--tidy", help="Remove pages and grades of students whose submission is gone.")
     ] = False,

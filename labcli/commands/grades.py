@@ -14,7 +14,7 @@ def grades(
     canvas: Annotated[bool, typer.Option("--canvas", help="Canvas's columns, and its zip of pages.")] = False,
     gradescope: Annotated[bool, typer.Option("--gradescope", help="An autograder for Gradescope, as a zip.")] = False,
     assignment: Annotated[
-        int | None, typer.Option(help="Canvas's number of the assignment, where its column has another name.", min=1)
+        int | None, typer.Option(help="Canvas's number of the assignment, if its column has a different name.", min=1)
     ] = None,
     course: Annotated[Path, typer.Option(help="Folder that holds nbgrader's gradebook.", callback=of_course)] = Path(
         "."
@@ -22,7 +22,7 @@ def grades(
 ) -> None:
     """Write a table of grades: for Moodle or Canvas as they import it, with a zip of feedback that they hand out.
 
-    Exit status 1 if somebody is still to be graded by hand; it says in what.
+    Exit status 1 if something still has to be graded by hand; it says what.
     """
     needs_linux("grades")
     from labgrader.grade_course import private

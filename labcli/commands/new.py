@@ -17,7 +17,7 @@ def new_question(
     points: Annotated[int, typer.Option(help="What it is worth.", min=1)] = 2,
     course: Checkout = Path("."),
 ) -> None:
-    """Write a question that works, right answers and wrong ones, and its cells in the topic's solution."""
+    """Write a working question, right and wrong answers to it, and its cells in the topic's solution."""
     from labgrader.release import scaffold
 
     tell_written(scaffold.new_question(course, name, points))

@@ -48,14 +48,14 @@ class Settings:
     ] = None
     camera_pose: Annotated[
         str | None,
-        typer.Option(help='Where the camera stands: "x y z qx qy qz qw", or T_base_cam=FILE; else /tf says.'),
+        typer.Option(help='Pose of the camera: "x y z qx qy qz qw", or T_base_cam=FILE; by default from /tf.'),
     ] = None
     base_frame: Annotated[str, typer.Option(help="The base frame's name.")] = "base_link"
-    slop: Annotated[float, typer.Option(help="How far apart the stamps of a frame may be, seconds.")] = 0.02
+    slop: Annotated[float, typer.Option(help="Largest difference between the stamps of a frame, seconds.")] = 0.02
     depth_scale: Annotated[
         float | None,
         typer.Option(
-            help="Metres per unit of 16-bit depth; else 0.001, and no grasps where things then fit another unit."
+            help="Metres per unit of 16-bit depth; by default 0.001, without grasps if the objects fit another unit."
         ),
     ] = None
     topic: Annotated[
@@ -124,10 +124,10 @@ class Settings:
 class RosSettings(Settings):
     """The options on ROS. On ROS 2 each but --topic is also a parameter of the same name, which wins."""
 
-    qos_inputs: Annotated[str, typer.Option(help="What to request from cameras: best_effort or reliable.")] = (
+    qos_inputs: Annotated[str, typer.Option(help="QoS to request from cameras: best_effort or reliable.")] = (
         "best_effort"
     )
-    qos_outputs: Annotated[str, typer.Option(help="What to offer: reliable or best_effort.")] = "reliable"
+    qos_outputs: Annotated[str, typer.Option(help="QoS to offer: reliable or best_effort.")] = "reliable"
     qos_depth: Annotated[int, typer.Option(help="Messages kept for a slow reader.")] = 10
     max_age: Annotated[float, typer.Option(help="Seconds; an older frame gets a mask and a warning, and no grasp.")] = (
         1.0
@@ -196,7 +196,7 @@ def bag(
         bool, typer.Option("--probabilities", help="Also write class probabilities to OUT.")
     ] = False,
 ) -> None:
-    """Answer the frames of a bag of ROS 1 or ROS 2, and write another; exit status 1 if no frame was answered."""
+    """Process the frames of a ROS 1 or ROS 2 bag, and write another bag; exit status 1 if no frame was answered."""
     from labros.bags import answer_bag
 
     options = settings.node()
@@ -212,7 +212,7 @@ def bag(
 def ros(
     settings: RosSettings,
     arguments: Annotated[
-        list[str] | None, typer.Argument(metavar="[--ros-args ...]", help="ROS's own arguments, after all others.")
+        list[str] | None, typer.Argument(metavar="[--ros-args ...]", help="Arguments for ROS itself, after all others.")
     ] = None,
     ros1: Annotated[bool, typer.Option("--ros1", help="On ROS 1 instead of ROS 2.")] = False,
     lifecycle: Annotated[

@@ -12,15 +12,15 @@ Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 Dask = Annotated[str | None, typer.Option(help="Run on the workers of this Dask scheduler, tcp://host:8786.")]
 
 Gripper = Annotated[
-    str, typer.Option(help='The hand, where not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON or YAML file.')
+    str, typer.Option(help='The hand, if not the Panda\'s: "max_opening=0.14 ...", metres, or a JSON or YAML file.')
 ]
 DepthScale = Annotated[
-    float | None, typer.Option(help="Metres per unit of depth; by default what the camera's file says, or what fits.")
+    float | None, typer.Option(help="Metres per unit of depth; by default the camera file's, or the one that fits.")
 ]
 Aligned = Annotated[
     bool, typer.Option("--aligned", help="Depth of another size shows the same view as colour, as on a phone.")
 ]
-CameraName = Annotated[str | None, typer.Option(help="Which camera of a file that has several.")]
+CameraName = Annotated[str | None, typer.Option(help="Which camera to use, if the file has several.")]
 
 MeasuredMm = Annotated[
     float, typer.Option(help="Measured length of the sheet's 150 mm line as printed, millimetres.", min=30.0, max=750.0)

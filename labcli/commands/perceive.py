@@ -34,7 +34,7 @@ def perceive(
     model: Model = "unet_rgbd",
     mask: Annotated[
         Path | None,
-        typer.Option(help="A mask from elsewhere instead of a network's: 0 and one other value, or labels."),
+        typer.Option(help="Use this mask instead of the network's: 0 and one other value, or labels."),
     ] = None,
     instances: Annotated[
         bool, typer.Option("--instances", help="Each value above 0 of --mask is an object, and each object a target.")
@@ -45,13 +45,13 @@ def perceive(
     at: Annotated[
         list[str] | None,
         typer.Option(
-            help='A pixel "U,V", column and row: the thing there is the target, whatever its class; several: all of it.'
+            help='Pixel "U,V", column and row: the object there is the target, of any class; several mark one object.'
         ),
     ] = None,
     not_at: Annotated[
         list[str] | None,
         typer.Option(
-            "--not", help='A pixel "U,V" that --at took with it and that is another thing: they are parted between.'
+            "--not", help='Pixel "U,V" on another object that --at included: the two are separated between the clicks.'
         ),
     ] = None,
     target: Annotated[
@@ -63,7 +63,7 @@ def perceive(
         str,
         typer.Option(
             help="What the arm can reach: from and to in x, y and z of the base frame, z from the table; by default "
-            "what stands on the table."
+            "whatever stands on the table."
         ),
     ] = "",
     out: Annotated[

@@ -15,7 +15,7 @@ def photos(
     name: Annotated[str, typer.Option(help="The frame's name.")],
     measured_mm: MeasuredMm = 150.0,
 ) -> None:
-    """Make a frame with depth of photographs of a table with the sheet on it, and add it to a folder of pictures."""
+    """Make a frame with depth from photographs of a table with the sheet on it, and add it to a folder of pictures."""
     from labcli import photos as own
     from labcli.cameras import read_intrinsics
     from labkit.geometry.sheet import RULER_MM, Sheet

@@ -15,8 +15,8 @@ def renumber(
 ) -> None:
     """Rerun lessons, update their marked numbers, and list the sentences whose claim may no longer hold.
 
-    For a camera of your own (`camera` in [tool.labcourse], LABKIT_CAMERA), other scenes, or new versions. The notebooks
-    are changed in place; git shows how. Exits with 1 if a sentence has to be read.
+    For your own camera (`camera` in [tool.labcourse], LABKIT_CAMERA), other scenes, or new versions. The
+    notebooks are changed in place; git shows the changes. Exit status 1 if a sentence has to be read again.
     """
     from labcli import renumber as again
 

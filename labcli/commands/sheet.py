@@ -12,7 +12,7 @@ def sheet(
     out: Annotated[Path, typer.Option(help="The PDF to write.")] = Path("sheet.pdf"),
     paper: Annotated[Literal["a4", "letter"], typer.Option(help="Paper in the printer.")] = "a4",
 ) -> None:
-    """Write a sheet to print at true size, by which `calibrate` finds a camera."""
+    """Write a sheet to print at true size, for `calibrate` and `photos`."""
     from labcli.sheet import sheet_pdf
     from labkit.support.files import write_atomically
 

@@ -10,15 +10,15 @@ from labcli.commands.options import Dask, Workers
 
 def study(
     out: Annotated[
-        Path | None, typer.Option(help="Where to write the table; out/07_grasp.csv or 07_scores.csv.")
+        Path | None, typer.Option(help="Where to write the table; by default out/07_grasp.csv or out/07_scores.csv.")
     ] = None,
     scores: Annotated[
-        bool, typer.Option("--scores", help="Measure what the planner's score is worth instead.")
+        bool, typer.Option("--scores", help="Measure instead how well the planner's score predicts lifts.")
     ] = False,
     workers: Workers = 1,
     dask: Dask = None,
 ) -> None:
-    """Measure what IoU is worth: lifts by masks spoilt in five ways; stopped with Ctrl-C, it resumes."""
+    """Measure what IoU is worth: lifts with masks degraded in five ways; after Ctrl-C, the same command resumes."""
     from labcli import mask_study, score_study
 
     out = out or Path("out/07_scores.csv" if scores else "out/07_grasp.csv")

@@ -15,12 +15,13 @@ def train(
     scenes: Annotated[int | None, typer.Option(help="Use only the first N scenes of each.", min=1)] = None,
     val: Annotated[Path | None, typer.Option(help="Data set to validate on after each epoch.")] = None,
     model: Annotated[
-        str | None, typer.Option(help="Which network: unet_rgbd, unet or smallsegnet; that of --init, or unet.")
+        str | None,
+        typer.Option(help="Which network: unet_rgbd, unet or smallsegnet; by default that of --init, or unet."),
     ] = None,
     init: Annotated[str | None, typer.Option(help="Weights to continue from: a name as in --model, or a file.")] = None,
     things: Annotated[
         bool,
-        typer.Option("--things", help="Also learn to tell objects apart, from data sets of data_gen; unet_rgbd only."),
+        typer.Option("--things", help="Also learn to separate objects, from data sets of data_gen; unet_rgbd only."),
     ] = False,
     epochs: Annotated[int | None, typer.Option(help="Passes over the data; by default the model's recipe.")] = None,
     lr: Annotated[float | None, typer.Option(help="Highest learning rate; by default the model's recipe.")] = None,

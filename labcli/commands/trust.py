@@ -11,7 +11,7 @@ def trust(
         Path, typer.Argument(help="A course's folder, with a pyproject.toml; the current one by default.")
     ] = Path("."),
 ) -> None:
-    """Trust another course than the installed one: its questions, which are code, run for commands in its folder."""
+    """Trust a course other than the installed one: commands in its folder then run its questions, which are code."""
     from labgrader.course import trust as trust_folder
 
     typer.echo(f"{folder.resolve()} is trusted from now on; {trust_folder(folder)} lists such folders")
