@@ -164,24 +164,24 @@ def said(words: str) -> str:
 
 HEAD = f"""# Evidence
 
-`make evidence` writes this page from the files of results; it measures nothing. Date and commit are those at which a
-result was written down. A test compares README, the guides and the model card with it.
+`make evidence` writes this page from the files of results; it measures nothing itself. Date and commit tell when each
+result was recorded. A test compares README, the guides and the model card with this page.
 
 ## Masks and lifts
 
 {SCORES} command | measured |
 |---|---|---|---|---|---|---|---|---|"""
 PROMISED = """
-## What else the pages say
+## Other claims
 
-| promise | command | last result | measured |
+| claim | command | last result | measured |
 |---|---|---|---|"""
 TESTS = """
-## What tests say
+## Claims shown by tests
 
-These have no file of results: they pass, or fail, at the commit that you have.
+These have no file of results; they pass or fail at the commit that you have checked out.
 
-| promise | command |
+| claim | command |
 |---|---|"""
 
 
