@@ -12,9 +12,8 @@ import matplotlib.figure
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
-from tqdm.auto import tqdm
 
-from labcli.photographs import Photograph, photographs
+from labcli.photographs import Photograph, photographs, showing
 from labkit.geometry import invert_transform
 from labkit.geometry.calibration import LEAST_VIEWS, Calibration, calibrate, hand_eye, sheet_pose
 from labkit.geometry.sheet import RULER_MM, Chessboard, Corners, Sheet, Target
@@ -59,19 +58,9 @@ def look(folder, target: Target, wanted: tuple[tuple[int, int], int] | None = No
     """
     found, orientation, said = photographs(folder, wanted)
     corners, kept = [], []
-    for photograph in tqdm(found, desc="looking for the sheet", unit="photograph"):
-        try:
-            seen = target.find(photograph.read(orientation))
-        except ValueError as error:
-            if not str(error).startswith(photograph.path.name):
-                raise
-            said.append(f"left out: {error}")
-            continue
-        if seen is None:
-            said.append(f"left out: {photograph.path.name}: no sheet found: hidden, too far, too flat, or blurred")
-        else:
-            corners.append(seen)
-            kept.append(photograph)
+    for photograph, seen in showing(found, orientation, target.find, said):
+        corners.append(seen)
+        kept.append(photograph)
     kept, corners = _sharp(kept, corners, said)
     size = (kept or found)[0].size(orientation) if found else (0, 0)
     return Views(corners, [photograph.path.name for photograph in kept], size, orientation, said)

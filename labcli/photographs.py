@@ -5,13 +5,14 @@ all photographs are turned as most of them are: portrait among landscape is turn
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, UnidentifiedImageError
+from tqdm.auto import tqdm
 
 from labkit.support.images import turned, turned_size
 from labkit.support.validation import require
@@ -23,6 +24,8 @@ HEIC = (
     "HEIC is read where pillow-heif is installed (pip install pillow-heif); or let the phone write JPEG: on an iPhone "
     "Settings > Camera > Formats > Most Compatible"
 )
+
+WHY_NONE = "hidden, too far, too flat, blurred, or not the sheet that `labkit sheet` prints"
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,23 @@ def photographs(folder, wanted: tuple[tuple[int, int], int] | None = None) -> tu
                 why = "it was cut or turned by another program, and nobody knows which way"
             said.append(f"left out: {photograph.path.name}: {w} x {h}, the others {size[0]} x {size[1]}: {why}")
     return [photograph for photograph in found if photograph.size(orientation) == size], orientation, said
+
+
+def showing(found: list[Photograph], orientation: int, find: Callable, said: list[str]) -> Iterator[tuple]:
+    """Each photograph in which `find` sees a sheet, with what it sees there; the others are named in `said`.
+
+    find: a function of an RGB picture; None means that it sees no sheet.
+    """
+    for photograph in tqdm(found, desc="looking for the sheet", unit="photograph"):
+        try:
+            picture = photograph.read(orientation)
+        except ValueError as error:
+            said.append(f"left out: {error}")
+            continue
+        if (seen := find(picture)) is None:
+            said.append(f"left out: {photograph.path.name}: no sheet found: {WHY_NONE}")
+        else:
+            yield photograph, seen
 
 
 def _opened(path: Path) -> Photograph:

@@ -10,7 +10,7 @@ from tqdm.auto import tqdm
 
 from labcli.calibrate import dumped
 from labcli.cameras import Intrinsics
-from labcli.photographs import photographs
+from labcli.photographs import photographs, showing
 from labkit.frame import RGBDFrame
 from labkit.geometry.calibration import MISFIT
 from labkit.geometry.sheet import Sheet
@@ -54,25 +54,18 @@ def table_in(folder, camera: Intrinsics, sheet: Sheet | None = None) -> Table:
     )
     found, orientation, said = photographs(folder, (camera.size, camera.orientation))
     views, names = [], []
-    for photograph in tqdm(found, desc="looking for the sheet", unit="photograph"):
-        try:
-            view = view_of_sheet(photograph.read(orientation), camera.K, camera.distortion, sheet)
-        except ValueError as error:
-            said.append(f"left out: {error}")
-            continue
-        if view is None:
-            said.append(f"left out: {photograph.path.name}: no sheet found: hidden, too far, too flat, or blurred")
-        else:
-            views.append(view)
-            names.append(photograph.path.name)
+    for photograph, view in showing(
+        found, orientation, lambda picture: view_of_sheet(picture, camera.K, camera.distortion, sheet), said
+    ):
+        views.append(view)
+        names.append(photograph.path.name)
     views, names = _fitting(views, names, said)
     _check_count(len(views), LEAST, said)
     views, names = _from_one_side(views, names, said)
     swept, views, names = _unmoved(views, names, said)
     known = (swept.depth > 0.0).mean()
     require("folder", known >= KNOWN, f"photographs that agree on how far things are; {HOW}", f"{known:.0%} that agree")
-    frame = RGBDFrame(views[0].rgb, swept.depth, views[0].K, views[0].T_base_cam, table_z=0.0)
-    return Table(frame, names[0], len(views), tuple(said))
+    return Table(views[0].frame(swept.depth), names[0], len(views), tuple(said))
 
 
 def _check_count(count: int, least: int, said: list[str]) -> None:

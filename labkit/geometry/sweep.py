@@ -63,6 +63,10 @@ class View:
         check_K("K", self.K)
         check_T("T_base_cam", self.T_base_cam)
 
+    def frame(self, depth: Float32[np.ndarray, "H W"]) -> RGBDFrame:
+        """This view with its depth, in the base frame of the sheet, where the table lies at z = 0."""
+        return RGBDFrame(self.rgb, depth, self.K, self.T_base_cam, table_z=0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Swept:
@@ -106,8 +110,7 @@ def frame_from_views(views: Sequence[View], progress: Callable = lambda heights:
 
     The base frame is the sheet's, and the table lies at z = 0. progress: as in `sweep`. Topic 06, parallax.
     """
-    first = views[0]
-    return RGBDFrame(first.rgb, sweep(views, progress).depth, first.K, first.T_base_cam, table_z=0.0)
+    return views[0].frame(sweep(views, progress).depth)
 
 
 def central_first(views: Sequence[View]) -> list[int]:

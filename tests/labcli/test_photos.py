@@ -14,6 +14,7 @@ from labcli.cameras import read_intrinsics
 from labcli.pictures import read_shot
 from labcli.poses import read_pose
 from labkit.geometry import back_project_to_base, sweep
+from labkit.geometry.sheet import Sheet
 
 TILTS = ((30, 0), (28, 14), (32, -14), (22, 8), (35, -8))  # degrees about x and y: from where the sheet is seen
 
@@ -119,6 +120,48 @@ def test_another_camera_is_refused(here, make, capsys):
     (here / "camera.json").write_text(json.dumps({**facts, "fx": 700.0, "fy": 700.0}))
     assert make() == 2
     assert "calibrate anew" in capsys.readouterr().err and not (here / "data").exists()
+
+
+def another(markers: int, columns=6, rows=8):
+    """A sheet of another make, on paper of the same size: other markers, or other counts of squares."""
+    board = cv2.aruco.CharucoBoard((columns, rows), 0.03, 0.024, cv2.aruco.getPredefinedDictionary(markers))
+    width, height = Sheet().size_mm
+    printed = board.generateImage((10 * width, 10 * height))
+    edge = [10 * sheets.MARGIN] * 4
+    return cv2.GaussianBlur(cv2.copyMakeBorder(printed, *edge, cv2.BORDER_CONSTANT, value=255), (0, 0), 4)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "says"),
+    [
+        (lambda: another(cv2.aruco.DICT_6X6_50), "not the sheet that `labkit sheet` prints"),
+        (lambda: another(cv2.aruco.DICT_4X4_50, 5, 7), "no sheet of this kit|not the sheet that `labkit sheet` prints"),
+        (lambda: cv2.flip(sheets.paper(), 1), "not the sheet that `labkit sheet` prints"),
+        (lambda: stretched(sheets.paper()), "a sheet that is bent or no sheet of this kit"),
+    ],
+    ids=["other markers", "other squares", "seen in a mirror", "stretched by the printer"],
+)
+def test_another_sheet_is_refused(here, make, capsys, sheet, says):
+    """With what to do, and nothing written."""
+    rng, paper = np.random.default_rng(2), sheet()
+    for i, tilt in enumerate(TILTS):
+        picture = sheets.photograph(sheets.pose(tilt, turn=5.0 * i), rng, paper=paper)
+        sheets.save(here / "shots" / f"{i}.jpg", picture)
+    assert make() == 2
+    assert re.search(says, capsys.readouterr().err) and not (here / "data").exists()
+
+
+def stretched(paper, by=1.04):
+    """Printed 4 % too long and not too wide, as a page that is made to fit."""
+    height, width = paper.shape
+    return cv2.resize(paper, (width, round(by * height)))[:height]
+
+
+def test_a_length_measured_wrong_makes_all_larger(here, make, capsys):
+    """No photograph tells it: the height of the camera that is printed does, to who knows it."""
+    assert make("one") == 0 and make("two", "shots", "other", "--measured-mm", 165.0) == 0
+    one, two = re.findall(r"camera: ([\d.]+) m over the sheet", capsys.readouterr().out)
+    assert float(two) == pytest.approx(1.1 * float(one), rel=5e-3)
 
 
 def test_a_full_disk_leaves_nothing_behind(here, make, monkeypatch, capsys):
