@@ -45,10 +45,14 @@ def _any_network(rng, shape, C):
 
 
 def _slow(rng):
-    """Logits that say little, so that the guess still moves in the last of many rounds."""
-    w, shares = draw_weights(rng, 2), draw_shares(rng, 2)
-    z = rng.normal(0.0, 0.3, (30, 2)) + np.log(w * shares) + rng.choice([0.0, 1e5])
-    return z, w, shares, int(rng.choice([97, MOST_ROUNDS]))
+    """Logits that say little, of a class that was rare: it grows by 15 % in each round, to the last."""
+    w, rounds = draw_weights(rng, 2), int(rng.choice([97, MOST_ROUNDS]))
+    rare = 0.2 * 1.15**-rounds
+    says = rng.normal(0.0, 0.3, 30)
+    says += np.log(1.15 / np.exp(says).mean())
+    shares = np.array([1.0 - rare, rare])
+    z = np.stack([0.0 * says, says], axis=1) + np.log(w * shares) + rng.choice([0.0, 1e5])
+    return z, w, shares, rounds
 
 
 MOST_ROUNDS = 100
