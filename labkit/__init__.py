@@ -4,13 +4,12 @@
 
     RGBDFrame -> class probabilities -> labels -> target cloud in the base frame -> grasp -> lift
 
-Each arrow is a module; `labkit.pipeline` puts them in a row. `check` and `check_file` are the course's: notebooks
-import them from here, and they ask `labgrader`.
+Each arrow is a module; `labkit.pipeline` puts them in a row. `check` and `check_file` are the course's, those of
+`labgrader`: notebooks import them from here.
 """
 
 import importlib
 import sys
-from collections.abc import Callable
 
 if not (3, 11) <= sys.version_info[:2] < (3, 14):
     raise ImportError(
@@ -25,6 +24,9 @@ OFFERED = {
     "Pipeline": "labkit.pipeline",
     "RGBDFrame": "labkit.frame",
     "load_model": "labkit.network",
+    # In a notebook these two note which cells run, so they are loaded where they are imported, not at the first call.
+    "check": "labgrader.check",
+    "check_file": "labgrader.file_check",
 }
 
 
@@ -38,17 +40,3 @@ def __getattr__(name: str):
 def __dir__() -> list[str]:
     """What tab completion shows."""
     return [*globals(), *OFFERED]
-
-
-def check(name: str, answer: object) -> Callable:
-    """Check a student's answer, show the result, and return the function to go on with (`labgrader.check`)."""
-    from labgrader.check import check
-
-    return check(name, answer)
-
-
-def check_file(path: str | None = None) -> None:
-    """Check a saved lab, or the one that runs, as the grader will; print the results (`labgrader.file_check`)."""
-    from labgrader.file_check import check_file
-
-    check_file(path)

@@ -54,8 +54,6 @@ PACKAGES = {
     "labcourse.stacks": {"labcourse.stacks", "labkit"},
     "labcli": {"labcli", "labkit", "labtrain", "labros", "labgrader", "labcourse", "data_gen"},
 }
-# `labkit.check` is the one door upwards, and opens when it is called.
-DOORS = {"labkit"}
 
 
 def tracked(*patterns: str) -> list[Path]:
@@ -100,8 +98,6 @@ def test_arrows_between_rooms_point_one_way_and_in_no_circle():
         roots = {other.split(".")[0] for other in found}
         assert not roots & {"tests", "bench", "lessons", "labs", "solutions"}, name
         assert "pybullet" not in roots or name.startswith("labkit.sim."), f"{name}: PyBullet belongs in labkit.sim"
-        if name in DOORS:
-            continue
         allowed = max((package for package in PACKAGES if f"{name}.".startswith(f"{package}.")), key=len)
         entered = {other for other in found if other.split(".")[0] in PACKAGES}
         strange = {o for o in entered if not any(f"{o}.".startswith(f"{way}.") for way in PACKAGES[allowed])}

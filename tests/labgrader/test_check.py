@@ -14,6 +14,7 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from labgrader import check as checking
 from labgrader.check import CheckFailed, Shown
+from labgrader.program.cell import Cell, Parsed
 from labgrader.question import Misconception, Property, Question
 from labgrader.reply.finding import WATCHES
 from labgrader.reply.messages import Marked
@@ -224,6 +225,8 @@ def test_html_says_the_same_in_colour_and_escapes_what_students_write():
 def executed(cells, folder):
     """The outputs of the cells of a notebook that runs in a kernel of its own."""
     notebook = new_notebook(cells=[new_code_cell(cell) for cell in cells])
+    for cell in notebook.cells:
+        cell.metadata["tags"] = ["raises-exception"] if Parsed(Cell(cell.source)).problem else []
     NotebookClient(
         notebook, timeout=250, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     ).execute()
@@ -283,6 +286,18 @@ def test_a_notebook_runs_through_a_blank_a_mistake_and_a_right_answer(tmp_path):
     assert not [o for cell in outputs for o in cell if o.output_type == "stream" and o.name == "stderr"]
 
 
+def test_the_first_check_of_a_notebook_says_that_the_first_answer_is_not_python(tmp_path):
+    """Nothing of the grader has run by then but the import of `check`."""
+    cells = [
+        "from labkit import check\nimport numpy as np",
+        "def iou(n):\n    i = np.diag(n)\n    return i / (n.sum(0) + n.sum(1)",
+        "iou = check('04_iou.iou', iou)",
+    ]
+    *_, (error,), (shown,) = executed(cells, tmp_path)
+    assert error.ename == "SyntaxError"
+    assert shown.data["text/plain"].startswith("✘ iou: its cell is not Python: look at line 3")
+
+
 FIRST_TRY = "def iou(n):\n    return n / 2"
 IOU = (
     "def iou(n):\n    i = np.diag(n)\n    with np.errstate(all='ignore'):\n        return i / (n.sum(0) + n.sum(1) - i)"
@@ -309,7 +324,7 @@ def test_a_notebooks_check_takes_the_cell_that_will_be_graded():
 
     Each notebook has a shell and a kit of its own, one after the other in one process.
     """
-    first = ("from labkit import check\nimport numpy as np\nimport labgrader.check", "setup")
+    first = ("from labkit import check\nimport numpy as np", "setup")
     program = f"""
 import linecache, sys
 from IPython.core.interactiveshell import InteractiveShell

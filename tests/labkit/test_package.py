@@ -10,9 +10,10 @@ import labkit
 
 
 def test_the_names_that_most_users_begin_with_come_from_the_package():
-    from labkit import Gripper, Pipeline, RGBDFrame, load_model
+    from labkit import Gripper, Pipeline, RGBDFrame, check, check_file, load_model
 
     offered = {"Gripper": Gripper, "Pipeline": Pipeline, "RGBDFrame": RGBDFrame, "load_model": load_model}
+    offered |= {"check": check, "check_file": check_file}
     assert offered.keys() == labkit.OFFERED.keys() <= {*dir(labkit)}
     for name, module in labkit.OFFERED.items():
         assert offered[name] is getattr(importlib.import_module(module), name)
