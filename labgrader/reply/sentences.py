@@ -127,8 +127,9 @@ def exceptions(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
         yield Sentence("exception", out_of_time(cases, right, shown, got))
     if "returns None" in got.says:
         never = all(isinstance(other, Problem) and "returns None" in other.says for other in outputs)
-        words = "It never reaches a `return` with a value" if never else "In some cases no `return` is reached"
-        yield Sentence("exception", f"{words}: where does it stand, and is it in a branch or a loop?")
+        words = "It never reaches" if never else "In some cases it does not reach"
+        says = f"{words} a `return` with a value: where does it stand, and is it in a branch or a loop?"
+        yield Sentence("exception", says)
     if got.kind == "exception" and (says := explained(question, cases[shown], got, pieces)):
         yield Sentence("exception", says)
 
@@ -166,9 +167,8 @@ def listed(
 ) -> Generator[Sentence, None, list[Sentence]]:
     """The hint of the listed misconception that gives these outputs, or of what gives the one that alone is wrong.
 
-    That is, of several outputs, in the case that is shown. Returns the hints of what gives one of the others: where
-    another output is wrong there, too, or this one is right, a mark in the program tells more, and a hint may speak of
-    what is not seen.
+    That is, of several outputs, in the case that is shown. Returns the hints of what gives one of the others that are
+    wrong there: a mark in the program tells more. The hint of one that is right there would speak of what is not seen.
     """
     if misconception := recognise(question, cases, outputs):
         yield Sentence("misconception", misconception.hint)
@@ -179,7 +179,7 @@ def listed(
     shown = [parts(case.expected)], [parts(got)]
     count = len(shown[0][0])
     wrong = [k for k in range(count) if not equal_parts(question, k, *shown)]
-    hints = {k: Sentence("misconception", f"Output {k + 1} of {count}: {m.hint}") for k, m in found}
+    hints = {k: Sentence("misconception", f"Output {k + 1} of {count}: {m.hint}") for k, m in found if k in wrong}
     if len(wrong) == 1 and wrong[0] in hints:
         yield hints.pop(wrong[0])
     return list(hints.values())

@@ -284,6 +284,19 @@ def test_a_mistake_in_one_of_several_outputs_is_recognised_beside_the_others():
     assert "largest" not in judge(both, lambda n: (n.min(), n.mean()), seed=3).hint
 
 
+def test_the_hint_of_an_output_that_is_right_in_the_case_shown_is_not_said():
+    """In a table with one number that is not 0 the largest is the sum: what is seen there is the other output."""
+    both = Question(
+        name="00_test.both",
+        reference=lambda n: (n.sum(), n.mean()),
+        inputs=lambda rng: (rng.integers(1, 99, (2, 3)),),
+        by_hand=((np.array([[7, 0]]),),),
+        misconceptions=[Misconception(lambda n: (n.max(), n.max()), "the largest is no sum")],
+    )
+    found = judge(both, lambda n: (n.max(), n.min()), seed=3)
+    assert found.where == "hand-made case 1 of 1" and "largest" not in found.hint
+
+
 def test_a_case_in_which_a_listed_mistake_tells_nothing_is_left_out():
     def some(n):
         if len(n) == 3:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from labgrader.comparison import HEAVY
 from labgrader.question import Question
 from labgrader.reply import repair
 from labgrader.reply.finding import Finding, Span
@@ -80,6 +81,16 @@ def test_a_mark_beside_a_listed_mistake_spoils_no_case_that_was_right():
     more = [(np.array([7, 8, 0, 9, 9, 4]), np.array([9, 9, 9, 9, 0, 4]))]
     assert found(differs, source, wrong, more, larger) == [("comparison", ["!="])]
     assert found(differs, source, [*wrong, (np.array([1]), np.array([2]))], more, larger) == []
+
+
+def test_a_mark_beside_a_listed_mistake_is_told_where_large_cases_agree():
+    """In small cases alone a change may give by chance what a listed mistake does."""
+    source, differs = "def f(a, b):\n    return 1.0 * (a != b)", lambda a, b: 1.0 * ((a != b) & (b != 9))
+    small = [(np.array([1]), np.array([9])), (np.array([3, 1, 2, 7]), np.array([5, 9, 2, 4]))]
+    large = [(np.arange(HEAVY) % 7, np.arange(HEAVY) % 5)]
+    same, other = lambda a, b: 1.0 * (a > b), lambda a, b: 1.0 * (a > b) * (len(a) < HEAVY)
+    assert found(differs, source, [*small, *large], mistake=same) == [("comparison", ["!="])]
+    assert found(differs, source, [*small, *large], mistake=other) == []
 
 
 @pytest.mark.parametrize(
