@@ -186,6 +186,13 @@ def known_as_a_condition(psi, known, large):
     return np.where(known, 0.0, large), np.where(known, large, 0.0), psi.min(axis=2).sum()
 
 
+@wrong("You treat a pixel with 255 as one that is known to be 1. Is 255 true in a condition?", of=("the min", "labels"))
+def arcs_by_a_condition(psi, known, large, of):
+    source, sink = unknown_arcs(psi)
+    constant = psi.min(axis=2).sum() if of == "the min" else constant_of(psi, known)
+    return np.where(known, source, large), np.where(known, large, sink), constant
+
+
 @wrong("`large` is what a forbidden cut would cost. The allowed label pays its psi, and only that is in the constant.")
 def large_in_the_constant(psi, known, large):
     source, sink, constant = terminal_capacities(psi, known, large)

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from labcourse.kinds import array, number, truth
-from labgrader.question import Question, wrong
+from labgrader.question import Question, Untold, wrong
 
 
 def weight_for_recall(q1, y, recall):
@@ -70,6 +70,13 @@ QUESTION = Question(
 )
 
 # ---------------------------------------------------------------------------------------------------- wrong answers
+
+
+def first_or_untold(found):
+    """The first of some numbers; without any, an answer gives what its author thought of."""
+    for one in found:
+        return float(one)
+    raise Untold
 
 
 @wrong("Recall is a share of the pixels that truly are of class 1: which of q1 do you sort?")
@@ -149,7 +156,15 @@ def as_many_of_all_pixels(q1, y, recall):
 @wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
 def weight_for_precision(q1, y, recall):
     odds = np.unique((1.0 - q1) / q1)
-    return float(next(w for w in odds if np.mean(y[w * q1 >= 1.0 - q1]) >= recall))
+    return first_or_untold(w for w in odds if np.mean(y[w * q1 >= 1.0 - q1]) >= recall)
+
+
+@wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
+def surest_pixels_with_precision(q1, y, recall):
+    surest_first = np.argsort(-q1)
+    precision = np.cumsum(y[surest_first]) / np.arange(1, len(y) + 1)
+    last = first_or_untold(q1[surest_first][precision >= recall])
+    return (1.0 - last) / last
 
 
 @wrong("0.4 of three pixels are 1.2 pixels: is the nearest whole number, one, at least a share of 0.4?")

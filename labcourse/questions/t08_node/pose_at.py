@@ -213,6 +213,11 @@ def one_nan_each(stamps, positions, quaternions, t):
     return pose_at(stamps, positions, quaternions, t) if stamps[0] <= t <= stamps[-1] else (np.nan, np.nan)
 
 
+@wrong("Outside the stamps, too, you return a pair: three NaN, and four. All seven in one array are not a pair.")
+def seven_nan_in_one(stamps, positions, quaternions, t):
+    return pose_at(stamps, positions, quaternions, t) if stamps[0] <= t <= stamps[-1] else np.full(7, np.nan)
+
+
 @wrong("At the pose before t the share is 0, at the next one 1: from which stamp to which does yours count?")
 def share_of_the_whole_recording(stamps, positions, quaternions, t):
     i, share = neighbours(stamps, t)[0], (t - stamps[0]) / (stamps[-1] - stamps[0])

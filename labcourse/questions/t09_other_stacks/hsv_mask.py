@@ -159,6 +159,17 @@ def all_three_go_round(hsv, lower, upper):
     return np.where(lower > upper, above | below, above & below).all(axis=-1)
 
 
+@wrong("Only the hue is a circle of 180 steps: saturation and value are bytes, from 0 to 255.")
+def all_three_on_a_circle(hsv, lower, upper):
+    low, high = lower.astype(int), upper.astype(int)
+    return ((hsv.astype(int) - low) % 180 <= (high - low) % 180).all(axis=-1)
+
+
+@wrong("Where the hue wraps around, your mask is one of hues alone: what has become of saturation and value?")
+def hue_alone_where_it_goes_round(hsv, lower, upper):
+    return inside(hsv, lower, upper)[..., 0] if lower[0] > upper[0] else hsv_mask(hsv, lower, upper)
+
+
 @wrong("When the hue wraps around, saturation and value do not: `or` is for the hue alone.")
 def all_three_go_with_the_hue(hsv, lower, upper):
     above, below = hsv >= lower, hsv <= upper
