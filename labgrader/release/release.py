@@ -9,6 +9,7 @@ execution, the state of widgets, the version of Python. Their outputs stay.
 import ast
 import hashlib
 import logging
+import os
 import re
 import shutil
 import tempfile
@@ -23,7 +24,7 @@ from labgrader.course import asked as asked_in
 from labgrader.course import course as course_here
 from labgrader.course import is_taught, of_topic, topics
 from labgrader.release.publishing import badges, published, unpublished, with_badges
-from labgrader.support import write_atomically
+from labgrader.support import git, write_atomically
 
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 VOLATILE_CELL = ("execution", "ExecuteTime", "collapsed", "scrolled", "trusted")
@@ -137,7 +138,9 @@ def generate(solution: Path, tidied: bytes) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         course = Path(folder)
         source = course / "solutions" / topic
-        shutil.copytree(solution.parent, source, ignore=shutil.ignore_patterns(".*", "*.tmp", "__pycache__"))
+        for path in belonging(solution.parent):
+            (source / path.relative_to(solution.parent)).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, source / path.relative_to(solution.parent))
         (source / solution.name).write_bytes(tidied)
         convert(course, topic)
         files = sorted(path for path in (course / "labs" / topic).rglob("*") if path.is_file())
@@ -149,6 +152,22 @@ def generate(solution: Path, tidied: bytes) -> dict[str, bytes]:
     course = solution.parents[2]
     lab = nbformat.from_dict(published(lab, f"labs/{topic}/{solution.name}", course, course_here()))
     return made | {solution.name: to_bytes(lab)}
+
+
+def belonging(folder: Path) -> list[Path]:
+    """The files of a solution's or a lab's folder, without hidden ones, caches, and what git ignores.
+
+    That is what running a notebook leaves behind, such as its table of attempts: no part of a release.
+    """
+    left_behind = shutil.ignore_patterns(".*", "*.tmp", "__pycache__")
+    names = [path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file()]
+    names = [name.as_posix() for name in names if not left_behind("", name.parts)]
+    try:
+        said = git(folder, "-c", "core.quotePath=false", "check-ignore", "--", *names).stdout
+        ignored = set(os.fsdecode(said).splitlines())
+    except OSError:  # no git
+        ignored = set()
+    return [folder / name for name in names if name not in ignored]
 
 
 def task_names(lab: NotebookNode) -> dict[str, str]:
@@ -190,8 +209,7 @@ def convert(course: Path, topic: str) -> None:
 
 def differing(folder: Path, files: dict[str, bytes]) -> list[Path]:
     """Files of a folder that are not what they should be: other bytes, missing, or too many."""
-    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    there = {name for name in there if not any(part.startswith(".") for part in Path(name).parts)}
+    there = {path.relative_to(folder).as_posix() for path in belonging(folder)}
     wrong = {name for name in there & files.keys() if (folder / name).read_bytes() != files[name]}
     return [folder / name for name in sorted(wrong | (there ^ files.keys()))]
 

@@ -192,6 +192,18 @@ def test_what_belongs_to_no_solution_is_removed(course):
     assert sorted(path.name for path in (course / "labs").iterdir()) == ["90_one", "91_two"]
 
 
+def test_what_git_ignores_is_no_part_of_a_lab(course):
+    """A table of attempts that running a solution, or a lab, leaves behind asks for no release and stays."""
+    release(course)
+    subprocess.run(["git", "-C", course, "init", "-q"], check=True)
+    (course / ".gitignore").write_text("/*/*/*_attempts.json\n")
+    ran, tried = course / "solutions/90_one/90_attempts.json", course / "labs/91_two/91_attempts.json"
+    for path in (ran, tried, course / "solutions/91_two/notes.txt"):
+        path.write_text("[]")
+    assert release(course) == [course / "labs/91_two/notes.txt"] and release(course, check=True) == []
+    assert tried.is_file() and not (course / "labs/90_one/90_attempts.json").exists()
+
+
 def test_only_the_topics_that_are_asked_for(course):
     release(course, ["91_two"])
     assert [path.name for path in (course / "labs").iterdir()] == ["91_two"]
