@@ -21,6 +21,7 @@ from pathlib import Path
 from labgrader.as_arrays import giving_arrays
 from labgrader.comparison import Problem
 from labgrader.course import course, find, of_topic
+from labgrader.languages import HintsUnreadable
 from labgrader.program.cell import Cell, parsed
 from labgrader.program.notebook import LARGEST_FILE, Unreadable, readable, refuse_long
 from labgrader.program.slice import NO_CELL, Program, program
@@ -80,6 +81,8 @@ def check(name: str, answer: object) -> Callable:
     """
     try:
         question = find(name)
+    except HintsUnreadable as error:
+        return conclude(Shown("✘", "the hints of this topic cannot be read", str(error)), answer, passed=False)
     except ValueError as error:
         return conclude(Shown("✘", "there is no such question", str(error)), answer, passed=False)
     if broken := broken_cell(question):

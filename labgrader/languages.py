@@ -21,24 +21,31 @@ CHOSEN = "LABGRADER_LANGUAGE"
 ENGLISH = "en"
 
 
+class HintsUnreadable(ValueError):
+    """Raised for a file of hints that is no TOML, or has a line that belongs to nothing."""
+
+
 def translated(question: Question, module: Path, language: str) -> Question:
     """A question with the hints and statements of its file in a language, where there are any.
 
-    Raises ValueError that names the file, if a line belongs to no wrong answer and no property of the question.
+    Raises HintsUnreadable, which names the file, if a line belongs to no wrong answer and no property of the question.
     """
     path = module.with_suffix(f".{language}.toml")
     if language == ENGLISH or not path.is_file():
         return question
-    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    try:
+        said = tomllib.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise HintsUnreadable(f"{path}: {error}") from error
     hints, statements = said.pop("hints", {}), said.pop("statements", {})
     wrong = {one.answer.__name__ for one in question.misconceptions}
     properties = {one.holds.__name__ for one in question.properties}
     for table, lines, names in (("hints", hints, wrong), ("statements", statements, properties)):
         if unknown := lines.keys() - names:
             expected = f"expected functions of {module.name} ({', '.join(sorted(names)) or 'there are none'})"
-            raise ValueError(f"{path}: {table}: {expected}, got {min(unknown)}")
+            raise HintsUnreadable(f"{path}: {table}: {expected}, got {min(unknown)}")
     if said:
-        raise ValueError(f"{path}: expected the tables hints and statements, got {min(said)}")
+        raise HintsUnreadable(f"{path}: expected the tables hints and statements, got {min(said)}")
     return replace(
         question,
         misconceptions=[replace(one, hint=hints.get(one.answer.__name__, one.hint)) for one in question.misconceptions],

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from labgrader import check as checking
 from labgrader import course
 from labgrader.languages import translated
 from labgrader.reply.judge import judge
@@ -43,6 +44,17 @@ def test_a_line_that_belongs_to_nothing_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"iou\.de\.toml: hints: .* of iou\.py \(.*, dice, .*\), got dicee"):
         translated(QUESTION, tmp_path / "iou.py", "de")
     assert translated(QUESTION, tmp_path / "iou.py", "fr") is QUESTION
+
+
+def test_a_check_says_that_hints_cannot_be_read_and_not_that_there_is_no_question(tmp_path, monkeypatch, capsys):
+    from labcourse.questions.t04_iou.iou import QUESTION
+
+    monkeypatch.setattr(checking, "find", lambda name: translated(QUESTION, tmp_path / "iou.py", "de"))
+    for text, says in (('[hints]\ndicee = "Dice"\n', "got dicee"), ("[hints\n", "iou.de.toml: ")):
+        (tmp_path / "iou.de.toml").write_text(text, encoding="utf-8")
+        checking.check("04_iou.iou", len)
+        first, second = capsys.readouterr().out.splitlines()
+        assert first == "✘ the hints of this topic cannot be read" and says in second
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
