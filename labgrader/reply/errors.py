@@ -281,6 +281,7 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
 
 # Exceptions that one sentence explains; {1} is what the first bracket of the pattern holds.
 TABLE = {
+    r"EOFError: EOF when reading": "input() waits for somebody to type, and nobody does: all that you need is passed.",
     r"IndexError: (?:arrays used as indices|only integers|.*is not a valid index)|TypeError: \w+ indices must be": (
         "An index must be integers or booleans: is it the right one? If so, use .astype(int), or a comparison."
     ),

@@ -26,6 +26,7 @@ SLOW = (
     "It is right in {right} smaller cases, and too slow for a case as large as this one. Which work does it repeat, "
     "and which loop over single numbers could be one step for whole arrays?"
 )
+OF_BYTES = "Bytes are not an array yet. Which function of NumPy makes one of them, and with which dtype?"
 ASLEEP = "It waits, and computes nothing: does it sleep, or wait for something to be typed?"
 
 
@@ -125,6 +126,8 @@ def exceptions(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
         return
     if got.kind == "time":
         yield Sentence("exception", out_of_time(cases, right, shown, got))
+    if got.kind == "kind" and got.says.endswith(("got bytes", "got bytearray", "got memoryview")):
+        yield Sentence("exception", OF_BYTES)
     if "returns None" in got.says:
         never = all(isinstance(other, Problem) and "returns None" in other.says for other in outputs)
         words = "It never reaches" if never else "In some cases it does not reach"

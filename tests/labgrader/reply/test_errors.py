@@ -52,6 +52,7 @@ EXCEPTIONS = [
     (lambda: np.argmx(1), "np.argmax"),
     (lambda: np.zeros(2).summ(), ".sum"),
     (lambda: {}[3], "no such key"),
+    (lambda: exec("raise EOFError('EOF when reading a line')"), "waits for somebody to type"),
     (lambda: int(np.nan), "is float() meant?"),
     (lambda: int("inf"), "is float() meant?"),
     (lambda: np.zeros((1, 3))[:, :2].__iadd__(np.zeros((0, 2))), "The right side is empty here"),

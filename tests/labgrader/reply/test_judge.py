@@ -10,7 +10,7 @@ import torch
 from labgrader.comparison import Problem, as_numpy, compare, expected_cases
 from labgrader.question import Misconception, Property, Question, Untold, wrong
 from labgrader.reply.judge import judge, outputs_of, verdict
-from labgrader.reply.sentences import Sentence, at_once, recognise
+from labgrader.reply.sentences import OF_BYTES, Sentence, at_once, recognise
 
 
 def iou(n):
@@ -282,6 +282,12 @@ def test_a_mistake_in_one_of_several_outputs_is_recognised_beside_the_others():
         sentence = at_once(both, cases, outputs_of(answer, [case.args for case in cases])[0])
         assert (sentence is not None) == is_alone, "with another output wrong beside it, the program is looked at first"
     assert "largest" not in judge(both, lambda n: (n.min(), n.mean()), seed=3).hint
+
+
+def test_bytes_are_said_to_be_no_array_before_the_program_is_searched():
+    """The absolute value of a bytearray is the array that was asked for, which says nothing of what is wrong."""
+    for kind in (bytes, bytearray):
+        assert judge(PLAIN, lambda n, kind=kind: kind(2), seed=3).hint == OF_BYTES
 
 
 def test_the_hint_of_an_output_that_is_right_in_the_case_shown_is_not_said():
