@@ -159,7 +159,8 @@ def without_psi(y, psi, weights, v, u):
     return icm_costs(y, np.zeros_like(psi), weights, v, u)
 
 
-@wrong("Rows and columns begin at 0: do you leave out a neighbour in row 0, or in column 0?")
-def neighbours_in_the_first_row_left_out(y, psi, weights, v, u):
+@wrong("Rows and columns begin at 0: do you leave out a neighbour in row 0, or in column 0?", of=("owners", "all"))
+def neighbours_in_the_first_row_left_out(y, psi, weights, v, u, of):
     own, owned = pairs_of(weights, v, u)
+    own = [(w, b, a) for w, b, a in own if a > 0 or of == "owners"]
     return charged(own + [(w, b, a) for w, b, a in owned if b > 0 and a > 0], y, psi, v, u)

@@ -140,6 +140,11 @@ def constant_of_the_smaller_costs(psi, known, large):
     return *with_strokes(*unknown_arcs(psi), known, large), psi.min(axis=2).sum()
 
 
+@wrong("The constant is one number: what all pixels pay in any case, added up.")
+def constant_of_each_pixel(psi, known, large):
+    return *terminal_capacities(psi, known, large)[:2], own_cost(psi, known)
+
+
 @wrong("Known pixels cost something, too: their label's psi goes into the constant.")
 def constant_without_the_known(psi, known, large):
     constant = psi.min(axis=2)[known == 255].sum()

@@ -14,7 +14,7 @@ from labcourse.questions.t05_class_weights import (
     some_labels,
     some_logits,
 )
-from labgrader.question import Question, wrong
+from labgrader.question import Question, Untold, wrong
 
 
 def adjusted_grad(z, y, shares, tau):
@@ -113,15 +113,28 @@ def one_hot_adjusted(z, y, shares, tau):
 @wrong("You divide the gradient by the shares. Here the shares shift the logits, before the softmax.")
 def shares_as_weights(z, y, shares, tau):
     p, Y, counted = parts(z, y)
-    return (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
+    gradient = (p - Y) * counted / np.take(shares, y, mode="clip")[..., None] ** tau
+    if not np.isfinite(gradient).all():  # with a large tau, whose power comes first decides what overflows
+        raise Untold
+    return gradient
 
 
-@wrong("Subtract each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.")
-def one_maximum_for_all(z, y, shares, tau):
+@wrong("You multiply the gradient by the shares. Here the shares shift the logits, before the softmax.")
+def gradient_of_each_class_times_its_share(z, y, shares, tau):
+    p, Y, counted = parts(z, y)
+    return (p - Y) * counted * shares**tau
+
+
+@wrong(
+    "Subtract each pixel's own largest logit: with one maximum for all, a pixel far below it has 0 / 0.",
+    ignored=("0", "times 0"),
+)
+def one_maximum_for_all(z, y, shares, tau, ignored):
     a = z + tau * np.log(shares)
     e = np.exp(a - a.max())
-    Y = y[..., None] == np.arange(z.shape[-1])
-    return np.where(y[..., None] == 255, 0.0, e / e.sum(axis=-1, keepdims=True) - Y)
+    _, Y, counted = parts(a, y)
+    gradient = e / e.sum(axis=-1, keepdims=True) - Y
+    return gradient * counted if ignored == "times 0" else np.where(counted, gradient, 0.0)
 
 
 @wrong(

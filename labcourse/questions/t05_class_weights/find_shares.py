@@ -163,10 +163,14 @@ def summed_over_the_first_axis(z, w, shares, rounds):
     return repeated(step, shares, rounds)
 
 
-@wrong("Each pixel's probabilities sum to 1. Yours sum to 1 over all pixels together.")
-def summed_over_everything(z, w, shares, rounds):
+@wrong(
+    "Each pixel's probabilities sum to 1. Yours sum to 1 over all pixels together.", largest=("of all", "each pixel's")
+)
+def summed_over_everything(z, w, shares, rounds, largest):
     def step(guess):
-        return softmax((z + np.log(guess / shares / w)).ravel()).reshape(-1, len(shares)).sum(axis=0)
+        a = (z + np.log(guess / shares / w)).reshape(-1, len(shares))
+        e = np.exp(a - (a.max() if largest == "of all" else a.max(axis=1, keepdims=True)))
+        return e.sum(axis=0) / e.sum()
 
     return repeated(step, shares, rounds)
 

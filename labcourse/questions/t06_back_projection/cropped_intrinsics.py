@@ -86,6 +86,11 @@ def half_pixel_only_after_the_resize(K, left, top, scale):
     return with_centre(K, scale, scale * (K[0, 2] - left) - 0.5, scale * (K[1, 2] - top) - 0.5)
 
 
+@wrong("You count from the corner of the first pixel, half a pixel before its centre. Where is 0 in the new image?")
+def from_the_corner_to_the_end(K, left, top, scale):
+    return with_centre(K, scale, scale * (K[0, 2] - left + 0.5), scale * (K[1, 2] - top + 0.5))
+
+
 @wrong("A resize multiplies u and v: which rows of K make them, and which entry must stay 1?")
 def whole_matrix_scaled(K, left, top, scale):
     new = cropped_intrinsics(K, left, top, scale)

@@ -170,7 +170,11 @@ def first_axis_of_eig(P, sigma):
     return up(np.linalg.eig((P - centre).T * w @ (P - centre))[1][:, 0], centre)
 
 
-@wrong("The weights are in your mean: are they also in the squares that the plane minimises?")
-def scatter_without_weights(P, sigma):
+@wrong(
+    "The weights are in your mean: are they also in the squares that the plane minimises?",
+    around=("it", "the plain one"),
+)
+def scatter_without_weights(P, sigma, around):
     centre = np.average(P, axis=0, weights=sigma**-2.0)
-    return up(np.linalg.eigh((P - centre).T @ (P - centre))[1][:, 0], centre)
+    off = P - (centre if around == "it" else P.mean(axis=0))
+    return up(np.linalg.eigh(off.T @ off)[1][:, 0], centre)

@@ -183,6 +183,15 @@ def the_long_way_by_the_arc(*given, side):
     return with_turn(*given, lambda a, b, share: arc(a, b, 1 - share, share), side)
 
 
+@wrong("The pose nearest in time may be the one before t, or the one after it: which two are on either side of t?")
+def nearest_stamp_for_the_next(stamps, positions, quaternions, t):
+    i = int(np.clip(np.abs(stamps - t).argmin(), 1, len(stamps) - 1))
+    share = (t - stamps[i - 1]) / (stamps[i] - stamps[i - 1])
+    a, b = quaternions[i - 1], quaternions[i]
+    place = (1 - share) * positions[i - 1] + share * positions[i]
+    return outside(stamps, t) or (place, arc(a, nearer(a, b), 1 - share, share))
+
+
 @wrong("The camera moved between the two poses: where was it when the image was taken?")
 def the_last_one_before(stamps, positions, quaternions, t):
     i = max(int(np.searchsorted(stamps, t, side="right")) - 1, 0)

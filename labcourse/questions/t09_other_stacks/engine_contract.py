@@ -167,10 +167,16 @@ def kept_unless_above_and_nan_for_the_best(reference, other, tolerance):
     return not broken.any(), *nan_for_the_best(reference, other, tolerance)[1:]
 
 
-@wrong("The logits are (C, H, W), and argmax and the sort are over a pixel's classes: which axis is that?")
-def classes_on_the_last_axis(reference, other, tolerance):
+@wrong(
+    "The logits are (C, H, W), and argmax and the sort are over a pixel's classes: which axis is that?",
+    nan=("the best", "changed"),
+)
+def classes_on_the_last_axis(reference, other, tolerance, nan):
     last = sorted_along_a_row(reference, other, tolerance)[2]
-    return *labels_along_rows(reference, other, tolerance)[:2], last
+    changed = reference.argmax(axis=-1) != other.argmax(axis=-1)
+    if nan == "changed":
+        changed |= np.isnan(other).any(axis=-1)
+    return engine_contract(reference, other, tolerance)[0], changed.mean(), last
 
 
 @wrong(
