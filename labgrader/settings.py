@@ -2,7 +2,7 @@
 
 import datetime
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from labgrader.course import topics
@@ -32,6 +32,16 @@ def read_blocks(course: Path, table: str) -> list[tuple[str, dict]]:
         if name not in TABLES or not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
             raise ValueError(f"{path}: expected blocks [[{']], [['.join(TABLES)}]], got {name}")
     return [(f"{path}, [[{table}]] number {i}", block) for i, block in enumerate(settings.get(table, []), start=1)]
+
+
+def usable_blocks(
+    course: Path, table: str, needed: Mapping[str, type], possible: Mapping[str, type] | None = None
+) -> Iterator[tuple[str, dict]]:
+    """The blocks of one kind as `read_blocks` gives them; raises ValueError at one whose fields cannot be used."""
+    for where, data in read_blocks(course, table):
+        if fault := fault_of_fields(data, needed, possible or {}):
+            raise ValueError(f"{where}: {fault}")
+        yield where, data
 
 
 def fault_of_fields(data: Mapping, needed: Mapping[str, type], possible: Mapping[str, type]) -> str:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from labgrader.handin.roster import ids_of, keys_of, read_roster
-from labgrader.settings import fault_of_fields, read_blocks
+from labgrader.settings import usable_blocks
 from labgrader.support import counted
 
 DAY_S = 86400.0
@@ -107,27 +107,19 @@ class Deadline:
 def read_deadline(course: Path, topic: str) -> Deadline | None:
     """The deadline of a lab in course.toml, None if there is none; ValueError, with its line, for what cannot be."""
     roster, extensions = read_roster(course), {}
-    for where, data in read_blocks(course, "extension"):
-        needed = {"lab": str, "student": str, "reason": str}
-        fault = fault_of_fields(data, needed, {"due": datetime.date, "late_days": float})
-        if not fault and ("due" in data) == ("late_days" in data):
-            fault = "expected one of due = DATE and late_days = NUMBER in this block"
-        ids = ids_of(roster, data["student"]) if not fault else []
-        if not fault and data["lab"] == topic and set(ids) & extensions.keys():
-            fault = f"student: {data['student']} has an extension above"
-        if fault:
-            raise ValueError(f"{where}: {fault}")
+    needed, possible = {"lab": str, "student": str, "reason": str}, {"due": datetime.date, "late_days": float}
+    for where, data in usable_blocks(course, "extension", needed, possible):
+        if ("due" in data) == ("late_days" in data):
+            raise ValueError(f"{where}: expected one of due = DATE and late_days = NUMBER in this block")
+        ids = ids_of(roster, data["student"]) if data["lab"] == topic else []
+        if extensions.keys() & ids:
+            raise ValueError(f"{where}: student: {data['student']} has an extension above")
+        extensions |= dict.fromkeys(ids, data | ({"due": in_utc(data["due"])} if "due" in data else {}))
+    found, needed = None, {"lab": str, "due": datetime.date}
+    for where, data in usable_blocks(course, "deadline", needed, {"grace_minutes": float, "penalty_per_day": float}):
         if data["lab"] == topic:
-            extensions |= dict.fromkeys(ids, data | ({"due": in_utc(data["due"])} if "due" in data else {}))
-    found = None
-    for where, data in read_blocks(course, "deadline"):
-        needed = {"lab": str, "due": datetime.date}
-        fault = fault_of_fields(data, needed, {"grace_minutes": float, "penalty_per_day": float})
-        if not fault and data["lab"] == topic and found is not None:
-            fault = f"lab: {topic} has a deadline above"
-        if fault:
-            raise ValueError(f"{where}: {fault}")
-        if data["lab"] == topic:
+            if found is not None:
+                raise ValueError(f"{where}: lab: {topic} has a deadline above")
             numbers = {name: float(value) for name, value in data.items() if name not in needed}
             found = Deadline(in_utc(data["due"]), **numbers, extensions=extensions)
     return found

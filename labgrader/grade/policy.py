@@ -23,7 +23,7 @@ from labgrader.course import topics
 from labgrader.grade.deadlines import read_deadline
 from labgrader.handin.collect import marked_late
 from labgrader.handin.roster import identity, read_roster
-from labgrader.settings import fault_of_fields, read_blocks
+from labgrader.settings import usable_blocks
 
 
 @dataclass(frozen=True)
@@ -52,33 +52,23 @@ class Policy:
 def read_policy(course: Path) -> Policy:
     """The policy in course.toml; raises ValueError, with the place, for what cannot be used."""
     weights: dict[str, float] = {}
-    for where, data in read_blocks(course, "weight"):
-        fault = fault_of_fields(data, {"lab": str, "weight": float}, {})
-        if not fault and data["lab"] in weights:
-            fault = f"lab: {data['lab']} has a weight above"
-        if fault:
-            raise ValueError(f"{where}: {fault}")
+    for where, data in usable_blocks(course, "weight", {"lab": str, "weight": float}):
+        if data["lab"] in weights:
+            raise ValueError(f"{where}: lab: {data['lab']} has a weight above")
         weights[data["lab"]] = float(data["weight"])
     found = Policy(weights)
-    for i, (where, data) in enumerate(read_blocks(course, "course")):
-        fault = fault_of_fields(data, {}, {"drop_lowest": float, "late_days": float})
-        if not fault and any(not isinstance(value, int) for value in data.values()):
-            fault = "expected whole numbers in this block"
-        if fault or i:
-            raise ValueError(f"{where}: {fault or 'expected one block of this name'}")
+    possible = {"drop_lowest": float, "late_days": float}
+    for i, (where, data) in enumerate(usable_blocks(course, "course", {}, possible)):
+        if i or any(not isinstance(value, int) for value in data.values()):
+            raise ValueError(f"{where}: expected {'one block of this name' if i else 'whole numbers in this block'}")
         found = Policy(weights, **data)
     return found
 
 
 def read_bonus(course: Path, topic: str) -> list[tuple[float, str]]:
     """The points that everybody gets in a lab, each with its reason; raises ValueError for what cannot be used."""
-    found = []
-    for where, data in read_blocks(course, "bonus"):
-        if fault := fault_of_fields(data, {"lab": str, "points": float, "reason": str}, {}):
-            raise ValueError(f"{where}: {fault}")
-        if data["lab"] == topic:
-            found.append((float(data["points"]), data["reason"]))
-    return found
+    blocks = usable_blocks(course, "bonus", {"lab": str, "points": float, "reason": str})
+    return [(float(data["points"]), data["reason"]) for _, data in blocks if data["lab"] == topic]
 
 
 def free_days(course: Path, gradebook, topic: str, late_days: int) -> Counter[str]:

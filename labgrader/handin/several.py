@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labgrader.handin.roster import ids_of, read_roster
-from labgrader.settings import fault_of_fields, read_blocks
+from labgrader.settings import usable_blocks
 
 OTHERS, SEVERAL = "others", "several"
 COPY = re.compile(r"(?P<name>.+?)(?: ?\((?P<saved>\d+)\)|-(?P<uploaded>\d+))?\.ipynb")  # saved, or handed in, again
@@ -63,13 +63,9 @@ def the_later(handed_in: Sequence[HandIn]) -> HandIn | None:
 def read_picks(course: Path, topic: str) -> dict[str, str]:
     """By student the notebook that a person named; raises ValueError, with the place, for what cannot be used."""
     roster, found = read_roster(course), {}
-    for where, data in read_blocks(course, "notebook"):
-        fault = fault_of_fields(data, {"lab": str, "student": str, "file": str}, {})
-        ids = ids_of(roster, data["student"]) if not fault else []
-        if not fault and data["lab"] == topic and set(ids) & found.keys():
-            fault = f"student: {data['student']} has a notebook above"
-        if fault:
-            raise ValueError(f"{where}: {fault}")
-        if data["lab"] == topic:
-            found |= dict.fromkeys(ids, data["file"])
+    for where, data in usable_blocks(course, "notebook", {"lab": str, "student": str, "file": str}):
+        ids = ids_of(roster, data["student"]) if data["lab"] == topic else []
+        if found.keys() & ids:
+            raise ValueError(f"{where}: student: {data['student']} has a notebook above")
+        found |= dict.fromkeys(ids, data["file"])
     return found

@@ -26,7 +26,7 @@ from labgrader.handin.reading import LEFT_OUT, Lab, read_lab
 from labgrader.handin.roster import FILE as ROSTER
 from labgrader.handin.roster import Person, absent_of, keys_of, person_of, read_roster
 from labgrader.report.outputs import NOTHING, harmless
-from labgrader.settings import fault_of_fields, read_blocks
+from labgrader.settings import usable_blocks
 from labgrader.support import write_atomically
 
 CANVAS = ("SIS User ID", "SIS Login ID", "Section")  # columns beside name and ID
@@ -146,10 +146,10 @@ def canvas_heading(course: Path, name: str, roster: dict[str, Person], assignmen
     headings = dict.fromkeys(heading for person in roster.values() for heading in person.more)
     found = [match for heading in headings if (match := ASSIGNMENT.fullmatch(heading))]
     numbered = {int(match[2]): match[0] for match in found}
-    for where, data in read_blocks(course, "canvas") if assignment is None else ():
-        fault = fault_of_fields(data, {"lab": str, "assignment": float}, {})
-        if fault or not isinstance(data["assignment"], int):
-            raise ValueError(f"{where}: {fault or 'assignment: expected a whole number'}")
+    blocks = usable_blocks(course, "canvas", {"lab": str, "assignment": float})
+    for where, data in blocks if assignment is None else ():
+        if not isinstance(data["assignment"], int):
+            raise ValueError(f"{where}: assignment: expected a whole number")
         assignment = data["assignment"] if data["lab"] == name else assignment
     if assignment is not None and (assignment in numbered or not numbered):
         return numbered.get(assignment, f"{name} ({assignment})")
