@@ -17,7 +17,7 @@ from labgrader.check import LIMITS, describe, jupyter, reply_to
 from labgrader.comparison import Problem
 from labgrader.course import asked, course, of_topic, topics
 from labgrader.handin.reading import released_by
-from labgrader.program.cell import Cell, Parsed, cells_of
+from labgrader.program.cell import Cell, Parsed, cells_of, grade_id
 from labgrader.program.notebook import Unreadable, code_of, no_code, parse
 from labgrader.program.open_notebook import live_notebook, running_file
 from labgrader.program.slice import NO_CELL, program
@@ -79,16 +79,9 @@ def is_lab(notebook: dict) -> bool:
     """Whether a notebook calls checks of one of the course's topics, has graded cells, or the course's own key."""
     called = "\n".join(cell.source for cell in cells_of(notebook.get("cells")))
     cells = notebook.get("cells")
-    marked = filter(is_marked, cells if isinstance(cells, list) else [])
-    graded = any(cell["metadata"]["nbgrader"].get("grade") for cell in marked)
+    graded = any(grade_id(cell) for cell in (cells if isinstance(cells, list) else ()))
     is_named = course().metadata in notebook.get("metadata", {})
     return is_named or graded or bool(re.search(r"check\(\s*[\"']\w+\.", called))
-
-
-def is_marked(cell: object) -> bool:
-    """Whether a cell has a mark of nbgrader's."""
-    metadata = cell.get("metadata") if isinstance(cell, dict) else None
-    return isinstance(metadata, dict) and isinstance(metadata.get("nbgrader"), dict)
 
 
 def texts_of(cells: Sequence[dict]) -> dict[str, str]:

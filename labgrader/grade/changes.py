@@ -26,7 +26,7 @@ from labgrader.course import find, of_topic
 from labgrader.grade.batch import Record
 from labgrader.grade.grade import Result
 from labgrader.handin.reading import Lab
-from labgrader.program.notebook import grade_id
+from labgrader.program.cell import grade_id
 from labgrader.settings import FILE, fault_of_fields, read_blocks
 from labgrader.support import write_atomically
 

@@ -38,9 +38,9 @@ from labgrader.grade.batch import Record
 from labgrader.grade.markdown import harmless_markdown, harmless_with_pictures
 from labgrader.grade.nbgrader_plugins import KERNEL, RUBRIC_TAG
 from labgrader.grade.overview import lines_of
-from labgrader.handin.reading import Lab, Submission, source_of, text_of
+from labgrader.handin.reading import Lab, Submission, text_of
 from labgrader.handin.roster import Person, person_of
-from labgrader.program.notebook import grade_id
+from labgrader.program.cell import grade_id, source_of
 from labgrader.sandbox.sandbox import NO_SANDBOX
 from labgrader.support import inherited, write_atomically
 

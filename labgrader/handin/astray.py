@@ -7,7 +7,7 @@ nobody would read it. Such cells get the grade id of the answer that they follow
 from collections.abc import Collection, Sequence
 from itertools import pairwise
 
-from labgrader.program.notebook import grade_id
+from labgrader.program.cell import grade_id
 
 
 def with_texts_astray(cells: Sequence, released: Sequence[dict], written: Collection[str]) -> list:

@@ -8,7 +8,7 @@ import base64
 import binascii
 from collections.abc import Collection, Sequence
 
-from labgrader.program.notebook import grade_id
+from labgrader.program.cell import grade_id
 
 BEGINNINGS = {
     "image/png": (b"\x89PNG\r\n\x1a\n",),

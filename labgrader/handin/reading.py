@@ -21,8 +21,8 @@ from labgrader.handin.astray import with_texts_astray
 from labgrader.handin.pictures import Pictures, pictures_of
 from labgrader.handin.roster import keys_of
 from labgrader.handin.several import OTHERS, SEVERAL
-from labgrader.program.cell import Cell
-from labgrader.program.notebook import LARGEST_FILE, Unreadable, code_of, grade_id, no_code, parse
+from labgrader.program.cell import Cell, grade_id, source_of
+from labgrader.program.notebook import LARGEST_FILE, Unreadable, code_of, no_code, parse
 
 MOST_WRITTEN = 100_000  # characters of a written answer, fifty pages: pages show less
 LONGEST_NAME = 220  # bytes: the names of a student's pages are longer, and no file's has more than 255
@@ -349,7 +349,7 @@ def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]
 
     Those of answers are code, which has a limit for all cells; what a person grades is cut where it is very long.
     """
-    code = tuple(Cell(plain_text(cell.source), cell.grade_id) for cell in code_of(cells))
+    code = tuple(code_of(cells))
     texts = {name: {} for name in (*lab.answers, *lab.written)}
     for cell in cells:
         name = grade_id(cell)
@@ -363,16 +363,3 @@ def pick_cells(cells: list, lab: Lab) -> tuple[tuple[Cell, ...], dict[str, str]]
             texts[name].pop(source_of(cell), None)
     whole = {name: "\n\n".join(filter(None, found)) for name, found in texts.items() if found}
     return code, {name: text if name in lab.answers else text[:MOST_WRITTEN] for name, text in whole.items()}
-
-
-def source_of(cell: dict) -> str | None:
-    """The source of a cell, which may be text or a list of lines; None if it is neither."""
-    source = cell.get("source")
-    if isinstance(source, list) and all(isinstance(line, str) for line in source):
-        source = "".join(source)
-    return plain_text(source) if isinstance(source, str) else None
-
-
-def plain_text(text: str) -> str:
-    """A text without halves of characters, which JSON can hold and files cannot."""
-    return text.encode("utf-8", "replace").decode()

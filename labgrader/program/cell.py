@@ -26,18 +26,31 @@ class Cell:
 
 def cells_of(notebook_cells: object) -> list[Cell]:
     """The code cells of a notebook as JSON has it; whatever is none is left out."""
-    found = []
-    for cell in notebook_cells if isinstance(notebook_cells, list) else ():
-        if not isinstance(cell, dict) or cell.get("cell_type") != "code":
-            continue
-        source, metadata = cell.get("source"), cell.get("metadata")
-        if isinstance(source, list) and all(isinstance(line, str) for line in source):
-            source = "".join(source)
-        mark = metadata.get("nbgrader") if isinstance(metadata, dict) else None
-        grade_id = mark.get("grade_id") if isinstance(mark, dict) else None
-        if isinstance(source, str):
-            found.append(Cell(source, grade_id if isinstance(grade_id, str) else ""))
-    return found
+    cells = notebook_cells if isinstance(notebook_cells, list) else ()
+    code = [cell for cell in cells if isinstance(cell, dict) and cell.get("cell_type") == "code"]
+    return [Cell(source, grade_id(cell) or "") for cell in code if (source := source_of(cell)) is not None]
+
+
+def source_of(cell: dict) -> str | None:
+    """The source of a cell, which may be text or a list of lines; None if it is neither."""
+    source = cell.get("source")
+    if isinstance(source, list) and all(isinstance(line, str) for line in source):
+        source = "".join(source)
+    return plain_text(source) if isinstance(source, str) else None
+
+
+def plain_text(text: str) -> str:
+    """A text without halves of characters, which JSON can hold and files cannot."""
+    return text.encode("utf-8", "replace").decode()
+
+
+def grade_id(cell: object) -> str | None:
+    """The grade id of a cell, None if it has none or is none."""
+    try:
+        name = cell["metadata"]["nbgrader"]["grade_id"]
+    except (TypeError, KeyError):
+        return None
+    return name if isinstance(name, str) else None
 
 
 class Statement:

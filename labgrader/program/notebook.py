@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Sequence
 
-from labgrader.program.cell import CONFLICT, Cell, cells_of
+from labgrader.program.cell import CONFLICT, Cell, cells_of, grade_id
 
 LARGEST_FILE = 100 << 20  # bytes
 LARGEST_NOTEBOOK = 20 << 20  # bytes: a larger one is read without its outputs
@@ -132,15 +132,6 @@ def no_code(cells: Sequence) -> dict[str, str]:
                 f"its cell, number {number} of the notebook, is {kind}, and must be code: click it, press Esc, Y"
             )
     return found
-
-
-def grade_id(cell: object) -> str | None:
-    """The grade id of a cell, None if it has none or is none."""
-    try:
-        name = cell["metadata"]["nbgrader"]["grade_id"]
-    except (TypeError, KeyError):
-        return None
-    return name if isinstance(name, str) else None
 
 
 def code_of(cells: object) -> list[Cell]:

@@ -18,9 +18,9 @@ from labgrader.course import of_topic
 from labgrader.grade.batch import Record, read_record
 from labgrader.grade.read_programs import Read, read_program
 from labgrader.grade.shapes import Shapes
-from labgrader.handin.reading import Lab, source_of
+from labgrader.handin.reading import Lab
 from labgrader.handin.roster import keys_of
-from labgrader.program.notebook import grade_id
+from labgrader.program.cell import grade_id, source_of
 
 ALIKE, LEAST = 0.7, 6  # the share of two answers' own shapes that is the same, and how many these are at least
 COPIED, LEAST_COPIED = 0.9, 8  # the same for an answer and the kit's own, of which nothing was taken away

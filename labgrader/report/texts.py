@@ -13,8 +13,8 @@ from pathlib import Path
 
 from labgrader.grade.gradebook import opened, rubrics_of
 from labgrader.handin.pictures import Pictures
-from labgrader.handin.reading import Lab, plain_text, source_of
-from labgrader.program.notebook import grade_id
+from labgrader.handin.reading import Lab
+from labgrader.program.cell import grade_id, plain_text, source_of
 from labgrader.report.outputs import answer_key, head
 from labgrader.report.rendered import rendered
 from labgrader.support import counted
