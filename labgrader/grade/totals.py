@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from labgrader.grade.changes import FOR_ALL, NO_COUNT, Change
-from labgrader.grade.deadlines import Deadline, Lateness
-from labgrader.grade.gradebook import opened
+from labgrader.grade.changes import FOR_ALL, NO_COUNT, Change, changed, read_changes
+from labgrader.grade.deadlines import Deadline, Lateness, read_deadline
+from labgrader.grade.gradebook import opened, register
 from labgrader.grade.policy import free_days, read_bonus, read_policy
 from labgrader.handin.collect import marked_late
+from labgrader.handin.reading import Lab
 from labgrader.support import counted, write_atomically
 
 NOT_FINAL = "Not final: an answer still has to be graded or reviewed"
@@ -66,6 +67,16 @@ def settle(course: Path, topic: str, changes: Sequence[Change], deadline: Deadli
             found[student] = Final(student, score, submission.max_score, waits, late, section)
         gradebook.db.commit()
     return dict(sorted(found.items()))
+
+
+def settle_anew(course: Path, lab: Lab) -> tuple[Lab, dict[str, Final]]:
+    """Bring the gradebook and the pages of a graded lab up to date; the lab with its changes, and the grades."""
+    changes, deadline = read_changes(course, lab), read_deadline(course, lab.topic)
+    now = changed(lab, [], changes)[0]
+    register(course, now)
+    finals = settle(course, lab.topic, changes, deadline)
+    finish_pages(course / "grades" / lab.topic, finals.values())
+    return now, finals
 
 
 def handed_in_late(late: Lateness) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from labgrader.grade.batch import Record
 from labgrader.handin.reading import Lab
 from labgrader.report.alike import Found, Group, Hand, by_people
-from labgrader.report.outputs import harmless, new_table, page, warning_of
+from labgrader.report.outputs import csv_text, harmless, page, warning_of
 from labgrader.support import write_atomically
 
 MOST_SHOWN = 200  # groups of answers on the page; the table has all pairs
@@ -33,11 +33,8 @@ def write_alike(out: Path, lab: Lab, records: Sequence[Record], found: Found) ->
 
 def alike_csv(records: Sequence[Record], found: Found) -> str:
     """A row per pair of answers."""
-    text, table = new_table(records, COLUMNS)
-    for pair in found.pairs:
-        row = (pair.question, str(pair.one), str(pair.other), f"{pair.share:.2f}", str(len(pair.shared)))
-        table.writerow([harmless(cell) for cell in row])
-    return text.getvalue()
+    rows = [(p.question, str(p.one), str(p.other), f"{p.share:.2f}", str(len(p.shared))) for p in found.pairs]
+    return csv_text([COLUMNS, *(map(harmless, row) for row in rows)], records)
 
 
 def alike_page(lab: Lab, records: Sequence[Record], found: Found) -> str:

@@ -5,24 +5,18 @@ there. Students are the same person in two labs if the roster has one email for 
 Moodle gives each a number of its own in every assignment.
 """
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from html import escape
 from pathlib import Path
 
 from labgrader.course import topics
-from labgrader.grade.changes import changed, read_changes
-from labgrader.grade.deadlines import read_deadline
-from labgrader.grade.gradebook import register
 from labgrader.grade.policy import Policy, read_policy
-from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
+from labgrader.grade.totals import NOT_FINAL, Final, settle_anew
 from labgrader.handin.reading import read_lab
 from labgrader.handin.roster import Person, identity, person_of, read_roster
-from labgrader.report.outputs import harmless, page, scrolled
-from labgrader.report.platforms import CANVAS, person_by_name
+from labgrader.report.outputs import csv_text, harmless, page, scrolled
+from labgrader.report.platforms import canvas_rows, person_by_name
 from labgrader.support import write_atomically
 
 FOLDER, TOTAL = "course", "Course total"
@@ -66,11 +60,7 @@ def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
         raise ValueError(f"topic: expected labs that were graded in {course}, there is none")
     policy, roster, finals, unread = read_policy(course), read_roster(course), {}, {}
     for name in labs:
-        lab = read_lab(course, name)
-        changes = read_changes(course, lab)
-        register(course, changed(lab, [], changes)[0])
-        finals[name] = settle(course, name, changes, read_deadline(course, name))
-        finish_pages(course / "grades" / name, finals[name].values())
+        _, finals[name] = settle_anew(course, read_lab(course, name))
         pages = (page.stem for page in sorted((course / "grades" / name / "feedback").glob("*.html")))
         unread[name] = [student for student in pages if student not in finals[name]]
     rows = rows_of(finals, roster, unread)
@@ -83,11 +73,13 @@ def write_course(course: Path, platform: str) -> tuple[list[Path], list[str]]:
     if platform != "scores" and (odd := [row.name for row in rows if row.person is None]):
         raise ValueError(f"{platform}: expected students in roster.csv, got {', '.join(odd)}")
     heading = next((h for person in roster.values() for h in person.more if h.startswith(f"{TOTAL} (")), TOTAL)
-    to_canvas = partial(canvas_table, heading=heading)
-    table = {"scores": plain_table, "moodle": moodle_table, "canvas": to_canvas}[platform](labs, rows)
-    text = io.StringIO(newline="")
-    csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in cells] for cells in table)
-    files = {"course.html": course_page(labs, rows, policy), f"{platform}.csv": text.getvalue()}
+    if platform == "canvas":  # the total in percent; Canvas keeps what it has of one that is not final
+        points = [(row.person, f"{row.total:.2f}" if row.has_a_total else "") for row in rows]
+        table = canvas_rows(heading, "100", points)
+    else:
+        table = moodle_table(labs, rows) if platform == "moodle" else plain_table(labs, rows)
+    text = csv_text(map(harmless, cells) for cells in table)
+    files = {"course.html": course_page(labs, rows, policy), f"{platform}.csv": text}
     for name, content in files.items():
         write_atomically(course / "grades" / FOLDER / name, content.encode())
     return [course / "grades" / FOLDER / name for name in files], [row.name for row in rows if row.waits]
@@ -127,42 +119,21 @@ def cell(row: Row, lab: str) -> str:
 
 def plain_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
     """A row per student."""
-    heading = ["student", "name", "email", *labs, "dropped", TOTAL, "not final"]
-    found = [
-        [
-            *(row.name, row.person.name if row.person else "", row.person.email if row.person else ""),
-            *(cell(row, lab) for lab in labs),
-            *(" ".join(row.dropped), f"{row.total:.2f}", "yes" if row.waits else ""),
-        ]
-        for row in rows
-    ]
-    return [heading, *found]
+    table = [["student", "name", "email", *labs, "dropped", TOTAL, "not final"]]
+    for row in rows:
+        who = [row.person.name, row.person.email] if row.person else ["", ""]
+        points = [*(cell(row, lab) for lab in labs), " ".join(row.dropped), f"{row.total:.2f}"]
+        table.append([row.name, *who, *points, "yes" if row.waits else ""])
+    return table
 
 
 def moodle_table(labs: Sequence[str], rows: Sequence[Row]) -> list[list[str]]:
     """For Moodle's gradebook, which finds students by email: Grades > Import > CSV file."""
-    heading = ["Full name", "Email address", *labs, TOTAL, "Feedback"]
-    found = [
-        [
-            *(row.person.name, row.person.email, *(cell(row, lab) for lab in labs)),
-            *(f"{row.total:.2f}" if row.finals else "", NOT_FINAL if row.waits else ""),
-        ]
-        for row in rows
-    ]
-    return [heading, *found]
-
-
-def canvas_table(labs: Sequence[str], rows: Sequence[Row], heading: str = TOTAL) -> list[list[str]]:
-    """For Canvas's Import Grades: the total in percent; what is not final is left out, and Canvas keeps what it has."""
-    possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), "100"]
-    found = [
-        [
-            *(row.person.name, row.person.id, *(row.person.more.get(column, "") for column in CANVAS)),
-            f"{row.total:.2f}" if row.has_a_total else "",
-        ]
-        for row in rows
-    ]
-    return [["Student", "ID", *CANVAS, heading], possible, *found]
+    table = [["Full name", "Email address", *labs, TOTAL, "Feedback"]]
+    for row in rows:
+        points = [*(cell(row, lab) for lab in labs), f"{row.total:.2f}" if row.finals else ""]
+        table.append([row.person.name, row.person.email, *points, NOT_FINAL if row.waits else ""])
+    return table
 
 
 def course_page(labs: Sequence[str], rows: Sequence[Row], policy: Policy) -> str:

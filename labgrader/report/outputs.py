@@ -73,25 +73,20 @@ def write_outputs(
 
 def grades_csv(lab: Lab, records: Sequence[Record], absent: Sequence[str] = ()) -> str:
     """One row per student and question; one row, with the reason, for what could not be graded, or is not there."""
-    text, table = new_table(records, COLUMNS)
+    table, total = [COLUMNS], f"{sum(lab.points.values()):g}"
     for record in records:
-        total = f"{sum(lab.points.values()):g}"
         rows = [("", "0", total, record.reason, "", NOT_GRADED)] if record.reason else map(row_of, record.results)
-        table.writerows([harmless(cell) for cell in (record.student, lab.topic, *row)] for row in rows)
-    for name in absent:
-        row = (name, lab.topic, "", "0", f"{sum(lab.points.values()):g}", NOTHING, "", NOT_GRADED)
-        table.writerow([harmless(cell) for cell in row])
-    return text.getvalue()
+        table += [map(harmless, (record.student, lab.topic, *row)) for row in rows]
+    table += [map(harmless, (name, lab.topic, "", "0", total, NOTHING, "", NOT_GRADED)) for name in absent]
+    return csv_text(table, records)
 
 
-def new_table(records: Sequence[Record], columns: Sequence[str]) -> tuple[io.StringIO, object]:
-    """A text, and a writer of rows into it, with the warning and the head of a table."""
+def csv_text(table: Iterable[Iterable], records: Sequence[Record] = ()) -> str:
+    """A table as text, with a warning above it if records come from a run without a sandbox."""
     text = io.StringIO(newline="")
-    if not all(record.sandboxed for record in records):
-        text.write(f"# {NO_SANDBOX}\n")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(columns)
-    return text, table
+    text.write("" if all(record.sandboxed for record in records) else f"# {NO_SANDBOX}\n")
+    csv.writer(text, lineterminator="\n").writerows(table)
+    return text.getvalue()
 
 
 def row_of(result: Result) -> tuple[str, ...]:
@@ -176,15 +171,15 @@ def scrolled(table: str, label: str) -> str:
 
 def class_csv(found: Sequence[Standing], records: Sequence[Record]) -> str:
     """One row per question, and one per group of wrong answers."""
-    text, table = new_table(records, CLASS_COLUMNS)
+    table = [CLASS_COLUMNS]
     for standing in found:
         counts = (standing.tried, standing.passed, two_decimals(standing.discrimination), *standing.counts.values())
-        table.writerow((standing.question, "", "", *counts, "", ""))
+        table.append((standing.question, "", "", *counts, "", ""))
         for group in standing.groups:
             count, named = str(len(group.students)), "yes" if group.named else "no"
             row = (group.question, group.name, count, *[""] * (3 + len(COUNTED)), named, group.says)
-            table.writerow([harmless(cell) for cell in row])
-    return text.getvalue()
+            table.append(map(harmless, row))
+    return csv_text(table, records)
 
 
 def class_page(lab: Lab, found: Sequence[Standing], comments: Mapping[str, str], records: Sequence[Record]) -> str:

@@ -7,7 +7,6 @@ Scores are those of nbgrader's gradebook: functions, what a person graded, and p
 `nbgrader zip_collect` gave them, which end with the platform's number, "Ada Lovelace_1234567"; a roster knows more.
 """
 
-import csv
 import io
 import re
 import zipfile
@@ -17,15 +16,12 @@ from pathlib import Path
 
 from labgrader.course import course as course_here
 from labgrader.grade.batch import read_record, record_path
-from labgrader.grade.changes import changed, read_changes
-from labgrader.grade.deadlines import read_deadline
-from labgrader.grade.gradebook import register
-from labgrader.grade.totals import NOT_FINAL, Final, finish_pages, settle
+from labgrader.grade.totals import NOT_FINAL, Final, settle_anew
 from labgrader.handin.collect import extracted, read_name, student_and_notebook
 from labgrader.handin.reading import LEFT_OUT, Lab, read_lab
 from labgrader.handin.roster import FILE as ROSTER
 from labgrader.handin.roster import Person, absent_of, keys_of, person_of, read_roster
-from labgrader.report.outputs import NOTHING, harmless
+from labgrader.report.outputs import NOTHING, csv_text, harmless
 from labgrader.settings import usable_blocks
 from labgrader.support import write_atomically
 
@@ -56,7 +52,7 @@ def write_grades(course: Path, topic: str, platform: str, assignment: int | None
     """
     course = Path(course)
     out, lab = course / "grades" / topic, read_lab(course, topic)
-    roster, changes, deadline = read_roster(course), read_changes(course, lab), read_deadline(course, topic)
+    roster = read_roster(course)
     pages = {page.stem: page for page in sorted((out / "feedback").glob("*.html"))}
     if not pages or not (course / "gradebook.db").is_file():
         mend = f"`{course_here().command} grade {topic}` makes them"
@@ -73,16 +69,15 @@ def write_grades(course: Path, topic: str, platform: str, assignment: int | None
     if twice and platform != "scores":
         other = one[people[twice[0]].id]
         raise ValueError(f"{platform}: {twice[0]} and {other} are both {people[other].id}; rename the folder of one")
-    now = changed(lab, [], changes)[0]
-    register(course, now)
-    finals = settle(course, topic, changes, deadline)
-    finish_pages(out, finals.values())
+    now, finals = settle_anew(course, lab)
     graded = [(people[student], final) for student, final in finals.items() if student in pages]
-    heading = canvas_heading(course, topic, roster, assignment) if platform == "canvas" else topic
-    rows = {"scores": plain_rows, "moodle": moodle_rows, "canvas": canvas_rows}[platform](heading, graded)
-    text = io.StringIO(newline="")
-    csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in row] for row in rows)
-    files = {out / f"{platform}.csv": text.getvalue().encode()}
+    if platform == "canvas":
+        points = [(person, "" if final.waits else f"{final.score:g}") for person, final in graded]
+        most = f"{graded[0][1].max_score:g}" if graded else ""
+        rows = canvas_rows(canvas_heading(course, topic, roster, assignment), most, points)
+    else:
+        rows = moodle_rows(graded) if platform == "moodle" else plain_rows(graded)
+    files = {out / f"{platform}.csv": csv_text(map(harmless, row) for row in rows).encode()}
     if platform != "scores":
         files[out / f"{platform}_feedback.zip"] = zip_of(pages, names_in_zip(course, topic, people, platform))
     for path, data in files.items():
@@ -106,29 +101,23 @@ def person_by_name(student: str) -> Person | None:
     return Person(name, student.removesuffix(f"_{name}")) if number else None
 
 
-def plain_rows(topic: str, graded: Sequence[tuple[Person | None, Final]]) -> list[list[str]]:
+def plain_rows(graded: Sequence[tuple[Person | None, Final]]) -> list[list[str]]:
     """A row per student."""
-    heading = ["student", "name", "email", "score", "max_score", "late", "to be graded by hand"]
-    rows = [
-        [
-            *(final.student, person.name if person else "", person.email if person else ""),
-            *(f"{final.score:g}", f"{final.max_score:g}", str(final.late), "yes" if final.waits else ""),
-        ]
-        for person, final in graded
-    ]
-    return [heading, *rows]
+    rows = [["student", "name", "email", "score", "max_score", "late", "to be graded by hand"]]
+    for person, final in graded:
+        who = [person.name, person.email] if person else ["", ""]
+        points = [f"{final.score:g}", f"{final.max_score:g}"]
+        rows.append([final.student, *who, *points, str(final.late), "yes" if final.waits else ""])
+    return rows
 
 
-def moodle_rows(topic: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
+def moodle_rows(graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
     """Moodle's grading worksheet, which finds students by their identifier; its gradebook can find them by email."""
-    rows = [
-        [
-            *(f"Participant {person.id}", person.name, person.email, f"{final.score:g}", f"{final.max_score:g}"),
-            NOT_FINAL if final.waits else "",
-        ]
-        for person, final in graded
-    ]
-    return [["Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Feedback comments"], *rows]
+    rows = [["Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Feedback comments"]]
+    for person, final in graded:
+        points = [f"{final.score:g}", f"{final.max_score:g}", NOT_FINAL if final.waits else ""]
+        rows.append([f"Participant {person.id}", person.name, person.email, *points])
+    return rows
 
 
 def canvas_heading(course: Path, name: str, roster: dict[str, Person], assignment: int | None = None) -> str:
@@ -162,19 +151,13 @@ def canvas_heading(course: Path, name: str, roster: dict[str, Person], assignmen
     raise ValueError(f"assignment: of the columns of {ROSTER} {what}; {mend}")
 
 
-def canvas_rows(heading: str, graded: Sequence[tuple[Person, Final]]) -> list[list[str]]:
-    """Canvas's gradebook, which finds students by its own ID; heading: that of the assignment.
+def canvas_rows(heading: str, most: str, points: Sequence[tuple[Person, str]]) -> list[list[str]]:
+    """For Canvas's Import Grades, which finds students by its own ID; heading: that of a column, of `most` points.
 
-    There is no room for words, so a grade that is not final is left out: Canvas keeps what it has.
+    There is no room for words, so the points of a grade that is not final are "": Canvas keeps what it has.
     """
-    possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), f"{graded[0][1].max_score:g}" if graded else ""]
-    rows = [
-        [
-            *(person.name, person.id, *(person.more.get(column, "") for column in CANVAS)),
-            "" if final.waits else f"{final.score:g}",
-        ]
-        for person, final in graded
-    ]
+    possible = ["    Points Possible", *[""] * (len(CANVAS) + 1), most]
+    rows = [[one.name, one.id, *(one.more.get(column, "") for column in CANVAS), said] for one, said in points]
     return [["Student", "ID", *CANVAS, heading], possible, *rows]
 
 
