@@ -253,11 +253,9 @@ def no_such_name(found: re.Match, args: dict) -> str:
     if found[1] in ("np", "numpy"):
         return "NumPy is not imported: run the cell with `import numpy as np` at the top of the lab."
     near = difflib.get_close_matches(found[1], [*args, "np"], 1, 0.7)
-    return (
-        f"No cell defines {found[1]}: do you mean {near[0]}?"
-        if near
-        else (f"No cell that counts here defines {found[1]}: is it spelled right, and was its cell run?")
-    )
+    if near:
+        return f"No cell defines {found[1]}: do you mean {near[0]}?"
+    return f"No cell that counts here defines {found[1]}: is it spelled right, and was its cell run?"
 
 
 @when(r"AttributeError: module 'numpy(?:\.\w+)?' has no attribute '(\w+)'")
@@ -274,9 +272,8 @@ def no_such_attribute(found: re.Match, args: dict) -> str:
         return "Something is None there: a function without `return`, or one that works in place, gives None."
     near = difflib.get_close_matches(found[2], dir(np.ndarray), 1, 0.6) if found[1] == "ndarray" else []
     article = "An" if found[1] == "ndarray" or found[1][0].lower() in "aeio" else "A"
-    return f"{article} {found[1]} has no {found[2]}" + (
-        f": do you mean .{near[0]}?" if near else ": is it what you think it is?"
-    )
+    asks = f"do you mean .{near[0]}?" if near else "is it what you think it is?"
+    return f"{article} {found[1]} has no {found[2]}: {asks}"
 
 
 # Exceptions that one sentence explains; {1} is what the first bracket of the pattern holds.

@@ -149,7 +149,7 @@ def recipes_for(place: Place, scope: Scope) -> Iterator[Recipe]:
         yield from names(node, scope)  # x in x[i] = 1: written to anything else, the line would do nothing
         return
     option = OPTIONS.get(parent.arg, "") if isinstance(parent, ast.keyword) else ""
-    for family in (operators, comparisons, conditions, calls, constants, names, transposes, subscripts):
+    for family in (operators, comparisons, conditions, calls, constants, names, axes):
         for recipe in family(node, scope):
             yield replace(recipe, kind=option) if option else recipe
     if isinstance(node, ast.Constant | ast.Tuple | ast.List | ast.Starred | ast.Lambda):
@@ -362,14 +362,10 @@ def names(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
                 yield Recipe("type", other, 1, template(other, node))
 
 
-def transposes(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
-    """A transpose too many."""
+def axes(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
+    """A transpose too many, indices in another order, or one that is too much."""
     if isinstance(node, ast.Attribute) and node.attr == "T":
         yield Recipe("transpose", "without T", 1, the(node.value))
-
-
-def subscripts(node: ast.expr, scope: Scope) -> Iterator[Recipe]:
-    """Indices in another order, or one that is too much."""
     if isinstance(node, ast.Subscript):
         yield Recipe("index too many", "without the index", 1, the(node.value), (node.slice,))
     if isinstance(node, ast.Tuple | ast.List) and 2 <= len(node.elts) <= 4:

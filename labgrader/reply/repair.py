@@ -38,13 +38,8 @@ MOST_S_OF_ALL = 2.0  # for all cases once: of a program that takes longer, too f
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
 MORE_S = 0.05  # on a case beside those on which it is searched: what takes longer there is neither right nor wrong
 MORE_COST = 0.5  # repairs that change so much more than the smallest are looked for, too
-LEFT_OUT = (
-    "line too many",
-    "branch",
-    "too much",
-    "call too many",
-    "moved",
-)  # what a mistake beside which is no mistake of its own
+# Beside a listed mistake these are none of their own.
+LEFT_OUT = ("line too many", "branch", "too much", "call too many", "moved")
 
 Cases = Sequence[tuple[tuple, object]]  # (arguments, expected) each
 
