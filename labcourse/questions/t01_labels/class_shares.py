@@ -127,12 +127,6 @@ def nothing_by_nothing(y, C):
     return np.where(counts(y, C).any(axis=0), class_shares(y, C), np.nan)
 
 
-@wrong("You give a rare class a large number: that is one over its share (a weight, topic 05).")
-def inverse_shares(y, C):
-    with np.errstate(divide="ignore"):
-        return 1 / class_shares(y, C)
-
-
 @wrong("A byte ends at 255. How many pixels of one class can an image have?")
 def counted_in_bytes(y, C):
     n = counts(y, C).astype(np.uint8).astype(int)

@@ -52,12 +52,6 @@ def steps(y):
     return np.stack([np.abs(y - np.roll(y, (-down, -right), (0, 1))) for down, right in PAIRS])
 
 
-@wrong("Pairs that agree change your energy: with one label everywhere, only the unary costs should remain.")
-def spins(y, psi, weights):
-    """Agreement is rewarded by w, disagreement costs w, as for spins of +1 and -1."""
-    return unary_part(y, psi) + (weights * np.where(disagreeing(y), 1, -1)).sum()
-
-
 @wrong("Classes have names, not sizes: a pair (0, 2) disagrees no more than a pair (0, 1).")
 def label_steps(y, psi, weights):
     """Labels subtracted as if they were numbers."""

@@ -237,11 +237,6 @@ def sigmoids(z, w, shares, rounds, summed):
     return of_rounds(z, shares, rounds, believed)
 
 
-@wrong("That is the guess after the first round, whatever `rounds` says.")
-def one_round(z, w, shares, rounds):
-    return find_shares(z, w, shares, 1)
-
-
 @wrong(
     "Your guess is that of another round. Where does your loop begin, and after which step does it end?", more=(-1, 1)
 )

@@ -92,11 +92,6 @@ def always_along_z(depth, K, along_ray):
     return back_project(depth, K, False)
 
 
-@wrong("You read every number as a distance along the ray: where along_ray is False, it is the point's z.")
-def always_along_the_ray(depth, K, along_ray):
-    return back_project(depth, K, True)
-
-
 @wrong("You swapped the two cases: which of them needs rays of length 1?")
 def cases_exchanged(depth, K, along_ray):
     return back_project(depth, K, not along_ray)

@@ -90,11 +90,6 @@ def double_precision(P):
     return packed(finite(P), "<f8", padding=8).ravel()
 
 
-@wrong("The message says is_bigendian = 0: which byte comes first?")
-def big_endian(P):
-    return packed(finite(P), ">f4").ravel()
-
-
 @wrong("point_step is 16 and three numbers take 12: what fills the rest?")
 def no_padding(P):
     return packed(finite(P), padding=0).ravel()

@@ -140,11 +140,6 @@ def inverse_twice(features, mean, covariance, allowed):
     return chosen(squared, allowed)
 
 
-@wrong("If no piece is allowed, the answer is 0, which is no piece's number.")
-def none_is_minus_one(features, mean, covariance, allowed):
-    return choose_region(features, mean, covariance, allowed) or -1
-
-
 @wrong("The diagonal has variances, squares already, and two features vary together: what is off it?")
 def divided_by_variances(features, mean, covariance, allowed):
     return chosen((((features - mean) / np.diag(covariance)) ** 2).sum(axis=1), allowed)

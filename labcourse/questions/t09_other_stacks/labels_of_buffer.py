@@ -277,8 +277,3 @@ def scores_of_the_best(buffer, C, H, W, block, step):
 )
 def whole_numbers(buffer, C, H, W, block, step, kind):
     return read(buffer, right_places(C, H, W, block, step), kind).argmax(axis=0)
-
-
-@wrong("Your picture is right, but it is that of the worst class.")
-def worst(buffer, C, H, W, block, step):
-    return read(buffer, right_places(C, H, W, block, step)).argmin(axis=0)
