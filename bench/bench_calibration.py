@@ -1,13 +1,13 @@
 """Calibration: real photographs of a chessboard, and a camera on a simulated arm's hand.
 
 The fourteen photographs of a 9 x 6 chessboard in the PyPI package `mvtb-data` (MIT, 130 MB): OpenCV's example finds
-RMS 0.406 pixels and f = 536.3 in them, with corners of one photograph that lie 1.2 pixels off. Where their folder is
-not given (`python -m bench.bench_calibration FOLDER`) that table is left out. Hand-eye: the Panda in PyBullet looks at
+RMS 0.406 pixels and f = 536.3 in them, with corners of one photograph that lie 1.2 pixels off. Where the package is not
+installed that table is left out. Hand-eye: the Panda in PyBullet looks at
 the sheet on a table from fifteen poses, the corners are detected in pictures of 640 x 480 with noise and blur, and
 `labkit.geometry.calibration.hand_eye` finds the camera on the hand.
 """
 
-import sys
+import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,12 +33,12 @@ T_HAND_CAM[:3, :3] = Rotation.from_euler("xyz", (6.0, -4.0, 88.0), degrees=True)
 T_HAND_CAM[:3, 3] = 0.07, 0.01, -0.06
 
 
-def main(photographs: str = "") -> str:
+def main() -> str:
     """Calibrate both; returns the tables."""
     rows = [[seed, *(f"{x:.2f}" for x in on_a_hand(seed))] for seed in range(RUNS)]
     parts = [table("hand-eye, run | error, mm | error, degrees | corners in the median", rows)]
-    if photographs:
-        found = chessboard(Path(photographs))
+    if package := importlib.util.find_spec("mvtbdata"):
+        found = chessboard(Path(package.submodule_search_locations[0]) / "images" / "calibration")
         f, error = found.K[0, 0], found.K_std[0]
         row = [len(found.used), f"{found.rms:.3f}", f"{f:.1f} (standard error {error:.1f})"]
         parts.insert(0, table("chessboard, photographs used | RMS, pixels | f", [row]))
@@ -86,4 +86,4 @@ def on_a_hand(seed: int) -> tuple[float, float, float]:
 
 
 if __name__ == "__main__":
-    print(main(*sys.argv[1:]))
+    print(main())
