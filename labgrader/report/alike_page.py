@@ -18,9 +18,9 @@ WIDE = """body{max-width:96rem}.pair{display:grid;grid-template-columns:repeat(2
 .pair pre{white-space:pre-wrap;overflow-wrap:anywhere;margin:.2rem 0}mark{background:var(--mark);color:inherit}
 @media(max-width:60rem){.pair{grid-template-columns:minmax(0,1fr)}}"""
 SAYS = (
-    "Each answer shares most of what is its own with another one of its group: what is in the lab, in the model "
-    "solution or in many answers was left out. Marked are the lines that hold it. Names, layout and order do not "
-    "count. This is a reason to read, not a proof, and no grade changes by it."
+    "Each answer has most of its distinctive code in common with another answer in its group. Code that also appears "
+    "in the lab, in the model solution or in many answers was ignored. The shared lines are marked. Names, layout and "
+    "order do not count. This is a reason to read, not a proof, and no grade changes because of it."
 )
 
 

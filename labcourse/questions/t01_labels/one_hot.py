@@ -54,7 +54,7 @@ def classes_that_occur(y, C):
     return (y[:, None] == np.unique(y[y != 255])[:, None, None]).astype(np.uint8)
 
 
-@wrong("Add up the entries of an unjudged pixel, 255: what should the sum be, and what is yours?")
+@wrong("Add up the entries of an unlabelled pixel (255): what should the sum be, and what do you get?")
 def ignored_is_shared_out(y, C):
     return np.where((y == 255)[:, None], 1 / C, one_hot(y, C))
 

@@ -133,7 +133,7 @@ def pixel_by_pixel(psi, w):
     return psi.argmin(axis=1)
 
 
-@wrong("The cheapest class so far need not be on the cheapest path: trace that back. Keeping a class costs no w.")
+@wrong("The class cheapest so far need not lie on the cheapest path: trace the path back. Keeping a class costs no w.")
 def never_walked_back(psi, w):
     """The minimum at each pixel of the forward walk."""
     return walk(psi, w).argmin(axis=1)

@@ -78,7 +78,7 @@ def added_and_scaled(p, eps):
     return -np.log(q / q.sum(axis=-1, keepdims=True))
 
 
-@wrong("A blind guess may hit the network's own class, too: it is spread over all C classes.")
+@wrong("A blind guess may also pick the network's own class: its probability is spread over all C classes.")
 def guess_of_the_others(p, eps):
     return -np.log((1.0 - eps) * p + (1.0 - p) * eps / (p.shape[-1] - 1))
 

@@ -91,7 +91,7 @@ def accuracy_by_class(n):
     return 1.0 - (predicted + true - 2.0 * correct) / n.sum()
 
 
-@wrong("You add 1 to both to avoid 0 / 0: what should the score of a class be that occurs nowhere?")
+@wrong("You add 1 to both to avoid 0 / 0: what should a class that occurs nowhere score?")
 def smoothed(n):
     correct, predicted, true = parts(n)
     return (correct + 1.0) / (predicted + true - correct + 1.0)

@@ -207,7 +207,9 @@ def pixels_counted(z, w, shares, rounds):
     return of_rounds(z, shares, rounds, one_hot)
 
 
-@wrong("The mean is one of probabilities, each pixel's own. You take a mean of logits, and then its softmax.")
+@wrong(
+    "Take the softmax at each pixel and average the probabilities. You average the logits and then take the softmax."
+)
 def mean_of_logits(z, w, shares, rounds):
     def one(z, guess):
         return softmax((z + np.log(guess) - np.log(w * shares)).mean(axis=0, keepdims=True))
