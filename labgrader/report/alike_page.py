@@ -8,7 +8,7 @@ from labgrader.grade.batch import Record
 from labgrader.handin.reading import Lab
 from labgrader.report.alike import Found, Group, Hand, by_people
 from labgrader.report.outputs import csv_text, harmless, page, warning_of
-from labgrader.support import write_atomically
+from labgrader.support import counted, write_atomically
 
 MOST_SHOWN = 200  # groups of answers on the page; the table has all pairs
 MOST_NAMED = 10  # groups of people in the terminal
@@ -68,7 +68,7 @@ def in_words(people: Sequence[str]) -> str:
 def side_by_side(group: Group) -> str:
     """The different programs of a group beside each other."""
     share = f"{100 * group.least:.0f}" + (f" to {100 * group.most:.0f}" if group.most - group.least > 0.005 else "")
-    said = f"{escape(group.question)}: {share} % of what is their own, {len(group.shared)} shapes"
+    said = f"{escape(group.question)}: {share} % of their distinctive code, {counted(len(group.shared), 'shape')}"
     programs: dict[str, list[Hand]] = {}
     for hand in group.hands:
         programs.setdefault(hand.program, []).append(hand)

@@ -27,7 +27,7 @@ NOT_GRADED = "not graded"
 NOTHING = "handed in nothing"
 DISCRIMINATION = (
     "Discrimination is the point-biserial correlation of a right answer with the points of the other questions: near 0 "
-    "or below it, a question tells good students from others badly, or is unclear."
+    "or below it, a question hardly separates good students from others, or is unclear."
 )
 # What begins a formula, in all its forms; where a spreadsheet may cut a line; and what it may pass over before.
 STARTS = "[=+@\uff1d\uff0b\uff0d\uff20\ufe66\ufe62\ufe63\ufe6b\u207a\u207b\u207c\u208a\u208b\u208c-]"
