@@ -60,6 +60,14 @@ def test_notebooks_quote_the_target_iou_that_was_measured():
     assert f"target IoU is {trained}" in (ROOT / "labs" / "04_iou" / "04_iou.ipynb").read_text()
 
 
+def test_the_card_says_what_the_benchmark_of_the_phone_says():
+    rows = [row for row in evidence.cells("phone") if row[0] in ("photographs", "exact")]
+    card = (ROOT / "labkit" / "weights" / "MODEL_CARD.md").read_text()
+    assert len(rows) == 4
+    for row in rows:
+        assert " | ".join([row[1], *row[4:8]]) in card
+
+
 def test_lesson_03_and_the_card_say_what_depth_is_worth():
     """Means over both trainings, of the network with depth, with colours alone, and with colours kept."""
     rows = [row for row in evidence.cells("depth") if row[0] in ("test", "hard")]
