@@ -169,6 +169,11 @@ def columns_scaled_as_rows(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.minimum((i + 0.5) * len(y) / height, old - 1))
 
 
+@wrong("The centre of new pixel i lies at (i + 0.5) * H / h, and floor gives the old pixel: which place do you round?")
+def corner_rounded(y, height, width):
+    return copied(y, (height, width), lambda i, n, old: np.round(i * old / n).clip(0, old - 1))
+
+
 @wrong("The pixel into which a centre falls is the whole part, floor: round may go on to the next one.")
 def rounded_up_and_clipped(y, height, width):
     return copied(y, (height, width), lambda i, n, old: np.round((i + 0.5) * old / n).clip(0, old - 1))

@@ -29,7 +29,7 @@ def _pixel_of(rng, draw):
 
 _LONG_ROW, _LONG_COLUMN = (labelled_model(np.random.default_rng(3), *sides, 2) for sides in ((1, LONG), (LONG, 1)))
 _ONE_PAIR = np.zeros((4, 2, 2))
-_ONE_PAIR[1, 0, 1] = 0.5
+_ONE_PAIR[1, 0, 1] = 1e6
 _LABELS, *_REST = labelled_model(np.random.default_rng(2), 3, 4)
 
 
@@ -157,6 +157,11 @@ def no_pairs_at_the_border(y, psi, weights, v, u):
 @wrong("Each class costs its own psi, whatever the neighbours are: where do you use psi?")
 def without_psi(y, psi, weights, v, u):
     return icm_costs(y, np.zeros_like(psi), weights, v, u)
+
+
+@wrong("Each class costs its own psi: you give all of them the one of the pixel's label.")
+def psi_of_its_label(y, psi, weights, v, u):
+    return without_psi(y, psi, weights, v, u) + psi[v, u, y[v, u]]
 
 
 @wrong("Rows and columns begin at 0: do you leave out a neighbour in row 0, or in column 0?", of=("owners", "all"))

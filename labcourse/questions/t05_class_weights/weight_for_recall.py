@@ -55,7 +55,8 @@ QUESTION = Question(
     by_hand=(
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
-        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 1.0),  # all three: 0.1, weight 9
+        # A little more than two of three, so that all three must be found: 0.1, weight 9.
+        (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.6667),
         (np.array([1e-6, 0.2]), np.array([True, False]), 1.0),  # weight 999,999
         # Two alike, weight 21/79. In floats 21/79 * 0.79 < 0.21: tried against the limit itself, they are not found.
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),

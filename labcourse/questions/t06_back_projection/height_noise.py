@@ -182,6 +182,12 @@ def signed_stds_added(*arguments):
     return np.abs(np.sum(shares(*arguments)))
 
 
+@wrong("u and v err independently: their shares do not cancel, and each is squared before they are added.")
+def pixel_errors_together(*arguments):
+    noise = shares(*arguments)
+    return np.linalg.norm([noise[0] + noise[1], *noise[2:]])
+
+
 def straight(u, v, d, K):
     return straight_ahead(u, v, d, K).T
 

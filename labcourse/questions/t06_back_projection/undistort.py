@@ -189,6 +189,11 @@ def one_focal_length(pixels, K, k):
     return divided_again(pixels, K_of(K[0, 0], K[0, 0], K[0, 2], K[1, 2]), lens(k))
 
 
+@wrong("Columns have their own focal length: u = fx x_d + cx, and fx is the first entry of K.")
+def focal_length_of_the_rows(pixels, K, k):
+    return divided_again(pixels, K_of(K[1, 1], K[1, 1], K[0, 2], K[1, 2]), lens(k))
+
+
 @wrong("A series is right only for small r: put your pixels into the lens, do the given ones come out?")
 def by_a_series(pixels, K, k):
     series = (-k[0], 3.0 * k[0] ** 2 - k[1])
