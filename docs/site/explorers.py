@@ -37,9 +37,11 @@ CLICKS |= {f"{n} of the thing's 6": dict.fromkeys(THING[:n], True) for n in rang
 CLICKS |= {"all 6, and the corner's 2": dict.fromkeys([*THING, "pixel_0_3", "pixel_0_4"], True)}
 POINTS = [(172, 112), (120, 122), (88, 115), (172, 155), (140, 85), (43, 110), (250, 80)]
 THINGS = [(139, 137), (66, 133), (196, 109), (227, 106), (209, 141), (193, 129), (60, 160)]
-# The second click, on the round box or on the small thing behind it; without one, nothing is to be drawn but the first.
-SECOND = {"no second click": {"part": False}}
-SECOND |= {f"u = {u}, v = {v}": {"part": True, "not_u": u, "not_v": v} for u, v in [(209, 141), (193, 129)]}
+# What is pointed at, without a second click; then the round box and the small thing behind it, parted by one.
+POINTED = {f"u = {u}, v = {v}": {"u": u, "v": v, "part": False} for u, v in THINGS}
+for (u, v), (not_u, not_v) in (((209, 141), (193, 129)), ((193, 129), (209, 141))):
+    parted = {"u": u, "v": v, "part": True, "not_u": not_u, "not_v": not_v}
+    POINTED[f"u = {u}, v = {v}, not u = {not_u}, v = {not_v}"] = parted
 BUGS = {"swapped": "u for the row", "ray": "depth along the ray", "buffer": "depth buffer", "view": "view matrix"}
 BUGS |= {"opengl": "OpenGL's axes"}
 CHOSEN = {
@@ -48,7 +50,7 @@ CHOSEN = {
     "logits": {"z0": [-8.0, 2.0, 8.0], "z1": [1.0, 7.0], "z2": [-8.0, -1.0, 5.0], "y": [1], "h": [1e-16, 1e-5, 1.0]},
     "keyhole": {"pixel": {f"u = {u}, v = {v}": {"u": u, "v": v} for u, v in POINTS}},
     "votes_that_meet": {"side": [10, 16, 18, 20, 24, 36, 50], "sigma": [0.0, 2.0, 4.0, 6.0, 10.0, 14.0, 16.0, 18.0]},
-    "pick_a_thing": {"pixel": {f"u = {u}, v = {v}": {"u": u, "v": v} for u, v in THINGS}, "another thing": SECOND},
+    "pick_a_thing": {"pixel": POINTED},
     "sliding_mask": {"shift": [0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 18, 24], "radius": [2, 4, 5, 9, 14]},
     "gaussians": {
         "exponent": [-4, -2, -1, 0, 0.5, 1, 2, 3, 4, 5, 5.25, 5.5, 6, 8, 10],
