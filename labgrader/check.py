@@ -133,11 +133,11 @@ def reply_to(
     if cut.refused:
         return reply_to(question, cut.late, meanwhile, budget, start)
     with Run(question, cut, start, LIMITS, budget) as answer:
-        verdict, _ = answer.judge(public_cases(question))
+        verdict, _ = answer.judge(public_cases(question), brief=True)
         printed = answer.worker.printed()
         if not verdict.passed and cut.late is not None:
             with Run(question, cut.late, start, LIMITS, budget) as late:
-                second, _ = late.judge(public_cases(question))
+                second, _ = late.judge(public_cases(question), brief=True)
                 if second.passed:
                     return second, late.worker.printed()
         if verdict.needs_a_look:

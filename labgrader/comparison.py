@@ -24,6 +24,7 @@ MOST_BYTES = 1 << 20  # of an output; no right one has more than some thousand
 DEEPEST = 64  # lists in lists: NumPy has no array of so many axes
 SHORT = 48  # numbers of a case that can be done by hand
 HEAVY = 1000
+LARGE = 10_000  # numbers of a case that is not tried where a usual one is wrong: smaller ones still tell mistakes apart
 FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, np.ufunc)
 
 
@@ -43,6 +44,9 @@ class Problem:
     kind: str
     says: str
     lines: tuple[tuple[int, str], ...] = ()
+
+
+UNTRIED = Problem("untried", "not tried, since a smaller case is wrong")
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,16 @@ def weight(args: tuple) -> int:
 def is_heavy(args: tuple, expected: object) -> bool:
     """Whether so many numbers go into a case, or come out, that a slow program is not tried on it a thousand times."""
     return weight(args) + weight(parts(expected)) > HEAVY
+
+
+def tells_enough(case: Case, is_wrong: bool) -> bool:
+    """Whether a case's output is wrong and may well be the one that is shown: then no large case tells more."""
+    return is_wrong and case.by_hand and not case.edge
+
+
+def is_large(case: Case) -> bool:
+    """Whether a case has so many numbers that it is left out where a usual one is wrong."""
+    return weight(case.args) + weight(parts(case.expected)) > LARGE
 
 
 def told_first(cases: Sequence[Case], wrong: Sequence[bool]) -> int | None:

@@ -13,7 +13,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from labgrader.comparison import Case, Problem, as_numpy, compare, expected_cases, quiet, told_first
+from labgrader.comparison import (
+    UNTRIED,
+    Case,
+    Problem,
+    as_numpy,
+    compare,
+    expected_cases,
+    is_large,
+    quiet,
+    tells_enough,
+    told_first,
+)
 from labgrader.program.live import altered, own_entry
 from labgrader.question import Question
 from labgrader.reply.finding import Finding
@@ -27,8 +38,8 @@ class Verdict:
 
     problem: None if the answer passes; case: the number of the case that has it, from 0, and `where` says it in words.
     question: None where no case was judged, and there is no hint. notes: what else is wrong, arguments that it changes.
-    cases, outputs: what it was made of. pieces: the program, and findings: what instruments and repair know about it,
-    once somebody has looked.
+    cases, outputs: what it was made of; UNTRIED for a large case beside a usual one that is wrong. pieces: the
+    program, and findings: what instruments and repair know about it, once somebody has looked.
     """
 
     problem: Problem | None
@@ -51,14 +62,20 @@ class Verdict:
         """The surest thing that is true of a wrong answer; looked for when it is asked for."""
         if self.problem is None or self.question is None or self.problem.kind == "unanswered":
             return None
-        return diagnose(self.question, self.cases, self.outputs, self.pieces, self.findings)
+        return diagnose(self.question, *self.tried, self.pieces, self.findings)
 
     @property
     def needs_a_look(self) -> bool:
         """Whether a wrong answer runs, and no sentence names its mistake without a look at its program."""
         if self.problem is None or self.question is None or self.problem.kind in ("unanswered", "time"):
             return False
-        return at_once(self.question, self.cases, self.outputs) is None
+        return at_once(self.question, *self.tried) is None
+
+    @property
+    def tried(self) -> tuple[list[Case], list[object]]:
+        """The cases that were tried, and their outputs."""
+        pairs = [(case, got) for case, got in zip(self.cases, self.outputs, strict=True) if not is_untried(got)]
+        return [case for case, _ in pairs], [got for _, got in pairs]
 
     @property
     def hint(self) -> str | None:
@@ -80,10 +97,7 @@ def verdict(
 
     altered: positions of the arguments that the answer altered: then it is not right, since its caller needs them.
     """
-    problems = [
-        got if isinstance(got, Problem) else compare(question, case.expected, got)
-        for case, got in zip(cases, outputs, strict=True)
-    ]
+    problems, outputs = told_apart(question, cases, outputs)
     changed = tuple(f"it changes its argument {question.parameters[i]}: work on a copy" for i in sorted(altered))
     first = told_first(cases, [problem is not None for problem in problems])
     if first is None:
@@ -92,6 +106,27 @@ def verdict(
     alike = [i for i, case in enumerate(cases) if case.by_hand == cases[first].by_hand]
     where = f"{'hand-made' if cases[first].by_hand else 'random'} case {alike.index(first) + 1} of {len(alike)}"
     return Verdict(problems[first], first, where, question, changed, cases, outputs)
+
+
+def is_untried(output: object) -> bool:
+    """Whether it is UNTRIED, perhaps out of another process."""
+    return isinstance(output, Problem) and output.kind == UNTRIED.kind
+
+
+def told_apart(
+    question: Question, cases: Sequence[Case], outputs: Sequence[object]
+) -> tuple[list[Problem | None], list[object]]:
+    """The problem of each output, None where it is right, and the outputs; UNTRIED where a large one tells no more."""
+    problems, told, enough = [], [], False
+    for case, got in zip(cases, outputs, strict=True):
+        if enough and is_large(case):
+            problems.append(None)
+            told.append(UNTRIED)
+            continue
+        problems.append(got if isinstance(got, Problem) else compare(question, case.expected, got))
+        told.append(got)
+        enough = enough or tells_enough(case, problems[-1] is not None)
+    return problems, told
 
 
 # ------------------------------------------------------------------------------------------ a trusted function

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from labgrader.comparison import Case, Problem, alike, differences, parts, trusted
+from labgrader.comparison import Case, Problem, alike, differences, is_heavy, parts, trusted
 from labgrader.question import Misconception, Question, Untold
 
 Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
@@ -72,10 +72,11 @@ def output_of(misconception: Misconception, args: tuple) -> object:
 
 
 def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
-    """What the listed mistakes of a question give in each case; those that raise give nothing."""
+    """What the listed mistakes of a question give in each case but the heavy ones; those that raise give nothing."""
     told: list[dict[bytes, set[int]]] = [{} for _ in cases]
+    light = [(found, case) for found, case in zip(told, cases, strict=True) if not is_heavy(case.args, case.expected)]
     for number, mistake in enumerate(question.misconceptions):
-        for found, case in zip(told, cases, strict=True):
+        for found, case in light:
             output = output_of(mistake, case.args)
             if output is not None and not isinstance(output, Problem):
                 found.setdefault(fingerprint(output), set()).add(number)

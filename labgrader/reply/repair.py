@@ -31,9 +31,9 @@ from labgrader.reply.listed import Listed, fingerprint
 from labgrader.reply.mutation import Mutation, mutations
 
 RANK = {kind: number for number, kind in enumerate(REPAIRS)}
-MOST_MUTATIONS = 3000  # of one program, the smallest first: they take 1 to 3 s
+MOST_MUTATIONS = 3000  # of one program, the smallest first: they take 1 to 2.5 s
 DEAREST_BESIDE = 2.0  # nodes that a mutation beside a listed mistake changes at most
-MOST_S = 3.0  # CPU seconds of the whole search: then what has been found is told, if there is something
+MOST_S = 2.5  # CPU seconds of the whole search: then what has been found is told, if there is something
 MOST_S_OF_ALL = 2.0  # for all cases once: of a program that takes longer, too few mutations could be tried
 CALL_S = 0.4  # CPU seconds of one mutation on a case: an endless loop is wrong
 MORE_S = 0.05  # on a case beside those on which it is searched: what takes longer there is neither right nor wrong

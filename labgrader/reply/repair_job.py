@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from labgrader.comparison import (
+    HEAVY,
     Case,
     Problem,
     as_expected,
@@ -15,6 +16,7 @@ from labgrader.comparison import (
     differences,
     parts,
     trusted,
+    weight,
 )
 from labgrader.question import PUBLIC_SEED, Question
 from labgrader.reply.finding import write
@@ -88,9 +90,9 @@ def comparison_settings(question: Question) -> tuple[dict, str]:
 
 
 def fresh_cases(question: Question, seed: int = PUBLIC_SEED) -> list[Case]:
-    """Random cases of another public seed, on which a repair is tried."""
+    """Random cases of another public seed, on which a repair is tried; heavy ones are not."""
     rng = np.random.default_rng(seed + 1)
-    drawn = question.draws(rng, FRESH)
+    drawn = [args for args in question.draws(rng, FRESH) if weight(args) <= HEAVY]
     return [Case(args, trusted(question.reference, args), by_hand=False) for args in drawn]
 
 

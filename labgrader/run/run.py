@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 
-from labgrader.comparison import Case, Problem, expected_cases
+from labgrader.comparison import UNTRIED, Case, Problem, compare, expected_cases, is_large, tells_enough
 from labgrader.course import course
 from labgrader.program.slice import Program
 from labgrader.question import PUBLIC_SEED, Question
@@ -124,14 +124,21 @@ class Run:
         self.used_s = self.stopwatch.used()
         return reply
 
-    def outputs(self, cases: Sequence[Case]) -> list[object]:
+    def outputs(self, cases: Sequence[Case], brief: bool = False) -> list[object]:
         """Call the answer on the arguments of all cases: an output or a Problem for each.
 
-        After a case that cost the worker, the answer is not called again.
+        After a case that cost the worker, the answer is not called again. brief: nor on large cases once a usual one
+        is wrong, of which no reply speaks.
         """
         outputs: list[object] = []
-        before = self.used_s
+        before, enough = self.used_s, False
         for case in cases:
+            if brief and not enough and outputs:
+                last = cases[len(outputs) - 1]
+                enough = tells_enough(last, is_wrong(self.question, last, outputs[-1]))
+            if enough and is_large(case):
+                outputs.append(UNTRIED)
+                continue
             if self.worker.closed:
                 outputs.append(self.worker.stopped or (outputs[-1] if outputs else self.not_run))
                 continue
@@ -141,9 +148,9 @@ class Run:
         self.called_s = self.used_s - before
         return outputs
 
-    def judge(self, cases: Sequence[Case]) -> tuple[Verdict, list[object]]:
+    def judge(self, cases: Sequence[Case], brief: bool = False) -> tuple[Verdict, list[object]]:
         """The verdict on some cases, with the outputs; outputs that cannot even be compared are wrong."""
-        outputs = self.outputs(cases)
+        outputs = self.outputs(cases, brief)
         worded = [self.with_line(output) for output in outputs]
         if self.not_run is not None and outputs[0] is self.not_run:
             return Verdict(worded[0], None, "before it is called", outputs=worded), outputs
@@ -184,6 +191,15 @@ class Run:
         lines = pieces[int(piece)][1].split("\n") if int(piece) < len(pieces) else []
         own = ((number, lines[number - 1].strip()),) if 1 <= number <= len(lines) else ()
         return replace(output, says=output.says.removeprefix("it raises "), lines=own)
+
+
+def is_wrong(question: Question, case: Case, output: object) -> bool:
+    """Whether an output of a worker is wrong; one that cannot be compared is."""
+    value = output.value if isinstance(output, Changed) else output
+    try:
+        return isinstance(value, Problem) or compare(question, case.expected, value) is not None
+    except Exception:
+        return True
 
 
 def packages_of(question: Question, program: Program) -> tuple[str, ...]:

@@ -187,7 +187,7 @@ def grouped(foreground, votes, cell, least, **own):
     counts. kernel: the three weights of the smoothing. border: how it goes on beyond the cells ("constant" is with 0).
     reach: cells around a peak. enough: what `least` is compared with, "near", "smoothed" or "cell". again: smooth again
     without the votes of what was found; cleared: cells around a peak that are set to 0 if not. last: the last of equal
-    peaks.
+    peaks. corners: whether the cells at a peak's corners are near. goes_on: looks on where a thing is too small.
     """
     v, u = np.nonzero(foreground > 0.5)
     places = own.get("place", lambda u, v, d: np.stack([u, v], axis=1) + d)(u, v, votes[v, u])
@@ -196,7 +196,7 @@ def grouped(foreground, votes, cell, least, **own):
     row, column = bounded(row, rows, own.get("outside")), bounded(column, columns, own.get("outside"))
     left = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
     numbers, smooth = np.zeros(foreground.shape, int), None
-    for number in range(1, len(v) + 2):
+    for _ in range(len(v) + 1):
         counts = np.zeros((rows, columns))
         np.add.at(counts, (row[left], column[left]), 1)
         if smooth is None or own.get("again", True):
@@ -205,11 +205,13 @@ def grouped(foreground, votes, cell, least, **own):
         r, c = divmod(int(at), columns)
         reach = own.get("reach", 1)
         near = left & (np.abs(row - r) <= reach) & (np.abs(column - c) <= reach)
+        near &= own.get("corners", True) | (row == r) | (column == c)
         enough = {"near": near.sum(), "smoothed": smooth[r, c], "cell": counts[r, c]}[own.get("enough", "near")]
-        if enough < least or not near.any():
+        if not near.any() or (enough < least and not own.get("goes_on")):
             break
-        numbers[v[near], u[near]] = number
         left &= ~near
+        if enough >= least:
+            numbers[v[near], u[near]] = numbers.max() + 1
         cleared = own.get("cleared", 0)
         smooth[max(r - cleared, 0) : r + cleared + 1, max(c - cleared, 0) : c + cleared + 1] = 0
     return numbers

@@ -52,17 +52,30 @@ def _row_or_column(rng, shape):
     return foreground, votes, int(rng.integers(1, 101)), int(rng.integers(1, 20))
 
 
+def _places_from_a_network(rng):
+    """Draw as `random_places` does, in the numbers of a network."""
+    foreground, votes, *sizes = random_places(rng)
+    return foreground.astype(np.float32), votes.astype(np.float32), *sizes
+
+
 QUESTION = Question(
     reference=group,
     kinds={
         # Whatever is no more than half is alike; so is whatever leads out of the largest picture.
         "foreground": array(
-            "H W", 0.0, 1.0, lengths=_SIDES, says=("0..1", "1 to 400"), free=("whole", "0 to NaN", "nine tenths*")
+            "H W",
+            0.0,
+            1.0,
+            dtype="float64 float32",
+            lengths=_SIDES,
+            says=("0..1", "1 to 400"),
+            free=("whole", "0 to NaN", "nine tenths*"),
         ),
         "votes": array(
             "H W 2",
             -1e6,
             1e6,
+            dtype="float64 float32",
             lengths=_SIDES,
             says="-1e6 to 1e6",
             free=("16 bits", "float16's range", "half of the largest", "nine tenths*"),
@@ -73,7 +86,7 @@ QUESTION = Question(
     inputs=(
         random_places,
         random_places,
-        random_places,
+        _places_from_a_network,
         partial(_row_or_column, shape=(1, 400)),
         partial(_row_or_column, shape=(400, 1)),
     ),
@@ -192,6 +205,16 @@ def smoothed_with_repeated_borders(foreground, votes, cell, least):
 @wrong("A thing's pixels are those whose votes lie in the peak's cell or in one of the eight around it.")
 def the_peaks_own_cell_alone(foreground, votes, cell, least):
     return grouped(foreground, votes, cell, least, reach=0)
+
+
+@wrong("Eight cells touch the peak's cell, and four of them only at its corners: which do you leave out?")
+def corners_left_out(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, corners=False)
+
+
+@wrong("Where the highest peak is too small a thing, the search is over. You skip it, and look on.")
+def goes_on_after_a_small_thing(foreground, votes, cell, least):
+    return grouped(foreground, votes, cell, least, goes_on=True)
 
 
 @wrong("Your things extend two cells from the peak: which cells touch it?")

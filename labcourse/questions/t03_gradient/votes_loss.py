@@ -33,10 +33,16 @@ def _scattered_things(rng, shape, size, beta, numbers=(0, 1, 9, 128, 254, 255)):
     return votes, instances.astype(np.uint8), float(rng.uniform(*beta))
 
 
+def _votes_from_a_network(rng):
+    """Draw as `random_votes` does, in the numbers of a network."""
+    votes, *others = random_votes(rng)
+    return votes.astype(np.float32), *others
+
+
 QUESTION = Question(
     reference=votes_loss,
     kinds={
-        "votes": array("H W 2", -1e6, 1e6, says="-1e6 to 1e6"),
+        "votes": array("H W 2", -1e6, 1e6, dtype="float64 float32", says="-1e6 to 1e6"),
         "instances": array(
             "H W", 0, 254, also=(255,), dtype="uint8", says=("0 is no thing", "255"), free=("255 to 0", "0 to 255")
         ),
@@ -44,7 +50,7 @@ QUESTION = Question(
     },
     inputs=(
         random_votes,
-        random_votes,
+        _votes_from_a_network,
         partial(_scattered_things, shape=(1, LONG), size=500.0, beta=(960.0, 1000.0), numbers=range(256)),
         partial(_scattered_things, shape=(LONG, 1), size=5e5, beta=(10.0, 1000.0)),
         partial(_scattered_things, shape=(20, 20), size=0.1, beta=(0.01, 0.011)),

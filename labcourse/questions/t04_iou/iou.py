@@ -97,9 +97,13 @@ def smoothed(n):
     return (correct + 1.0) / (predicted + true - correct + 1.0)
 
 
-@wrong("You divide by all pixels: most of them are neither truly class c nor called c. Which ones are in its union?")
-def share_of_all_pixels(n):
-    return divide(np.diagonal(n), np.full(len(n), n.sum()))
+@wrong(
+    "You divide by all pixels: most of them are neither truly class c nor called c. Which ones are in its union?",
+    absent=(0.0, np.nan),
+)
+def share_of_all_pixels(n, absent):
+    correct, predicted, true = parts(n)
+    return np.where(predicted + true > 0, correct / n.sum(), absent)
 
 
 @wrong("The larger of two sets is less than their union: what of the smaller one lies outside of it?")

@@ -42,7 +42,7 @@ def _many_pixels(rng, least, most):
     return q1, y, float((must - rng.uniform(0.3, 0.7)) / n)
 
 
-MANY = 12_000
+MANY = 2_000
 SURE = 1e-9
 QUESTION = Question(
     reference=weight_for_recall,
@@ -51,7 +51,12 @@ QUESTION = Question(
         "y": truth("N"),
         "recall": number(0.01, 1.0, says="0.01 to 1"),
     },
-    inputs=(_pixels, partial(_many_pixels, least=0.012, most=0.016), partial(_many_pixels, least=0.3, most=1.0)),
+    inputs=(
+        _pixels,
+        _pixels,
+        partial(_many_pixels, least=0.012, most=0.016),
+        partial(_many_pixels, least=0.3, most=1.0),
+    ),
     by_hand=(
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.4),  # two of three: 0.5, weight 1
         (np.array([0.9, 0.5, 0.2, 0.1]), np.array([True, True, False, True]), 0.3),  # the surest one: weight 1 / 9
@@ -62,8 +67,9 @@ QUESTION = Question(
         (np.array([0.79, 0.79, 0.1, 0.8]), np.array([True, True, True, False]), 0.6),
         (np.array([0.4]), np.array([True]), 0.5),
         (np.array([SURE, *[0.5] * 19]), np.ones(20, bool), 1.0),  # weight 999,999,999
+        (np.array([0.1, *[0.5] * 9]), np.ones(10, bool), 0.9001),  # nine of ten are hardly too few
     ),
-    edges=2,
+    edges=3,
     random_cases=12,
     atol=0.0,
     rtol=1e-5,  # weights tried one after the other come near, and not to the answer

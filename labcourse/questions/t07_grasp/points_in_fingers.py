@@ -123,6 +123,11 @@ def position_taken_off_after_the_turn(P, T_base_grasp, *boxes):
     return in_boxes(*(P @ T_base_grasp[:3, :3] - T_base_grasp[:3, 3]).T, *boxes)
 
 
+@wrong("You move the points to the grasp's origin: along which axes do the fingers lie, and along which your x, y, z?")
+def shifted_alone(P, T_base_grasp, *boxes):
+    return in_boxes(*(P - T_base_grasp[:3, 3]).T, *boxes)
+
+
 @wrong("What lies lower than the tips is not in the way. The frame's z points down.")
 def below_the_tips_too(P, T_base_grasp, width, half, thickness, tips):
     return points_in_fingers(P, T_base_grasp, width, half, thickness, np.inf)

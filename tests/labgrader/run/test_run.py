@@ -13,7 +13,7 @@ import numpy as np
 import psutil
 import pytest
 
-from labgrader.comparison import Problem
+from labgrader.comparison import UNTRIED, Problem, is_large
 from labgrader.course import find
 from labgrader.program.slice import Program
 from labgrader.reply.finding import Span
@@ -41,6 +41,19 @@ def test_a_right_answer_passes_and_a_wrong_one_gets_its_place():
     verdict, _, found = judged("def iou(n):\n" + WRONG)
     assert verdict.problem.says == "2 of 2 values are wrong" and verdict.where == "hand-made case 1 of 8"
     assert (found[0].kind, found[0].piece, found[0].spans) == ("operator", 1, (Span(4, 39, 4, 42),))
+
+
+@pytest.mark.parametrize("source", [WRONG, RIGHT.replace("n.sum(0)", "n.sum(0).astype(np.int32)")])
+def test_a_large_case_is_not_tried_once_a_usual_one_is_wrong_and_the_reply_is_the_same(source):
+    program, cases = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + source))), public_cases(IOU)
+    large = [is_large(case) for case in cases]
+    with Run(IOU, program, subprocess_worker.fresh_worker, PATIENT) as answer:
+        whole, all_outputs = answer.judge(cases)
+        brief, outputs = answer.judge(cases, brief=True)
+    usual_is_wrong = source == WRONG
+    assert any(large) and not any(output is UNTRIED for output in all_outputs)
+    assert [output is UNTRIED for output in outputs] == [usual_is_wrong and which for which in large]
+    assert (brief.where, brief.problem, brief.hint) == (whole.where, whole.problem, whole.hint) and not brief.passed
 
 
 @pytest.mark.parametrize("seconds, looks", [(0.1, ["watch", "repair"]), (3.0, ["repair"])])
