@@ -73,30 +73,31 @@ class Perception:
 class Pipeline:
     """The chain as one object: `Pipeline(model).run(frame)`, which is `perceive` and then `locate`.
 
-    model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes, and which outputs are
-        understood), or any function from an RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1;
-        None if only `locate` is used.
-    table_z: height of the table in the base frame, metres; None takes the frame's own, or else 0.
-    target_class: the class to grasp, its number or its name in the id2label of a Hugging Face model; None is the kit's
-        target, 2, or 1 where there are two classes, as of one channel with a sigmoid.
-    processor: the image processor of a Hugging Face model, which then sees the picture as that prepares it.
-    find_objects: in place of a model, any function from a frame to the numbers of objects, integers (H, W), 0 for none,
-        or to `labkit.learning.things.Instances`, such as its `instance_finder` makes of a network; each is a target.
-    flip_tta: test-time flip: a network sees the image and its mirror image, and the mean of both counts: a little
-        better, at twice its time; None does so for a network that sees the canonical view, which has one size.
-    engine: "torch", "opencv" or "onnxruntime" runs the network there (`labkit.learning.engines`): equal numbers, other
-        speeds; the model may then be an ONNX file of `labkit export`.
-    crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
-        refines those of a network, and leaves those of a plain function, which decides for itself.
-    workspace: ((x, x), (y, y), (z, z)), from and to, metres in the base frame, z from the table: what the arm can meet;
-        nothing outside is a target or an obstacle. "table" if nobody knows it: then the table is looked for at its
-        height, and what does not stand on it, or hangs into the picture from its border, is no target.
-    gripper: the hand that the planner plans for; the Panda's if none is given.
-    back_project: a function (depth, K, T_base_cam) -> (H, W, 3), in place of the kit's.
-    split: a function of the target's points (N, 3) to a list of index arrays, one for each object.
-    grasp: a function (clouds, scene, table_z, camera_position) -> GraspPlan, in place of the kit's planner.
-    unit_known: True if the unit of depth is certain. Otherwise nothing is grasped where the targets' distance and sizes
-        fit another unit and not this one; the plan's reason says so (`labkit.geometry.depth_units.other_unit`).
+    - model: any PyTorch network (`labkit.network.TorchEngine` says how it states what it takes, and which outputs are
+      understood), or any function from an RGB image, uint8 (H, W, 3), to class probabilities (H, W, C) that sum to 1;
+      None if only `locate` is used.
+    - table_z: height of the table in the base frame, metres; None takes the frame's own, or else 0.
+    - target_class: the class to grasp, its number or its name in the id2label of a Hugging Face model; None is the
+      kit's target, 2, or 1 where there are two classes, as of one channel with a sigmoid.
+    - processor: the image processor of a Hugging Face model, which then sees the picture as that prepares it.
+    - find_objects: in place of a model, any function from a frame to the numbers of objects, integers (H, W), 0 for
+      none, or to `labkit.learning.things.Instances`, such as its `instance_finder` makes of a network; each is a
+      target.
+    - flip_tta: test-time flip: a network sees the image and its mirror image, and the mean of both counts: a little
+      better, at twice its time; None does so for a network that sees the canonical view, which has one size.
+    - engine: "torch", "opencv" or "onnxruntime" runs the network there (`labkit.learning.engines`): equal numbers,
+      other speeds; the model may then be an ONNX file of `labkit export`.
+    - crf: True refines the labels with the kit's CRF, or a function (probabilities, frame) -> labels (H, W) does; None
+      refines those of a network, and leaves those of a plain function, which decides for itself.
+    - workspace: ((x, x), (y, y), (z, z)), from and to, metres in the base frame, z from the table: what the arm can
+      meet; nothing outside is a target or an obstacle. "table" if nobody knows it: then the table is looked for at its
+      height, and what does not stand on it, or hangs into the picture from its border, is no target.
+    - gripper: the hand that the planner plans for; the Panda's if none is given.
+    - back_project: a function (depth, K, T_base_cam) -> (H, W, 3), in place of the kit's.
+    - split: a function of the target's points (N, 3) to a list of index arrays, one for each object.
+    - grasp: a function (clouds, scene, table_z, camera_position) -> GraspPlan, in place of the kit's planner.
+    - unit_known: True if the unit of depth is certain. Otherwise nothing is grasped where the targets' distance and
+      sizes fit another unit and not this one; the plan's reason says so (`labkit.geometry.depth_units.other_unit`).
 
     Raises ValueError for an argument that does not fit. Topics 03, 06 and 07.
 

@@ -1,6 +1,7 @@
 """Facts about the repository as a whole: what make does, what is pinned, what may import what, what the files hold."""
 
 import ast
+import inspect
 import os
 import re
 import shutil
@@ -10,7 +11,7 @@ import tomllib
 from collections import Counter
 from functools import cache
 from graphlib import TopologicalSorter
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 
 import pytest
@@ -204,6 +205,28 @@ def test_the_licence_and_the_changelog_belong_to_this_version():
     assert PROJECT["version"] == labkit.__version__
     assert re.search(rf"^## {re.escape(labkit.__version__)}\b", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert (ROOT / "LICENSE").read_text().startswith("MIT License")
+
+
+def test_docstrings_are_indented_as_the_sites_reference_reads_them():
+    """A line that goes back to the left without an empty one before it makes Sphinx warn, unless a list goes on."""
+
+    def complaints(docstring: str) -> list[str]:
+        paragraphs = [text.splitlines() for text in re.split(r"\n\s*\n", inspect.cleandoc(docstring))]
+        pairs = [pair for lines in paragraphs if ">>>" not in lines[0] for pair in pairwise(lines)]
+        indented = [
+            (len(before) - len(before.lstrip()), len(line) - len(line.lstrip()), line) for before, line in pairs
+        ]
+        return [line for before, here, line in indented if here < before and not line.lstrip().startswith("- ")]
+
+    assert complaints("A box.\n\nx: a number,\n    in metres.\ny: another.") == ["y: another."]
+    assert not complaints("A box.\n\n- x: a number,\n  in metres.\n- y: another.\n\nNothing else.")
+    wrong = []
+    for path in tracked("labkit/*.py", "labtrain/*.py", "labros/*.py", "labcourse/stacks/*.py", "labcourse/views.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                docstring = ast.get_docstring(node, clean=False) or "Nothing."
+                wrong += [f"{path.relative_to(ROOT)}: {line!r}" for line in complaints(docstring)]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_links_in_the_pages_lead_to_files():
