@@ -31,17 +31,23 @@ def giving_arrays(answer: Callable, cases: Sequence[Case]) -> Callable:
     @functools.wraps(answer)
     def given(*args, **named):
         __tracebackhide__ = True
-        if inside.get():
-            return answer(*args, **named)
-        token = inside.set(True)
-        try:
-            got = answer(*args, **named)
-        finally:
-            inside.reset(token)
-        return in_form(form, got)
+        return called(answer, form, args, named)
 
     given.given = given
     return given
+
+
+def called(answer: Callable, form: object, args: tuple, named: dict) -> object:
+    """What an answer returns, in a form. By itself, since `given` goes to other processes with all that it names."""
+    __tracebackhide__ = True
+    if inside.get():
+        return answer(*args, **named)
+    token = inside.set(True)
+    try:
+        got = answer(*args, **named)
+    finally:
+        inside.reset(token)
+    return in_form(form, got)
 
 
 def in_form(form: object, got: object) -> object:

@@ -2,6 +2,7 @@
 
 import inspect
 
+import cloudpickle
 import numpy as np
 import pytest
 
@@ -55,6 +56,16 @@ def test_it_looks_like_the_answer_and_in_another_answer_lists_stay_lists(monkeyp
     assert given.__name__ == "countdown" and given.__doc__ == "From n to 1."
     assert "[n, *countdown" in inspect.getsource(given)
     assert giving_arrays(given, []) is given
+
+
+def test_a_notebooks_answer_goes_to_other_processes_after_its_check(monkeypatch):
+    monkeypatch.setattr(
+        countdown, "__module__", "__main__"
+    )  # so it is sent by value, as lab 07 does with several workers
+    given = giving_arrays(countdown, [Case((1,), np.array([1]), True)])
+    sent = cloudpickle.loads(cloudpickle.dumps(given))
+    np.testing.assert_array_equal(sent(2), [2, 1])
+    assert isinstance(sent(2), np.ndarray)
 
 
 def test_of_numbers_in_a_list_no_dtype_is_asked_and_an_empty_list_is_an_empty_array():

@@ -21,8 +21,12 @@ MILLIMETRES = 1e8  # of squares: then a covariance has large numbers
 
 
 def _covariance(rng, unit=1.0):
-    """The covariance of a thing of centimetres, in square metres or in another unit."""
-    return np.cov(cloud(rng).T, bias=True) * unit
+    """The covariance of a thing of centimetres, in square metres or in another unit; no disc, seen from above."""
+    while True:
+        Sigma = np.cov(cloud(rng).T, bias=True) * unit
+        narrow, long = np.linalg.eigvalsh(Sigma[:2, :2])
+        if long >= 1.1 * narrow:
+            return Sigma
 
 
 def _covariance_and_hand(rng, unit=1.0):
@@ -38,7 +42,7 @@ QUESTION = Question(
         "Sigma": array(
             "3 3",
             form=lambda rng, _: _covariance(rng, rng.choice([1.0, MILLIMETRES])),
-            says=("symmetric", "seen from above it is no disc"),
+            says=("symmetric", "variances of 1e-6 to 1e6", "at least a tenth larger than the smallest"),
             # What is upright does not count, and of two equal entries one is enough.
             free=("* at ??, 2]", "* at ?2, ?]", "* at ?0, 1]"),
         ),
@@ -53,8 +57,9 @@ QUESTION = Question(
         (np.array([[5.0, 2.0, 1.0], [2.0, 2.0, 0.0], [1.0, 0.0, 3.0]]), 1000.0),  # and as far as the statement allows
         (np.array([[3.0, 2.0, 1.0], [2.0, 3.0, 0.0], [1.0, 0.0, 3.0]]), -1000.0),
         (np.diag([1.0, 4.0, 0.5]), 7.8537),  # hardly less than a quarter turn off, which few digits hide
+        (np.array([[1.1e-6, 9e-9, 0.0], [9e-9, 1e-6, 0.0], [0.0, 0.0, 1e-6]]), 1.0),  # a screw, in square metres
     ),
-    edges=3,
+    edges=4,
     random_cases=10,
     atol=1e-4,
     points=3,

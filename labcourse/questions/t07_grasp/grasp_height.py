@@ -134,6 +134,12 @@ def extremes_of_all_coordinates(P, table_z, palm, tips, clearance):
     return max(P.max() - palm, P.min(), table_z + clearance) + tips
 
 
+@wrong("You leave out points at the table's height or below it. What was seen there belongs to the object, too.")
+def points_above_the_table_alone(P, table_z, palm, tips, clearance):
+    z = P[P[:, 2] > table_z, 2]
+    return (max(z.max() - palm, z.min(), table_z + clearance) if len(z) else table_z + clearance) + tips
+
+
 @wrong("A percentile leaves out the highest points: what does the palm meet?")
 def percentiles_for_the_ends(P, table_z, palm, tips, clearance):
     low, high = np.percentile(P[:, 2], (2, 98))

@@ -49,12 +49,18 @@ QUESTION = Question(
         (np.array([-0.4, 0.1, -0.2]), np.array([-1.0, 2.0, 2.0]), np.array([-3.0, 0.0, 3.0])),  # upwards
         (np.array([0.5, 0.1, 0.02]), np.array([0.0, 0.0, -2.0]), np.array([3.0, 0.0, 4.0])),
         (np.array([9.5, -9.5, -7.0]), np.array([8e5, -4e5, 4e5]), np.array([-7e5, 7e5, 3e4])),  # the largest numbers
-        (np.array([0.5, 0.2, 0.1]), np.array([0.0, 0.0, -1e-3]), np.array([2e-5, 0.0, 1e-3])),  # the smallest ones
+        (
+            np.array([0.5, 0.2, 0.1]),
+            np.array([0.0, 0.0, -1e-3]),
+            np.array([1.2e-5, -1.6e-5, 1e-3]),
+        ),  # the smallest ones
         (np.array([0.4, -0.1, 0.2]), np.array([0.0, -0.5, 0.0]), np.array([-0.25, 0.25, 0.0])),  # level
+        (np.array([0.123454, 0.2, 0.1]), np.array([0.0, 0.0, -1.0]), np.array([1.0, 2.0, 0.0])),  # few digits do not do
     ),
-    edges=5,
+    edges=6,
     random_cases=10,
-    atol=1e-5,
+    rtol=1e-6,
+    atol=1e-6,
     points=4,
     canonical=_same_for_both_ways,
     forbidden=("scipy",),
@@ -121,6 +127,17 @@ def projected_on_a_long_vector(position, approach, closing):
 def closing_left_short(position, approach, closing):
     y, z = unit(closing), unit(approach)
     y = y - (y @ z) * z
+    return pose(np.cross(y, z), y, z, position)
+
+
+@wrong(
+    "The columns of a rotation have length 1: how long is your y once the part along z is subtracted?",
+    by=("nothing", "largest"),
+)
+def closing_of_another_length(position, approach, closing, by):
+    z = unit(approach)
+    y = closing - (closing @ z) * z
+    y = y / np.abs(y).max() if by == "largest" else y
     return pose(np.cross(y, z), y, z, position)
 
 

@@ -202,6 +202,13 @@ def position_not_taken_off(P, T_base_grasp, half):
     return middle_and_width(y[np.abs(x) <= half])
 
 
+@wrong("The hand may lean: an axis has three components, and a yaw knows two. Which column of T is the axis?")
+def axes_of_a_yaw(P, T_base_grasp, half):
+    yaw, off = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1]), P - T_base_grasp[:3, 3]
+    along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    return middle_and_width((off[:, :2] @ along)[np.abs(off[:, :2] @ across) <= half])
+
+
 @wrong("A point at the very edge of a pad is touched, too: is x < half true of it?")
 def edges_left_out(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)

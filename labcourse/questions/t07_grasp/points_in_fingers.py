@@ -68,7 +68,7 @@ _HALF_OFF = transform(FACING_X[:3, :3], [2.00042, -1.00037, 0.50046])
 _FAR = np.array([[0.9, 1.4, 0.9], [-0.5, -1.4, -3.0], [1.1, 1.4, 0.9]])
 _HIGH_UP = transform(TURNED[:3, :3], [-7.5, -7.5, 9.5])
 
-MOST_POINTS = 80_000  # of a scene of 320 x 240 pixels
+MOST_POINTS = 80_000  # more than a scene of 320 x 240 pixels has
 
 
 QUESTION = Question(
@@ -94,6 +94,7 @@ QUESTION = Question(
         (np.array(_OUT), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.zeros((0, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.resize(10 * _IN + _OUT, (MOST_POINTS, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # more than 16 bits count
+        (np.resize(_IN, (1999, 3)), FACING_X, 1.0, 0.25, 0.25, 0.25),  # no multiple of a round number
         *((moved(_BESIDE, T).T.round(6), T, 0.48, 0.22, 0.28, 0.12) for T in (FROM_BELOW, TURNED, TURNED_OVER)),
         (np.array([[0.0, 0.6, 0.0], [0.0, 0.4, 0.0]]), np.diag([-1.0, 1.0, -1.0, 1.0]), 1.0, 0.25, 0.25, 0.1),
         (np.array([[2.125, 1.0, 0.5], [2.0, 1.0, 0.375]]), FACING_X, 0.25, 0.0, 0.0, 0.0),  # lines for fingers
@@ -101,7 +102,7 @@ QUESTION = Question(
         (moved(_FAR, _HIGH_UP).T, _HIGH_UP, 1.0, 1.0, 1.0, 1.0),  # the largest numbers
         *((moved(_CLOSE, _HALF_OFF).T, _HALF_OFF, *boxes) for boxes in _FINE),  # few digits do not hold these
     ),
-    edges=11,
+    edges=12,
     random_cases=12,
     points=3,
 )
@@ -184,6 +185,17 @@ def fingers_without_an_outer_side(P, T_base_grasp, width, half, thickness, tips)
 @wrong("That is a share of the points: how many are they?")
 def share_of_the_points(P, *others):
     return points_in_fingers(P, *others) / len(P) if len(P) else np.nan
+
+
+@wrong("A mask has an entry for each point, whatever it says: which entries do you want to count?")
+def length_of_the_mask(P, *others):
+    return len(P)
+
+
+@wrong("You count fingers that are hit. How many points are in their way?")
+def fingers_hit(P, T_base_grasp, *boxes):
+    x, y, z = moved(P, np.linalg.inv(T_base_grasp))
+    return sum(in_boxes(x, np.where(side * y >= 0.0, y, np.nan), z, *boxes) > 0 for side in (1.0, -1.0))
 
 
 @wrong("You return the points themselves: how many are they?")

@@ -20,6 +20,9 @@ def _grasp_and_middle(rng):
     return transform(R, origin), origin + R @ off
 
 
+_LEANING = np.array([[0.0, 0.6, 0.8, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.8, -0.6, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
 QUESTION = Question(
     reference=slip_across,
     kinds={
@@ -34,8 +37,9 @@ QUESTION = Question(
         (TURNED, np.array([0.56, -0.28, 1.06])),
         (transform(np.diag([-1.0, 1.0, -1.0]), [8.0, -9.0, 7.0]), np.array([0.0, 9.5, -9.5])),
         (FROM_BELOW, np.array([-0.47, 0.31, -1.06])),  # off by (0.03, 0.06, -0.06)
+        (_LEANING, np.array([1.1, 0.0, 0.7])),  # no slip, which rounding must not make NaN
     ),
-    edges=3,
+    edges=4,
     random_cases=6,
     atol=1e-4,
     forbidden=("scipy",),
@@ -110,6 +114,12 @@ def in_metres(T_base_grasp, middle):
 @wrong("The jaws close along y of the grasp frame: that part is pushed, and it comes first.")
 def exchanged(T_base_grasp, middle):
     off = 1000.0 * np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
+    return off[0], off[1]
+
+
+@wrong("In which unit are the two asked for? And the jaws close along y: that part is pushed, and it comes first.")
+def exchanged_in_metres(T_base_grasp, middle):
+    off = np.abs(T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3]))
     return off[0], off[1]
 
 
