@@ -166,6 +166,8 @@ def plain_part(got: object) -> object:
     """Give one output of several as `as_numpy` does: a list or tuple of numbers is an array here, too."""
     if issubclass(type(got), tuple | list) and (array := array_of_list(list(got))) is not None:
         return array
+    if got is None:
+        return Problem("kind", "there is a None in what it returns: expected numbers alone")
     return plain_array(got)
 
 

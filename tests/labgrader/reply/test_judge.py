@@ -170,6 +170,7 @@ def itself(n):
     "answer, expected_kind, says",
     [
         (lambda n: None, "kind", "it returns None: is a `return` missing?"),
+        (lambda n: [0.5, None], "kind", "there is a None in what it returns"),
         (itself, "kind", "expected an array or a number, got a function"),
         (lambda n: "right", "kind", "got str"),
         (lambda n: (x for x in iou(n)), "kind", "got generator"),
