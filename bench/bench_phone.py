@@ -8,9 +8,9 @@ thing's IoU with something found is over 0.5. False: most pixels of what is foun
 Panda tries what is planned for a click in the middle of the largest target in view (as `labkit perceive --anything
 --at`). Heaps: scenes of `clutter`, of which nothing was trained on either. In brackets: 95 % intervals, of shares by
 Wilson, of other numbers by drawing the scenes again. No weights were trained on such depth; the sweep's constants were
-chosen on seeds 700,000, 700,001, 700,003 and 700,004 and on the real sets. The last table is of real photographs of a table
-(`../shared/real/views`), whose poses are a tracker's and whose depth is a Kinect's; where they are not, it is left out.
-Looked at: with the photographs' depth the same objects come out as with the Kinect's, a mug, a box and a game
+chosen on seeds 700,000, 700,001, 700,003 and 700,004 and on the real sets. The last table is of real photographs of a
+table (`../shared/real/views`), whose poses are a tracker's and whose depth is a Kinect's; where they are not, it is
+left out. Looked at: with the photographs' depth the same objects come out as with the Kinect's, a mug, a box and a game
 controller, and two mugs and a parcel, up to 2 cm too wide; the box is in two pieces, and the controller has holes.
 Around them are false pieces: slivers along the joints of the boards, and behind the table the backs of chairs and a
 shelf, since a plain wall is taken for more of the table. The best grasp is on an object in both.
