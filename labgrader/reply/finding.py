@@ -16,6 +16,7 @@ WATCHES = {
     "overflow": "The marked part overflows a float{exponent}. What keeps it small?",
     "wraps": "The marked part is a whole number of a type that cannot hold it, so it wraps around. Which type can?",
     "division": "The marked part divides by 0, or takes the log of 0. When does that happen, and what is right then?",
+    "nothing": "The marked part is the mean of nothing, and so NaN. When is nothing left there, and should it be?",
     "no number": "The marked part is NaN (0 / 0, for example). When does that happen, and what is right then?",
     "aliased": "All rows of this list are the same list: what you write into one row appears in all of them. How "
     "is a new list made for each row?",
@@ -35,6 +36,7 @@ REPAIRS = {
     "copy": "A later line changes this array, although you still need its old values. Where is a copy needed?",
     "line too many": "Without the marked line every case is right. What should it do, and what does it really do?",
     "branch": "Without the marked branch every case is right. When does it run, and what is different then?",
+    "always": "The marked condition should not be there: every case is right if its lines always run.",
     "too much": "The marked part should not be there: every case is right without it. What is it for?",
     "condition": "The marked condition lacks a part, or has one too many. What must hold there?",
     "option": "The marked option is wrong, or should not be there. What does it do, and what happens without it?",

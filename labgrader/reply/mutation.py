@@ -192,6 +192,8 @@ def of_block(place: Place) -> Iterator[Mutation]:
         above, below = block[:i], block[i + 1 :]
         if len(block) > 1 and not is_docstring(statement):
             yield mutation("line too many", 1, above + below, statement)
+        if isinstance(statement, ast.If) and not statement.orelse:
+            yield mutation("always", 1, [*above, *statement.body, *below], statement)
         if isinstance(statement, ast.If) and statement.orelse:
             yield mutation("branch", 1, [*above, *statement.orelse, *below], statement)
             yield mutation("branch", 1, [*above, *statement.body, *below], statement.orelse[0])

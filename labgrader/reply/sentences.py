@@ -30,6 +30,9 @@ OF_BYTES = "Bytes are not an array yet. Which function of NumPy makes one of the
 ASLEEP = "It waits, and computes nothing: does it sleep, or wait for something to be typed?"
 
 
+NO_CAUSE = ("division", "nothing", "no number")  # where these appear may be right: a repair that is found tells more
+
+
 @dataclass(frozen=True)
 class Sentence:
     """Something true of a wrong answer.
@@ -196,13 +199,17 @@ def found_in_the_program(
 ) -> Iterator[Sentence]:
     """What instruments show, an argument that is never read, then what repair finds, with the student's lines.
 
+    Where a NaN appears is told last: what makes it may be in another line, which repair marks, or which changes an
+    argument.
     That an argument is changed is told at once where that is all that is wrong, and else at last. Of a cast that mends
     wrong values is not said that the values are right.
     """
     shown = [f for f in findings if f.kind in (*WATCHES, "unread") and f.kind != "writes"]
     repairs = [f for f in findings if f.kind in REPAIRS]
     written = [f for f in findings if f.kind == "writes"]
-    for finding in (*written, *shown, *repairs[:1]) if values_are_right else (*shown, *repairs[:1], *written):
+    sure, weak = ([f for f in shown if (f.kind in NO_CAUSE) is which] for which in (False, True))
+    later = (*sure, *repairs[:1], *written, *weak)
+    for finding in (*written, *shown, *repairs[:1]) if values_are_right else later:
         equal = [f for f in repairs if f.kind == finding.kind and f.width == finding.width and f != finding][:1]
         equal = equal if len(finding.spans) == 1 else []  # more than two marked places help nobody
         changes_values = finding.kind == "cast" and not values_are_right

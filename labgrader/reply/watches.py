@@ -7,6 +7,7 @@ says nothing unless a wrong output hangs on it. Like `repair`, this runs in a wo
 import ast
 import contextlib
 import itertools
+import re
 import sys
 from collections.abc import Sequence
 from types import FrameType, TracebackType
@@ -18,6 +19,7 @@ from labgrader.program.live import LiveProgram, altered, copied, own_entry
 from labgrader.reply.alarm import ENDS, limited
 from labgrader.reply.finding import Finding, Span
 
+MEAN = re.compile(r"\bmean\(")
 MOST_S = 1.0  # CPU seconds of all watches together
 MOST_TRACED_S = 0.3  # of a call whose lines are looked at one by one
 
@@ -67,6 +69,8 @@ def floating_point(program: LiveProgram, wrong: Sequence[tuple[tuple, object, ob
             piece, span, frame = where
             kind = "overflow" if "overflow" in str(error) else "division" if "divide" in str(error) else "no number"
             part = text_of(program.pieces[piece][1], span)
+            if kind != "overflow" and MEAN.search(part):
+                return Finding("nothing", piece, (span,))
             if kind == "overflow" and is_whole(part, frame):
                 return Finding("wraps", piece, (span,))
             return Finding(kind, piece, (span,), extreme(part, frame, kind))

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from labcourse.kinds import LONG, MOST_CLASSES, array, count
+from labcourse.kinds import MOST_CLASSES, array, count
 from labgrader.question import Question, wrong
 
 
@@ -36,15 +36,25 @@ def _any_classes(rng, shape):
     return y_true.astype(np.uint8), y_pred.astype(np.uint8), MOST_CLASSES, ignore
 
 
+MOST_SIDE = 4000
+SIDES = {"H": (1, MOST_SIDE), "W": (1, MOST_SIDE)}
 QUESTION = Question(
     reference=confusion_matrix,
     kinds={
-        "y_true": array("H W", 0, 254, also=(255,), dtype="uint8", says=("0 .. num_classes - 1, or `ignore`")),
-        "y_pred": array("H W", 0, 254, dtype="uint8", says="0 .. num_classes - 1"),
+        "y_true": array(
+            "H W",
+            0,
+            254,
+            also=(255,),
+            dtype="uint8",
+            lengths=SIDES,
+            says=("sides up to 4000", "0 .. num_classes - 1, or `ignore`"),
+        ),
+        "y_pred": array("H W", 0, 254, dtype="uint8", lengths=SIDES, says="0 .. num_classes - 1"),
         "num_classes": count(1, MOST_CLASSES, says="1 to 255"),
         "ignore": count(0, 255, says="0 to 255"),
     },
-    inputs=(_label_pair, *(partial(_any_classes, shape=shape) for shape in ((LONG, 2), (1, LONG)))),
+    inputs=(_label_pair, *(partial(_any_classes, shape=shape) for shape in ((MOST_SIDE, 2), (1, MOST_SIDE)))),
     by_hand=(
         # An array may lie in memory by columns, and be a part of another.
         (np.array([[0, 1, 1], [2, 0, 2]], np.uint8, order="F"), np.array([[0, 1, 2], [2, 0, 1]], np.uint8), 3, 255),
@@ -52,8 +62,10 @@ QUESTION = Question(
         (np.array([[0, 0, 1]], np.uint8), np.array([[0, 1, 1]], np.uint8), 2, 255),
         (np.array([[2, 255], [2, 1], [0, 2]], np.uint8), np.array([[1, 0], [1, 1], [0, 2]], np.uint8), 3, 255),
         (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 1]], np.uint8), 4, 0),
+        (np.array([[0, 1, 2, 1]], np.uint8), np.array([[1, 0, 2, 2]], np.uint8), 3, 1),
         (np.array([[0]], np.uint8), np.array([[0]], np.uint8), 1, 255),
         (np.array([[255, 255]], np.uint8), np.array([[0, 1]], np.uint8), 2, 255),  # nothing was judged
+        (np.array([[0, 255]], np.uint8), np.array([[0, 0]], np.uint8), 1, 255),  # one class, and what nobody judged
         (
             np.zeros((240, 320), np.uint8),
             np.ones((240, 320), np.uint8),
@@ -63,7 +75,7 @@ QUESTION = Question(
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
         (np.array([[254]], np.uint8), np.array([[253]], np.uint8), 255, 255),
     ),
-    edges=5,
+    edges=6,
     random_cases=10,
     forbidden=("sklearn", "torchmetrics"),
 )
@@ -90,6 +102,11 @@ def ignored_as_class_0(y_true, y_pred, num_classes, ignore):
 def prediction_ignored_too(y_true, y_pred, num_classes, ignore):
     rows, columns = counted_pairs(y_true, y_pred, ignore)
     return pair_count(rows[columns != ignore], columns[columns != ignore], num_classes)
+
+
+@wrong("0 is a label like any other: where `ignore` is 0, the true pixels of class 0 do not count.")
+def zero_ignores_nothing(y_true, y_pred, num_classes, ignore):
+    return pair_count(*counted_pairs(y_true, y_pred, ignore if ignore else 255), num_classes)
 
 
 @wrong("`ignore` need not be 255: where it is the number of a class, that class's true pixels do not count.")

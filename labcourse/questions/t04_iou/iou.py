@@ -40,10 +40,10 @@ def overlap_twice_in_the_union(n):
     return divide(correct, predicted + true)
 
 
-@wrong("That is Dice (F1), another score: an IoU has the overlap once, not twice.")
-def dice(n):
+@wrong("That is Dice (F1), another score: an IoU has the overlap once, not twice.", absent=(np.nan, 0.0))
+def dice(n, absent):
     correct, predicted, true = parts(n)
-    return divide(2.0 * correct, predicted + true)
+    return divide(2.0 * correct, predicted + true, absent)
 
 
 @wrong("A pixel of class 1 that is predicted as 2 is in neither set of class 0: is it in your union of class 0?")
@@ -83,6 +83,11 @@ def precision(n):
 @wrong("A class that is predicted and never true has a union: how large is its overlap?")
 def nan_where_never_true(n):
     return np.where(n.sum(axis=1) > 0, iou_of(n), np.nan)
+
+
+@wrong("A class that is true and never predicted has a union: how large is its overlap?")
+def nan_where_never_predicted(n):
+    return np.where(n.sum(axis=0) > 0, iou_of(n), np.nan)
 
 
 @wrong("You count pixels that are neither labelled nor predicted as class c as right: are they in its union?")

@@ -125,7 +125,7 @@ def spread_of_the_scores(n_frames):
     return with_factor(n_frames, lambda F: 1 / F)
 
 
-@wrong("The scores without one frame are close together, as they share nearly all frames: by which factor too close?")
+@wrong("The scores without one frame share nearly all frames: which factor makes their spread a standard error?")
 def spread_of_the_scores_of_a_sample(n_frames):
     return with_factor(n_frames, lambda F: 1 / (F - 1))
 
@@ -140,7 +140,9 @@ def as_if_they_were_independent_by_f(n_frames):
     return with_factor(n_frames, lambda F: 1 / F**2)
 
 
-@wrong("A factor of F is missing: try it on numbers. What is it for the mean of 1 and 3, whose standard error is 1?")
+@wrong(
+    "A factor made of F is missing: try it on numbers. What is it for the mean of 1 and 3, whose standard error is 1?"
+)
 def no_factor(n_frames):
     return with_factor(n_frames, lambda F: 1.0)
 
@@ -152,6 +154,11 @@ def no_factor(n_frames):
 def factor_too_large(n_frames, of):
     factors = {"F - 1": lambda F: F - 1, "F": lambda F: F, "up": lambda F: F / (F - 1)}
     return with_factor(n_frames, factors.get(of, lambda F: (F - 1) ** 2 / F))
+
+
+@wrong("1/2 is the factor of two frames: what is it of three?")
+def factor_of_two_frames(n_frames):
+    return with_factor(n_frames, lambda F: 0.5)
 
 
 @wrong("The factor belongs to the squares: it is under the root, too.")

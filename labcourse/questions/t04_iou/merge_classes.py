@@ -164,6 +164,19 @@ def groups_as_they_first_occur(n, group):
     return merge_classes(n, group)[np.ix_(order, order)]
 
 
+@wrong("You take one class of each group and leave out the others: a cell is the sum over all of its group.")
+def one_class_of_each_group(n, group):
+    first = [int(np.argmax(group == g)) for g in range(group.max() + 1)]
+    return n[np.ix_(first, first)]
+
+
+@wrong("You sort the rows by their group, and not the columns: which columns do you add up then?")
+def rows_alone_sorted(n, group):
+    order = np.argsort(group, kind="stable")
+    start = np.searchsorted(group[order], np.arange(group.max() + 1))
+    return np.add.reduceat(np.add.reduceat(n[order], start, axis=0), start, axis=1)
+
+
 @wrong("You sort the classes and cut: what the classes of one group have in common is a sum.")
 def sorted_and_cut(n, group):
     G, order = group.max() + 1, np.argsort(group)

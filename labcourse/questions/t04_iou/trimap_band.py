@@ -51,16 +51,18 @@ QUESTION = Question(
         (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 1),  # one step from 1 nothing was judged
         (np.array([[1, 1, 255, 2, 2, 2]], np.uint8), 2),
         (np.array([[0, 0, 255, 255]], np.uint8), 2),  # beside class 0, too, nothing was judged
+        (np.array([[1, 1, 2, 1, 1]], np.uint8), 2),  # a thin line is nearer than the window's border
         (np.array([[4, 4, 4, 9, 9, 254]], np.uint8), 1),  # nor is 3 the last class
         (np.array([[1, 1, 1], [1, 1, 1], [2, 1, 1]], np.uint8), 1),
         (np.diag([2, 0, 0, 0, 1]).astype(np.uint8), 1),
         (np.array([[7]], np.uint8), 1),
+        (np.array([[1, 255], [255, 2]], np.uint8), 1),  # they meet across a corner
         (np.array([[255, 255, 255, 7]], np.uint8), 1),  # nor is 255 in the band where no class is near
         (np.array([[0, 128, 128, 128]], np.uint8), 1),  # alike but for the first of eight bits
         (np.repeat([[4, 4], [9, 4]], 30, axis=0).astype(np.uint8), MOST_WIDE),  # more places than a byte counts
         (np.repeat([4, 9], 16 * 16).reshape(32, 16).astype(np.uint8), MOST_WIDE),  # 256 of another class: 0 in a byte
     ),
-    edges=5,
+    edges=6,
     random_cases=8,
     points=3,
     forbidden=("cv2", "scipy", "skimage"),
@@ -80,6 +82,24 @@ def banded(y, width, steps, differs=np.not_equal):
     framed = np.pad(y, width, constant_values=255)
     near = [framed[width + v : width + v + H, width + u : width + u + W] for v, u in steps]
     return np.any([differs(n, y) & (n != 255) for n in near], axis=0)
+
+
+@wrong("Another class may be nearer than `width`, as a thin line is: which shifts do you try?")
+def outermost_shifts_alone(y, width):
+    return banded(y, width, [(v, u) for v in (-width, 0, width) for u in (-width, 0, width)]) & (y != 255)
+
+
+@wrong("First along the rows, then along the columns: what if the pixel between the two steps is 255?")
+def rows_then_columns(y, width):
+    rows, columns = [(0, u) for u in range(-width, width + 1)], [(v, 0) for v in range(-width, width + 1)]
+    down, across = (np.where(banded(y, width, steps) & (y != 255), 1, 255) for steps in (columns, rows))
+    marked = lambda near, _: near == 1  # noqa: E731
+    return (banded(down, width, rows, marked) | banded(across, width, columns, marked)) & (y != 255)
+
+
+@wrong("0 is a class like any other. Which number is no class?")
+def zero_is_no_class(y, width):
+    return banded(y, width, square(width), lambda near, own: (near != own) & (near != 0)) & (y != 255) & (y != 0)
 
 
 @wrong("A class may have any number from 0 to 254: over which of them does your loop go?", count=(2, 3, 4, 5, 10, 20))

@@ -31,6 +31,7 @@ MADE = [
     ("part", "def f(a): return a.max()", "a[:, 0].max()", ["a"]),
     ("branch", "def f(a):\n    if a: b = 1\n    else: b = 2\n    return b", "def f(a):\n    b = 2", ["if a"]),
     ("branch", "def f(a):\n    if a: b = 1\n    else: b = 2\n    return b", "def f(a):\n    b = 1", ["b = 2"]),
+    ("always", "def f(a):\n    if a: a = 1\n    return a", "def f(a):\n    a = 1", ["if a"]),
     ("branch", "def f(a): return 1 if a else 2", "return 2", ["1"]),
     ("type", "def f(a): return a.astype(np.uint8)", "a.astype(float)", ["np.uint8"]),
     ("option", "def f(a): return np.zeros(3, dtype=int)", "np.zeros(3)", ["dtype=int"]),
