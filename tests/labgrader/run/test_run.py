@@ -39,7 +39,7 @@ def judged(*sources: str, limits: Limits = PATIENT):
 def test_a_right_answer_passes_and_a_wrong_one_gets_its_place():
     assert judged("def iou(n):\n" + RIGHT)[0].passed
     verdict, _, found = judged("def iou(n):\n" + WRONG)
-    assert verdict.problem.says == "2 of 2 values are wrong" and verdict.where == "hand-made case 1 of 8"
+    assert verdict.problem.says == "2 of 2 values are wrong" and verdict.where == "hand-made case 1 of 9"
     assert (found[0].kind, found[0].piece, found[0].spans) == ("operator", 1, (Span(4, 39, 4, 42),))
 
 
