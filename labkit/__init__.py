@@ -24,9 +24,8 @@ OFFERED = {
     "Pipeline": "labkit.pipeline",
     "RGBDFrame": "labkit.frame",
     "load_model": "labkit.network",
-    # In a notebook these two note which cells run, so they are loaded where they are imported, not at the first call.
+    # In a notebook it notes which cells run, so it is loaded where it is imported, not at the first call.
     "check": "labgrader.check",
-    "check_file": "labgrader.file_check",
 }
 
 
@@ -40,3 +39,10 @@ def __getattr__(name: str):
 def __dir__() -> list[str]:
     """What tab completion shows."""
     return [*globals(), *OFFERED]
+
+
+def check_file(path: str | None = None) -> None:
+    """Check a saved lab, or the one that runs, as the grader will; print the results (`labgrader.file_check`)."""
+    from labgrader.file_check import check_file
+
+    check_file(path)  # what it returns is no output of a cell
