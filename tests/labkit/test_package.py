@@ -10,13 +10,18 @@ import labkit
 
 
 def test_the_names_that_most_users_begin_with_come_from_the_package():
-    from labkit import Gripper, Pipeline, RGBDFrame, check, check_file, load_model
+    from labkit import Gripper, Pipeline, RGBDFrame, check, load_model
 
     offered = {"Gripper": Gripper, "Pipeline": Pipeline, "RGBDFrame": RGBDFrame, "load_model": load_model}
-    offered |= {"check": check, "check_file": check_file}
+    offered |= {"check": check}
     assert offered.keys() == labkit.OFFERED.keys() <= {*dir(labkit)}
     for name, module in labkit.OFFERED.items():
         assert offered[name] is getattr(importlib.import_module(module), name)
+
+
+def test_what_check_file_returns_is_no_output_of_a_cell(monkeypatch):
+    monkeypatch.setattr("labgrader.file_check.check_file", lambda path: path == "lab.ipynb")
+    assert labkit.check_file("lab.ipynb") is None
 
 
 def test_importing_the_package_loads_neither_torch_nor_numpy_nor_the_course():
