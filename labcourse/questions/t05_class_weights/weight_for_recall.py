@@ -86,6 +86,18 @@ def first_or_untold(found):
     raise Untold
 
 
+def called(weights, q1, y):
+    """How many pixels each weight calls class 1, in floats, and how many of these are of it."""
+    order = np.argsort(q1)
+    q1, hits = q1[order], np.append(np.cumsum(y[order][::-1])[::-1], 0)
+    first, last = np.zeros(len(weights), int), np.full(len(weights), len(q1))
+    while (wide := first < last).any():
+        middle = np.minimum((first + last) // 2, len(q1) - 1)
+        is_called = weights * q1[middle] >= 1.0 - q1[middle]  # and so is each surer pixel
+        first, last = np.where(wide & ~is_called, middle + 1, first), np.where(wide & is_called, middle, last)
+    return len(q1) - first, hits[first]
+
+
 @wrong("Recall is a share of the pixels that truly are of class 1: which of q1 do you sort?")
 def of_all_pixels(q1, y, recall):
     return weight_for_recall(q1, np.ones_like(y), recall)
@@ -163,7 +175,8 @@ def as_many_of_all_pixels(q1, y, recall):
 @wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
 def weight_for_precision(q1, y, recall):
     odds = np.unique((1.0 - q1) / q1)
-    return first_or_untold(w for w in odds if np.mean(y[w * q1 >= 1.0 - q1]) >= recall)
+    count, hits = called(odds, q1, y)
+    return first_or_untold(odds[hits / np.maximum(count, 1) >= recall])
 
 
 @wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
@@ -190,11 +203,17 @@ def equal_ones_counted_once(q1, y, recall):
 @wrong("You divide by the pixels that are predicted as class 1, and that is precision: what is recall a share of?")
 def largest_pixel_with_precision(q1, y, recall):
     """The least sure pixel down to which enough of those that are called class 1 are."""
-    last = [q for q in np.sort(q1) if y[q1 >= q].mean() >= recall]
-    return float((1.0 - last[0]) / last[0]) if last else 1.0
+    order = np.argsort(q1)
+    last, hits = q1[order], np.cumsum(y[order][::-1])[::-1]
+    first = np.searchsorted(last, last)  # of those that are alike
+    last = last[hits[first] / (len(y) - first) >= recall]
+    return float((1.0 - last[0]) / last[0]) if len(last) else 1.0
 
 
 @wrong("Accuracy counts the pixels of class 0, too. Recall is a share of the pixels that truly are of class 1.")
 def weight_for_accuracy(q1, y, recall):
     odds = np.sort((1.0 - q1) / q1)
-    return float(next((w for w in odds if np.mean((w * q1 >= 1.0 - q1) == y) >= recall), odds[-1]))
+    count, hits = called(odds, q1, y)
+    right = hits + np.count_nonzero(~y) - (count - hits)
+    enough = odds[right / len(y) >= recall]
+    return float(enough[0] if len(enough) else odds[-1])
