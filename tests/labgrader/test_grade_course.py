@@ -13,7 +13,7 @@ from labgrader.sandbox.sandbox import Limits
 
 SEED = "a hidden seed"
 LABS = [topic for topic in topics() if of_topic(topic)]  # those that have questions
-EACH_TIME = LABS[4:5]
+EACH_TIME = LABS[:1]  # that of the fewest students, and of answers that take no time
 AT_NIGHT = [pytest.param(topic, marks=pytest.mark.nightly) for topic in LABS if topic not in EACH_TIME]
 
 
