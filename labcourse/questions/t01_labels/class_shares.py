@@ -166,5 +166,5 @@ def images_with_255_left_out(y, C):
     "You take the median of the images' shares, so a large and a small image count alike. Add up pixels, then divide."
 )
 def median_over_images(y, C):
-    shares = [[np.mean(i[i != 255] == c) for i in y if (i == c).any()] for c in range(C)]
-    return np.array([np.median(s) if s else 0.0 for s in shares])
+    n = counts(y, C)
+    return np.nan_to_num(np.nanmedian(np.where(n > 0, n / n.sum(axis=1, keepdims=True), np.nan), axis=0))
