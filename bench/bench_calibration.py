@@ -4,7 +4,8 @@ The fourteen photographs of a 9 x 6 chessboard in the PyPI package `mvtb-data` (
 RMS 0.406 pixels and f = 536.3 in them, with corners of one photograph that lie 1.2 pixels off. Where the package is not
 installed that table is left out. Hand-eye: the Panda in PyBullet looks at
 the sheet on a table from fifteen poses, the corners are detected in pictures of 640 x 480 with noise and blur, and
-`labkit.geometry.calibration.hand_eye` finds the camera on the hand.
+`labkit.geometry.calibration.hand_eye` finds the camera on the hand. Beside it, from the same poses, the five methods of
+OpenCV 4's `calibrateHandEye`, in an environment of its own.
 """
 
 import importlib.util
@@ -15,6 +16,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from bench import opencv4
 from bench.measure import table
 from labkit.frame import read_image
 from labkit.geometry import invert_transform
@@ -35,8 +37,13 @@ T_HAND_CAM[:3, 3] = 0.07, 0.01, -0.06
 
 def main() -> str:
     """Calibrate both; returns the tables."""
-    rows = [[seed, *(f"{x:.2f}" for x in on_a_hand(seed))] for seed in range(RUNS)]
-    parts = [table("hand-eye, run | error, mm | error, degrees | corners in the median", rows)]
+    rows = []
+    for seed in range(RUNS):
+        T_base_hand, T_cam_sheet, corners = on_a_hand(seed)
+        ways = {"the kit": hand_eye(T_base_hand, T_cam_sheet)[0]}
+        ways |= {f"OpenCV 4, {name}": T for name, T in opencv4.hand_eye(T_base_hand, T_cam_sheet).items()}
+        rows += [[seed, way, *(f"{x:.2f}" for x in errors(T)), f"{corners:.0f}"] for way, T in ways.items()]
+    parts = [table("hand-eye, run | by | error, mm | error, degrees | corners in the median", rows)]
     if package := importlib.util.find_spec("mvtbdata"):
         found = chessboard(Path(package.submodule_search_locations[0]) / "images" / "calibration")
         f, error = found.K[0, 0], found.K_std[0]
@@ -52,8 +59,8 @@ def chessboard(folder: Path):
     return calibrate(views, pictures[0].shape[1::-1])
 
 
-def on_a_hand(seed: int) -> tuple[float, float, float]:
-    """Millimetres and degrees by which the camera on the hand is off, and how many corners were found."""
+def on_a_hand(seed: int) -> tuple[list[np.ndarray], list[np.ndarray], float]:
+    """T_base_hand and T_cam_sheet of each pose, the second from corners, and how many of these were found."""
     rng = np.random.default_rng([50, seed])
     spec = SceneSpec((), Camera.looking_at(MIDDLE, 0.5, 0.0, 1.0), table=Table(), robot=True, sheet=SHEET)
     T_base_hand, T_cam_sheet, counts = [], [], []
@@ -79,10 +86,14 @@ def on_a_hand(seed: int) -> tuple[float, float, float]:
                 T_base_hand.append(T)
                 T_cam_sheet.append(sheet_pose(corners, drawn.K)[0])
                 counts.append(len(corners.points))
-    found, _ = hand_eye(T_base_hand, T_cam_sheet)
-    off = invert_transform(T_HAND_CAM) @ found
+    return T_base_hand, T_cam_sheet, float(np.median(counts))
+
+
+def errors(T_found: np.ndarray) -> tuple[float, float]:
+    """Millimetres and degrees by which a camera on the hand is off."""
+    off = invert_transform(T_HAND_CAM) @ T_found
     turn = np.degrees(np.linalg.norm(cv2.Rodrigues(off[:3, :3])[0]))
-    return 1e3 * float(np.linalg.norm(off[:3, 3])), float(turn), float(np.median(counts))
+    return 1e3 * float(np.linalg.norm(off[:3, 3])), float(turn)
 
 
 if __name__ == "__main__":

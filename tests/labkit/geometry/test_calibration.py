@@ -191,9 +191,10 @@ def test_turns_about_one_axis_and_too_few_poses_are_refused():
 @pytest.mark.nightly
 def test_a_camera_on_the_simulated_arms_hand_is_found():
     """Fifteen poses of the Panda in PyBullet, corners detected in its pictures: within 2 mm and 0.2 degrees."""
-    from bench.bench_calibration import on_a_hand
+    from bench.bench_calibration import errors, on_a_hand
 
-    millimetres, degrees, _ = on_a_hand(0)
+    T_base_hand, T_cam_sheet, _ = on_a_hand(0)
+    millimetres, degrees = errors(hand_eye(T_base_hand, T_cam_sheet)[0])
     assert millimetres < 2.0 and degrees < 0.2
 
 
