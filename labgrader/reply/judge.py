@@ -116,10 +116,10 @@ def is_untried(output: object) -> bool:
 def told_apart(
     question: Question, cases: Sequence[Case], outputs: Sequence[object]
 ) -> tuple[list[Problem | None], list[object]]:
-    """The problem of each output, None where it is right, and the outputs; UNTRIED where a large one tells no more."""
+    """The problem of each output, None where it is right, and the outputs; UNTRIED where one tells no more."""
     problems, told, enough = [], [], False
     for case, got in zip(cases, outputs, strict=True):
-        if enough and is_large(case):
+        if is_untried(got) or (enough and is_large(case)):
             problems.append(None)
             told.append(UNTRIED)
             continue

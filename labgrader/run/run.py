@@ -25,6 +25,7 @@ from labgrader.run.limits import Limits
 from labgrader.run.process import MORE
 from labgrader.run.stopwatch import Stopwatch
 
+ENOUGH_S = 2.0  # CPU seconds for the cases of an answer that is wrong: then others are not tried
 LOOK_S = 5.0  # for a look: its own limits come before, but where a compiled function does not come back
 # References are called with Python's warnings off, which no thread has for itself; and Python 3.11's parser fails when
 # two threads use it at a time.
@@ -128,7 +129,7 @@ class Run:
         """Call the answer on the arguments of all cases: an output or a Problem for each.
 
         After a case that cost the worker, the answer is not called again. brief: nor on large cases once a usual one
-        is wrong, of which no reply speaks.
+        is wrong, of which no reply speaks, nor on any more where that has taken ENOUGH_S.
         """
         outputs: list[object] = []
         before, enough = self.used_s, False
@@ -136,7 +137,7 @@ class Run:
             if brief and not enough and outputs:
                 last = cases[len(outputs) - 1]
                 enough = tells_enough(last, is_wrong(self.question, last, outputs[-1]))
-            if enough and is_large(case):
+            if enough and (is_large(case) or self.used_s - before > ENOUGH_S):
                 outputs.append(UNTRIED)
                 continue
             if self.worker.closed:

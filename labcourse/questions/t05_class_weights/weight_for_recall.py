@@ -42,7 +42,7 @@ def _many_pixels(rng, least, most):
     return q1, y, float((must - rng.uniform(0.3, 0.7)) / n)
 
 
-MANY = 2_000
+MANY = 1_000
 SURE = 1e-9
 QUESTION = Question(
     reference=weight_for_recall,

@@ -56,6 +56,17 @@ def test_a_large_case_is_not_tried_once_a_usual_one_is_wrong_and_the_reply_is_th
     assert (brief.where, brief.problem, brief.hint) == (whole.where, whole.problem, whole.hint) and not brief.passed
 
 
+def test_a_slow_answer_is_not_tried_on_all_cases_once_a_usual_one_is_wrong(monkeypatch):
+    monkeypatch.setattr("labgrader.run.run.ENOUGH_S", 0.0)
+    program = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + WRONG)))
+    with Run(IOU, program, subprocess_worker.fresh_worker, PATIENT) as answer:
+        verdict, outputs = answer.judge(public_cases(IOU), brief=True)
+    assert [output is UNTRIED for output in outputs] == [False, *[True] * (len(outputs) - 1)]
+    assert (
+        verdict.where.startswith("hand-made case 1 of") and verdict.tried[0] == [public_cases(IOU)[0]] and verdict.hint
+    )
+
+
 @pytest.mark.parametrize("seconds, looks", [(0.1, ["watch", "repair"]), (3.0, ["repair"])])
 def test_no_watch_looks_at_an_answer_that_takes_longer_than_it_may(seconds, looks):
     program, asked = Program((("np", "import numpy as np"), ("iou", "def iou(n):\n" + WRONG))), []
