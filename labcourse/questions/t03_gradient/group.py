@@ -40,6 +40,8 @@ _SPREAD = pointing((12, 12), {(0, u): (2, 2) for u in range(6)} | {(11, u): (6 +
 _ROUND = ((6, 8), (8, 8), (6, 10), (8, 10), (7, 9), (7, 9))
 _FEW = pointing((12, 12), {(0, u): (2, 2) for u in range(4)} | {(11, u): place for u, place in enumerate(_ROUND)})
 
+_CROSS = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, 0), (0, 0))
+
 _SIDES = dict.fromkeys("HW", (1, 400))
 
 
@@ -50,6 +52,15 @@ def _row_or_column(rng, shape):
     foreground = rng.random(shape)
     foreground[-1, -1] = 0.9
     return foreground, votes, int(rng.integers(1, 101)), int(rng.integers(1, 20))
+
+
+def _peaks(rng, few):
+    """Draw two things with equal peaks; few: a third peak is the highest, and has fewer pixels than `least`."""
+    rows, columns = (np.sort(rng.choice([2, 6, 10], 2, replace=False)) for _ in range(2))
+    places = [(u + i, v + j) for v, u in zip(rows, columns[::-1], strict=True) for i, j in _CROSS]
+    places += [(14, 14)] * (4 if few else 0)
+    pixels = rng.permutation(list(np.ndindex(17, 17)))[: len(places)].tolist()
+    return *pointing((17, 17), dict(zip(map(tuple, pixels), places, strict=True))), 1, 5
 
 
 def _places_from_a_network(rng):
@@ -89,6 +100,8 @@ QUESTION = Question(
         _places_from_a_network,
         partial(_row_or_column, shape=(1, 400)),
         partial(_row_or_column, shape=(400, 1)),
+        partial(_peaks, few=False),
+        partial(_peaks, few=True),
     ),
     by_hand=(
         (*_TWO, 2, 2),
@@ -108,7 +121,7 @@ QUESTION = Question(
         (np.array([[0.9]]), np.array([[[0.0, -0.0004]]]), 1, 1),
     ),
     edges=9,
-    random_cases=10,
+    random_cases=14,
     points=4,
     forbidden=("scipy", "torch", "cv2", "skimage", "sklearn"),
 )

@@ -16,12 +16,12 @@ def confusion_matrix(y_true, y_pred, num_classes, ignore):
     return n
 
 
-def _label_pair(rng):
+def _label_pair(rng, shape=(9, 14), classes=(4, 20)):
     """Two label images that agree on two pixels in three; what is ignored is 255 or one of the classes."""
-    num_classes = int(rng.choice([4, 20]))
+    num_classes = int(rng.choice(classes))
     p = rng.dirichlet(np.full(num_classes, 2.0))
     p[-1] *= rng.random() < 0.5  # in some cases the last class is never true
-    y_true = rng.choice(num_classes, size=(9, 14), p=p / p.sum()).astype(np.uint8)
+    y_true = rng.choice(num_classes, size=shape, p=p / p.sum()).astype(np.uint8)
     y_pred = np.where(rng.random(y_true.shape) < 0.65, y_true, rng.integers(num_classes, size=y_true.shape))
     ignore = int(rng.choice([0, 255]))
     y_true[rng.random(y_true.shape) < 0.15] = ignore
@@ -54,7 +54,12 @@ QUESTION = Question(
         "num_classes": count(1, MOST_CLASSES, says="1 to 255"),
         "ignore": count(0, 255, says="0 to 255"),
     },
-    inputs=(_label_pair, *(partial(_any_classes, shape=shape) for shape in ((MOST_SIDE, 2), (1, MOST_SIDE)))),
+    inputs=(
+        _label_pair,
+        partial(_any_classes, shape=(MOST_SIDE, 2)),
+        partial(_label_pair, shape=(40, 60), classes=(2,)),  # more pixels of a pair than a byte counts
+        partial(_any_classes, shape=(1, MOST_SIDE)),
+    ),
     by_hand=(
         # An array may lie in memory by columns, and be a part of another.
         (np.array([[0, 1, 1], [2, 0, 2]], np.uint8, order="F"), np.array([[0, 1, 2], [2, 0, 1]], np.uint8), 3, 255),

@@ -29,7 +29,10 @@ def _labels(rng):
     y[:, W - int(rng.integers(6, 8))] = 255
     y[int(rng.integers(1, H - 1)), int(rng.integers(9, 12))] = 0
     y[y != 255] += np.uint8(rng.choice([0, 0, 4, 90, 251]))  # any number but 255 may be a class
-    return np.roll(y, int(rng.integers(-1, 2)), axis=1), int(rng.integers(1, 4))
+    y = np.roll(y, int(rng.integers(-1, 2)), axis=1)
+    y[0, 1:4] = y[1:4, 0] = 255  # two classes meet across a corner
+    y[0, 0] = y[1, 1] + 1
+    return y, int(rng.integers(1, 4))
 
 
 def _long(rng, shape):

@@ -15,11 +15,14 @@ def grasp_height(P, table_z, palm, tips, clearance):
 
 def _heights(rng):
     """Draw a cloud of which each of the three bounds is sometimes the one that counts, above the base or below."""
-    P, kind = cloud(rng) + rng.uniform(-1.0, 1.0, 3), rng.integers(3)
-    table_z = float(P[:, 2].min() - rng.uniform(0.01, 0.03)) if kind else float(P[:, 2].min() + 0.002)
-    high = np.ptp(P[:, 2])
-    palm = float(high * (0.6 if kind == 1 else 1.5))
-    return P, table_z, palm, float(rng.uniform(0.005, 0.1)), float(rng.uniform(0.003, 0.008))
+    P, kind = cloud(rng) + rng.uniform(-1.0, 1.0, 3), rng.integers(4)
+    low, high = P[:, 2].min(), np.ptp(P[:, 2])
+    if kind == 3:  # tall, and most of it seems to be below the table
+        table_z, palm = low + 0.7 * high, 0.6 * high
+    else:
+        table_z = low - rng.uniform(0.01, 0.03) if kind else low + 0.002
+        palm = high * (0.6 if kind == 1 else 1.5)
+    return P, float(table_z), float(palm), float(rng.uniform(0.005, 0.1)), float(rng.uniform(0.003, 0.008))
 
 
 def _upright(low, high):
@@ -56,7 +59,7 @@ QUESTION = Question(
         (np.vstack([_upright(-1.0, -0.5), np.full((299, 3), -0.75), [[0.5, 0.1, -0.4375]]]), -1.0, 0.25, 0.125, 0.0),
     ),
     edges=10,
-    random_cases=16,
+    random_cases=20,
     rtol=1e-5,
 )
 
