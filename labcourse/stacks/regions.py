@@ -146,7 +146,7 @@ def learn_typical(masks: Sequence[Bool[np.ndarray, "H W"]]) -> Typical:
 def choose_region(measurements: Measurements, typical: Typical, allowed: Bool[np.ndarray, " n"]) -> int:
     """Select the piece that looks most like the wanted ones: least Mahalanobis distance; its number, 0 if none may be.
 
-    allowed: which pieces come into question, such as `~measurements.at_border`. Topic 09.
+    allowed: which pieces may be chosen, such as `~measurements.at_border`. Topic 09.
     """
     allowed = check_shape("allowed", allowed, measurements.area.shape)
     if not allowed.any():
