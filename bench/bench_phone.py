@@ -14,8 +14,8 @@ left out. Looked at: with the photographs' depth the same objects come out as wi
 controller, and two mugs and a parcel, up to 2 cm too wide; the box is in two pieces, and the controller has holes.
 Around them are false pieces: slivers along the joints of the boards, and behind the table the backs of chairs and a
 shelf, since a plain wall is taken for more of the table. The best grasp is on an object in both.
-`python -m bench.bench_phone 100 10 kept.jsonl` takes 100 scenes and 10 heaps, and keeps what it has in a file, from which
-it goes on.
+`python -m bench.bench_phone 100 10 kept.jsonl` takes 100 scenes and 10 heaps, and keeps what it has in a file, from
+which it goes on.
 """
 
 import json
