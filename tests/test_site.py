@@ -181,7 +181,7 @@ def test_a_lab_is_one_click_away_once_its_reader_has_given_an_address(site, brow
 @pytest.mark.debian("chromium")
 def test_a_double_click_turns_a_view_back(site, browser):
     tab = browser.new_page()
-    tab.goto((site / "lessons/07_grasp.html").as_uri())
+    tab.goto((site / "lessons/06_back_projection.html").as_uri())
     view = tab.locator("div.view").first
     view.scroll_into_view_if_needed()
     view.locator("canvas").first.wait_for(state="attached")
