@@ -12,6 +12,7 @@ else `language` in [tool.labgrader]; for English no file is looked for.
 """
 
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,7 +39,7 @@ def translated(question: Question, module: Path, language: str) -> Question:
     except ValueError as error:
         raise HintsUnreadable(f"{path}: {error}") from error
     hints, statements = said.pop("hints", {}), said.pop("statements", {})
-    wrong = {one.answer.__name__ for one in question.misconceptions}
+    wrong = {in_source(one.answer) for one in question.misconceptions}
     properties = {one.holds.__name__ for one in question.properties}
     for table, lines, names in (("hints", hints, wrong), ("statements", statements, properties)):
         if unknown := lines.keys() - names:
@@ -48,6 +49,13 @@ def translated(question: Question, module: Path, language: str) -> Question:
         raise HintsUnreadable(f"{path}: expected the tables hints and statements, got {min(said)}")
     return replace(
         question,
-        misconceptions=[replace(one, hint=hints.get(one.answer.__name__, one.hint)) for one in question.misconceptions],
+        misconceptions=[
+            replace(one, hint=hints.get(in_source(one.answer), one.hint)) for one in question.misconceptions
+        ],
         properties=[replace(one, says=statements.get(one.holds.__name__, one.says)) for one in question.properties],
     )
+
+
+def in_source(answer: Callable) -> str:
+    """The name by which a question's module defines a wrong answer, whichever of its variants this is."""
+    return getattr(answer, "of", answer).__name__

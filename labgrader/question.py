@@ -144,4 +144,5 @@ def with_argument(answer: Callable, name: str, value: object) -> Callable:
         return answer(*args, **{name: value})
 
     variant.__name__ = f"{answer.__name__}_{name}_{getattr(value, '__name__', value)}"
+    variant.of = answer  # with one hint for all its variants, in any language
     return variant
