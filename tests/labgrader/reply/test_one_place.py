@@ -72,7 +72,7 @@ def one_place_changed(question: Question) -> Iterator[tuple[str, int]]:
 def output_of(program: LiveProgram, args: tuple) -> object:
     """What a changed program gives; None if it stops, or takes long."""
     try:
-        with limited(0.4):
+        with limited(0.1):
             return program.call(args)[0]
     except (Exception, SystemExit, TimeIsUp):
         return None
