@@ -61,6 +61,11 @@ class Case:
     by_hand: bool
     edge: bool = False
 
+    @property
+    def is_usual(self) -> bool:
+        """Whether it is one by hand that stands at no end: shown before all others if it is wrong."""
+        return self.by_hand and not self.edge
+
 
 def expected_cases(question: Question, seed: int) -> list[Case]:
     """Give the cases by hand, the random ones that belong to the seed, then the edges by hand: the telling ones first.
@@ -102,24 +107,19 @@ def same_argument(a: object, b: object) -> bool:
     return bool(a == b or (a != a and b != b))
 
 
-def weight(args: tuple) -> int:
-    """How much a case has to be worked on: numbers in its arrays."""
-    return sum(np.size(a) for a in args)
+def weight(args: tuple, expected: object = ()) -> int:
+    """How much a case has to be worked on: numbers in its arrays, and in what comes out of it."""
+    return sum(np.size(a) for a in (*args, *parts(expected)))
 
 
 def is_heavy(args: tuple, expected: object) -> bool:
     """Whether so many numbers go into a case, or come out, that a slow program is not tried on it a thousand times."""
-    return weight(args) + weight(parts(expected)) > HEAVY
-
-
-def tells_enough(case: Case, is_wrong: bool) -> bool:
-    """Whether a case's output is wrong and may well be the one that is shown: then no large case tells more."""
-    return is_wrong and case.by_hand and not case.edge
+    return weight(args, expected) > HEAVY
 
 
 def is_large(case: Case) -> bool:
     """Whether a case has so many numbers that it is left out where a usual one is wrong."""
-    return weight(case.args) + weight(parts(case.expected)) > LARGE
+    return weight(case.args, case.expected) > LARGE
 
 
 def told_first(cases: Sequence[Case], wrong: Sequence[bool]) -> int | None:
@@ -128,7 +128,7 @@ def told_first(cases: Sequence[Case], wrong: Sequence[bool]) -> int | None:
     An edge is shown where no other case by hand is wrong, and at most half of the random ones, or only long ones, are.
     """
     at = [i for i, is_wrong in enumerate(wrong) if is_wrong]
-    usual = [i for i in at if cases[i].by_hand and not cases[i].edge]
+    usual = [i for i in at if cases[i].is_usual]
     drawn, edges = [i for i in at if not cases[i].by_hand], [i for i in at if cases[i].edge]
     short = [i for i in drawn if weight(cases[i].args) <= SHORT]
     mostly = 2 * len(drawn) > sum(not case.by_hand for case in cases)

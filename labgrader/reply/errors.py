@@ -186,10 +186,11 @@ def shapes_do_not_fit(found: re.Match, args: dict) -> str:
     said = " and ".join(f"{shape}{whose(shape, args)}" for shape in (a, b))
     masked = [(one, other) for one, other in ((a, b), (b, a)) if len(one) == 1 < len(other) and whose(other, args)]
     if masked and masked[0][0][0] not in masked[0][1] and masked[0][0][0] <= np.prod(masked[0][1]):
-        one, other = masked[0]
-        made = "perhaps what a mask left" if one[0] < np.prod(other) else "as a mask or ravel puts them in a row"
-        again = "mask both alike" if one[0] < np.prod(other) else "treat both alike"
-        return f"{one[0]} numbers, {made}, meet shape {other}{whose(other, args)}: {again}."
+        (count,), other = masked[0]
+        made, again = "perhaps what a mask left", "mask"
+        if count == np.prod(other):
+            made, again = "as a mask or ravel puts them in a row", "treat"
+        return f"{count} numbers, {made}, meet shape {other}{whose(other, args)}: {again} both alike."
     if len(a) != len(b):
         return f"Shapes {said} do not fit: is an axis missing, as [..., None] or keepdims=True gives it?"
     if sorted(a) == sorted(b):

@@ -309,7 +309,7 @@ def fulfilled(prop: Property, case: Case, got: object) -> bool:
 def which_cases(cases: Sequence[Case], right: Sequence[bool]) -> Sentence:
     """What to do with the case that is shown, and how many others are right; right: of each case."""
     shown = told_first(cases, [not is_right for is_right in right])
-    usual = [is_right for case, is_right in zip(cases, right, strict=True) if case.by_hand and not case.edge]
+    usual = [is_right for case, is_right in zip(cases, right, strict=True) if case.is_usual]
     if shown is not None and usual and all(usual):
         unusual = "What is unusual about the case above, a size, a number, a type?"
         drawn = "What does the case above have that they do not: a size, a number, a direction?"

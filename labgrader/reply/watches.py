@@ -154,9 +154,10 @@ def written_argument(program: LiveProgram, cases: Sequence[tuple[tuple, object]]
             program.answer(*locked)
         except ValueError as error:
             where = own_place(program, error.__traceback__) if "read-only" in str(error) else None
-            return (
-                Finding("writes", where[0], (line_that_changes(program, args, where[0], where[1]),)) if where else None
-            )
+            if where is None:
+                return None
+            piece, span, _ = where
+            return Finding("writes", piece, (line_that_changes(program, args, piece, span),))
         except Exception:
             return None
     return None

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 
-from labgrader.comparison import UNTRIED, Case, Problem, compare, expected_cases, is_large, tells_enough
+from labgrader.comparison import UNTRIED, Case, Problem, compare, expected_cases, is_large
 from labgrader.course import course
 from labgrader.program.slice import Program
 from labgrader.question import PUBLIC_SEED, Question
@@ -136,7 +136,7 @@ class Run:
         for case in cases:
             if brief and not enough and outputs:
                 last = cases[len(outputs) - 1]
-                enough = tells_enough(last, is_wrong(self.question, last, outputs[-1]))
+                enough = last.is_usual and is_wrong(self.question, last, outputs[-1])
             if enough and (is_large(case) or self.used_s - before > ENOUGH_S):
                 outputs.append(UNTRIED)
                 continue
