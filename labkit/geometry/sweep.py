@@ -115,9 +115,14 @@ def frame_from_views(views: Sequence[View], progress: Callable = lambda heights:
 
 def central_first(views: Sequence[View]) -> list[int]:
     """Numbers of the views, that first whose camera is nearest to all others: it shares most with them."""
-    C = np.array([view.T_base_cam[:3, 3] for view in views])
-    middle = int(np.linalg.norm(C[:, None] - C[None], axis=-1).sum(axis=1).argmin())
+    middle = int(_apart(views).sum(axis=1).argmin())
     return [middle, *(i for i in range(len(views)) if i != middle)]
+
+
+def _apart(views: Sequence[View]) -> Float[np.ndarray, "n n"]:
+    """Metres from each camera to each other one."""
+    C = np.array([view.T_base_cam[:3, 3] for view in views])
+    return np.linalg.norm(C[:, None] - C[None], axis=-1)
 
 
 def sweep(views: Sequence[View], progress: Callable = lambda heights: heights) -> Swept:
@@ -153,7 +158,7 @@ def sweep(views: Sequence[View], progress: Callable = lambda heights: heights) -
     certainty = _certainty(patterns.weight, by_pattern, by_colour, k)
     known = (certainty > SURE) & (k > 0) & (k < len(HEIGHTS) - 1) & np.isfinite(depth)
     known &= ~_unproven(known & (np.abs(height) > FLAT), total[np.abs(HEIGHTS).argmin()] - total.min(axis=0) >= PROOF)
-    known &= depth**2 <= COARSE * first.K[0, 0] * _widest(views)
+    known &= depth**2 <= COARSE * first.K[0, 0] * _apart(views)[0].max()  # a pixel means z^2 / (b f) at depth z
     depth = np.where(known, depth, 0.0).astype(np.float32)
     changed = changed_places(first, others, depth, colours, other_colours, gains)
     return Swept(depth, np.where(known, certainty, 0.0).astype(np.float32), changed)
@@ -172,12 +177,6 @@ def _unproven(raised: Bool[np.ndarray, "H W"], proof: Bool[np.ndarray, "H W"]) -
     count, number = cv2.connectedComponents(raised.astype(np.uint8), connectivity=4)
     pixels, proven = (np.bincount(number[raised & which], minlength=count) for which in (True, proof))
     return raised & ~proof & (proven < PROVEN * pixels)[number]
-
-
-def _widest(views: Sequence[View]) -> float:
-    """Metres from the first camera to the farthest of the others: z^2 / (b f) is what a pixel means at depth z."""
-    C = np.array([view.T_base_cam[:3, 3] for view in views])
-    return float(np.linalg.norm(C - C[0], axis=1).max())
 
 
 def plane_homography(first: View, other: View, height: float) -> Float[np.ndarray, "3 3"]:
