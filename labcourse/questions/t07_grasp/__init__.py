@@ -23,6 +23,12 @@ def cloud(rng):
     return np.stack([x, y, z], axis=1) + rng.uniform([0.4, -0.3, 0.05], [0.6, 0.3, 0.2])
 
 
+def axes_of_yaw(T):
+    """What a mistake has for a hand's axes y and x, seen from above: those of its yaw, as if it did not lean."""
+    yaw = np.arctan2(T[1, 1], T[0, 1])
+    return np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+
+
 def transform(R, origin):
     """The 4 x 4 matrix of a rotation and an origin."""
     T = np.eye(4)

@@ -12,6 +12,7 @@ from labcourse.questions.t07_grasp import (
     PLACES,
     TURNED,
     WITHIN,
+    axes_of_yaw,
     cloud,
     quarter_turns,
     transform,
@@ -204,9 +205,8 @@ def position_not_taken_off(P, T_base_grasp, half):
 
 @wrong("The hand may lean: an axis has three components, and a yaw knows two. Which column of T is the axis?")
 def axes_of_a_yaw(P, T_base_grasp, half):
-    yaw, off = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1]), P - T_base_grasp[:3, 3]
-    along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
-    return middle_and_width((off[:, :2] @ along)[np.abs(off[:, :2] @ across) <= half])
+    y, x = ((P - T_base_grasp[:3, 3])[:, :2] @ axis for axis in axes_of_yaw(T_base_grasp))
+    return middle_and_width(y[np.abs(x) <= half])
 
 
 @wrong("A point at the very edge of a pad is touched, too: is x < half true of it?")
@@ -224,8 +224,5 @@ def one_edge_alone(P, T_base_grasp, half):
 @wrong("The hand may lean: its pads need not be level. Which number of the x axis is left out?", by_yaw=(False, True))
 def pads_taken_as_level(P, T_base_grasp, half, by_yaw):
     _, y, _ = in_grasp(P, T_base_grasp)
-    pads = T_base_grasp[:2, 0]
-    if by_yaw:
-        yaw = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1])
-        pads = np.array([-np.sin(yaw), np.cos(yaw)])
+    pads = axes_of_yaw(T_base_grasp)[1] if by_yaw else T_base_grasp[:2, 0]
     return middle_and_width(y[np.abs((P - T_base_grasp[:3, 3])[:, :2] @ pads) <= half])

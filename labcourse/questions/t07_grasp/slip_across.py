@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.kinds import array, poses, rotation
-from labcourse.questions.t07_grasp import FACING_X, FROM_BELOW, LAST_ROW, PLACES, TURNED, WITHIN, transform
+from labcourse.questions.t07_grasp import FACING_X, FROM_BELOW, LAST_ROW, PLACES, TURNED, WITHIN, axes_of_yaw, transform
 from labgrader.question import Question, wrong
 
 
@@ -149,9 +149,9 @@ def transform_not_inverted(T_base_grasp, middle):
 
 @wrong("The hand may lean: an axis has three components, and a yaw knows two. Which column of T is the axis?")
 def axes_of_a_yaw(T_base_grasp, middle):
-    yaw, off = np.arctan2(T_base_grasp[1, 1], T_base_grasp[0, 1]), 1000.0 * (middle - T_base_grasp[:3, 3])
-    along = np.array([np.cos(yaw), np.sin(yaw)])
-    return np.abs(off[:2] @ along), np.abs(off[1] * along[0] - off[0] * along[1])
+    off = 1000.0 * (middle - T_base_grasp[:3, 3])
+    pushed, left = (np.abs(off[:2] @ axis) for axis in axes_of_yaw(T_base_grasp))
+    return pushed, left
 
 
 @wrong("That is the whole distance: what is pushed, and what lies along the approach, do not slip.")
