@@ -78,10 +78,10 @@ class Scene:
 
 def main(scenes: int = SCENES, heaps: int = HEAPS, kept: str = "") -> str:
     """Photograph scenes and score both kinds of depth; returns the tables. kept: a file to go on from."""
-    find = instance_finder()
+    find, known = instance_finder(), read_kept(kept)
     results = {
-        config: [scene(config, seed, find, kept) for seed in range(FIRST, FIRST + int(count))]
-        for config, count in (("any", scenes), ("clutter", heaps))
+        config: [known.get((config, seed)) or scene(config, seed, find, kept) for seed in range(FIRST, FIRST + int(n))]
+        for config, n in (("any", scenes), ("clutter", heaps))
     }
     parts = [part for config, looked in results.items() if looked for part in tables(config, looked)]
     if REAL.is_dir():
@@ -91,16 +91,18 @@ def main(scenes: int = SCENES, heaps: int = HEAPS, kept: str = "") -> str:
     return "\n\n".join(parts)
 
 
+def read_kept(kept: str) -> dict[tuple[str, int], Scene]:
+    """The scenes that `scene` wrote to a file, by config and seed; none where there is no file."""
+    found = {}
+    for line in map(json.loads, Path(kept).read_text().splitlines() if kept and Path(kept).is_file() else []):
+        key, ways = (line.pop("config"), line.pop("seed")), line.pop("ways")
+        ways = {way: Looked(**one | {"scores": InstanceScores(**one["scores"])}) for way, one in ways.items()}
+        found[key] = Scene(ways=ways, **line)
+    return found
+
+
 def scene(config: str, seed: int, find: Callable, kept: str = "") -> Scene:
-    """Photograph and judge a scene, or take it from a file of those that were judged, and write it there."""
-    lines = Path(kept).read_text().splitlines() if kept and Path(kept).is_file() else []
-    for line in map(json.loads, lines):
-        if [line.pop("config"), line.pop("seed")] == [config, seed]:
-            ways = {
-                way: Looked(**one | {"scores": InstanceScores(**one["scores"])})
-                for way, one in line.pop("ways").items()
-            }
-            return Scene(ways=ways, **line)
+    """Photograph and judge a scene, and add it to a file of those that were judged."""
     found = judged(photograph(seed, config), find)
     if kept:
         with Path(kept).open("a") as file:
