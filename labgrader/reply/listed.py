@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from labgrader.comparison import Case, Problem, alike, differences, is_heavy, parts, trusted
+from labgrader.comparison import Case, Problem, alike, differences, is_heavy, parts, trusted, weight
 from labgrader.question import Misconception, Question, Untold
 
+HEAVY_ONES = 2  # of the heavy cases, the smallest, in which it is known what listed mistakes give
 Listed = dict[bytes, frozenset[int]]  # of one case: fingerprints of outputs, and which listed mistakes give them
 
 
@@ -71,16 +72,21 @@ def output_of(misconception: Misconception, args: tuple) -> object:
         return Problem("exception", type(error).__name__)
 
 
-def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed]:
-    """What the listed mistakes of a question give in each case but the heavy ones; those that raise give nothing."""
-    told: list[dict[bytes, set[int]]] = [{} for _ in cases]
-    light = [(found, case) for found, case in zip(told, cases, strict=True) if not is_heavy(case.args, case.expected)]
+def listed_in(question: Question, cases: Sequence[Case]) -> list[Listed | None]:
+    """What the listed mistakes of a question give in each case, None in heavy ones but the smallest."""
+    heavy = [k for k, case in enumerate(cases) if is_heavy(case.args, case.expected)]
+    left_out = sorted(heavy, key=lambda k: weight(cases[k].args, cases[k].expected))[HEAVY_ONES:]
+    return [None if k in left_out else listed_in_case(question, case) for k, case in enumerate(cases)]
+
+
+def listed_in_case(question: Question, case: Case) -> Listed:
+    """What the listed mistakes of a question give in a case; those that raise give nothing."""
+    told: dict[bytes, set[int]] = {}
     for number, mistake in enumerate(question.misconceptions):
-        for found, case in light:
-            output = output_of(mistake, case.args)
-            if output is not None and not isinstance(output, Problem):
-                found.setdefault(fingerprint(output), set()).add(number)
-    return [{key: frozenset(numbers) for key, numbers in found.items()} for found in told]
+        output = output_of(mistake, case.args)
+        if output is not None and not isinstance(output, Problem):
+            told.setdefault(fingerprint(output), set()).add(number)
+    return {key: frozenset(numbers) for key, numbers in told.items()}
 
 
 def fingerprint(output: object) -> bytes:

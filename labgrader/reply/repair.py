@@ -54,14 +54,14 @@ class Search:
 
     right: function (expected, got) -> bool; off: function (expected, got) -> how far each of its numbers is off, 0 if
     it is right; None for an output of another form. listed: what the question's listed mistakes give in each case, as
-    `Listed`.
+    `Listed`; None where nobody knows.
     """
 
     program: LiveProgram
     right: Callable[[object, object], bool]
     off: Callable[[object, object], np.ndarray | None]
     end: float
-    listed: "dict[int, Listed]"
+    listed: dict[int, Listed | None]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def repairs(
     fresh: Callable[[], Cases],
     right: Callable[[object, object], bool],
     off: Callable[[object, object], np.ndarray | None],
-    listed: Sequence[Listed] = (),
+    listed: Sequence[Listed | None] = (),
 ) -> list[Finding]:
     """Find the places of a program whose mutation makes all cases right, the best first.
 
@@ -148,8 +148,9 @@ def one_repair(
     """Try single mutations, the smallest first, until those of the next cost are much larger than one that repairs.
 
     Gives the repairs, and the best mutation beside a listed mistake: with it the program gives what that one does, the
-    case that is shown is right, or closer in each of its numbers, and no case that was right is wrong: the listed
-    mistake would have spoiled it. In heavy cases it gives what that one does, too: a few small ones agree by chance.
+    case that is shown is right, or at least closer in each of its numbers, and no case that was right is wrong: the
+    listed mistake would have spoiled it. In heavy cases it gives what that one does, too: a few small ones agree by
+    chance.
     """
     found: dict[Finding, tuple] = {}  # with what decides which one is told first
     with_listed: dict[Finding, tuple] = {}
@@ -166,10 +167,10 @@ def one_repair(
                     found[trial.finding] = trial.rank
                 elif runs and not found and trial.mutation.cost <= DEAREST_BESIDE and not leaves_out(trial.mutation):
                     number = listed_mistake(search, cases)
-                    closer = number is not None and is_closer(distance(search, shown), before)
-                    spoils_none = closer and all(passes(search, case) for case in right_before)
+                    now = None if number is None else distance(search, shown)
+                    spoils_none = is_closer(now, before) and all(passes(search, case) for case in right_before)
                     if spoils_none and gives_in_large_ones_too(search, number, more.known):
-                        with_listed[replace(trial.finding, listed=number)] = trial.rank
+                        with_listed[replace(trial.finding, listed=number)] = (now.any(), *trial.rank)
     return sorted(found, key=found.get), sorted(with_listed, key=with_listed.get)[:1]
 
 
@@ -179,10 +180,12 @@ def leaves_out(mutation: Mutation) -> bool:
 
 
 def listed_mistake(search: Search, cases: Cases) -> int | None:
-    """The number of a listed mistake that gives in all cases what the program gives now; None if there is none."""
+    """The number of a listed mistake that gives what the program gives now in all cases of which that is known."""
     numbers: frozenset[int] | None = None
     for case in cases:
-        given = search.listed.get(id(case), {}).get(fingerprint(outcome(search, case[0])[0]), frozenset())
+        if (listed := search.listed.get(id(case))) is None:
+            continue
+        given = listed.get(fingerprint(outcome(search, case[0])[0]), frozenset())
         numbers = given if numbers is None else numbers & given
         if not numbers:
             return None
@@ -192,8 +195,10 @@ def listed_mistake(search: Search, cases: Cases) -> int | None:
 def gives_in_large_ones_too(search: Search, number: int, cases: Cases) -> bool:
     """Whether the program gives what a listed mistake does in more cases, but for those for which it takes too long."""
     for case in cases:
+        if (listed := search.listed.get(id(case))) is None:
+            continue
         output, unaltered = outcome(search, case[0])
-        if unaltered is not None and number not in search.listed.get(id(case), {}).get(fingerprint(output), ()):
+        if unaltered is not None and number not in listed.get(fingerprint(output), ()):
             return False
     return True
 

@@ -45,7 +45,7 @@ class Look:
         name: str,
         pieces: Sequence[tuple[str, str]],
         public: Pairs,
-        listed: Sequence[Listed] = (),
+        listed: Sequence[Listed | None] = (),
     ):
         if canonical:
             namespace = {"np": np}

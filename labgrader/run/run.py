@@ -50,8 +50,8 @@ def more_public_cases(question: Question) -> tuple[Case, ...]:
 
 
 @functools.cache
-def listed_mistakes(question: Question) -> list[Listed]:
-    """What the listed mistakes give in the public cases; computed once in a process."""
+def listed_mistakes(question: Question) -> list[Listed | None]:
+    """What the listed mistakes give in the public cases, as `listed_in` does; computed once in a process."""
     cases = public_cases(question)
     with reference_lock:
         return listed_in(question, cases)

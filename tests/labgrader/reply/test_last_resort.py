@@ -17,8 +17,8 @@ CASES = [(np.array([1.0, 5.0]), np.array([2.0, 3.0])), (np.array([4.0, 0.5, 7.0]
 FRESH = [(np.array([-3.0, 2.0]), np.array([0.25, -8.0]))]
 
 
-def found(reference, source, shown=CASES, fresh=FRESH, mistake=None):
-    """What repair finds in a program, with the parts that it marks; mistake: a listed one."""
+def found(reference, source, shown=CASES, fresh=FRESH, mistakes=()):
+    """What repair finds in a program, with the parts that it marks; mistakes: the listed ones."""
 
     def off(expected, got):
         same = np.shape(expected) == np.shape(got)
@@ -28,7 +28,7 @@ def found(reference, source, shown=CASES, fresh=FRESH, mistake=None):
         return off(expected, got) is not None and not off(expected, got).any()
 
     cases, more = ([(args, reference(*args)) for args in some] for some in (shown, fresh))
-    listed = [{fingerprint(mistake(*args)): frozenset({0})} for args in shown] if mistake else ()
+    listed = [{fingerprint(mistake(*args)): frozenset({k}) for k, mistake in enumerate(mistakes)} for args in shown]
     pieces = ("quiet", "import numpy as np"), ("f", source)
     lines = source.split("\n")
     return [
@@ -79,8 +79,8 @@ def test_a_mark_beside_a_listed_mistake_spoils_no_case_that_was_right():
     larger = lambda a, b: 1.0 * (a > b)  # noqa: E731
     wrong = [(np.array([1]), np.array([9])), (np.array([3, 1, 2, 7]), np.array([5, 9, 2, 4]))]
     more = [(np.array([7, 8, 0, 9, 9, 4]), np.array([9, 9, 9, 9, 0, 4]))]
-    assert found(differs, source, wrong, more, larger) == [("comparison", ["!="])]
-    assert found(differs, source, [*wrong, (np.array([1]), np.array([2]))], more, larger) == []
+    assert found(differs, source, wrong, more, [larger]) == [("comparison", ["!="])]
+    assert found(differs, source, [*wrong, (np.array([1]), np.array([2]))], more, [larger]) == []
 
 
 def test_a_mark_beside_a_listed_mistake_is_told_where_large_cases_agree():
@@ -89,8 +89,18 @@ def test_a_mark_beside_a_listed_mistake_is_told_where_large_cases_agree():
     small = [(np.array([1]), np.array([9])), (np.array([3, 1, 2, 7]), np.array([5, 9, 2, 4]))]
     large = [(np.arange(HEAVY) % 7, np.arange(HEAVY) % 5)]
     same, other = lambda a, b: 1.0 * (a > b), lambda a, b: 1.0 * (a > b) * (len(a) < HEAVY)
-    assert found(differs, source, [*small, *large], mistake=same) == [("comparison", ["!="])]
-    assert found(differs, source, [*small, *large], mistake=other) == []
+    assert found(differs, source, [*small, *large], mistakes=[same]) == [("comparison", ["!="])]
+    assert found(differs, source, [*small, *large], mistakes=[other]) == []
+
+
+def test_a_mark_with_which_the_case_shown_is_right_is_told_before_one_that_only_brings_it_closer():
+    """1 * 1 is closer to 1.4 than 1 + 1 is, and so large an operator comes before a name."""
+    shown = [(np.array([1.0]), np.array([0.4])), (np.array([9.0, 3.0]), np.array([1.0, 2.0]))]
+    without_9, squares = np.add, lambda a, b: a * a
+    answer = lambda a, b: a + b + 7 * (a == 9)  # noqa: E731
+    source = "def f(a, b):\n    return a + a"
+    assert found(answer, source, shown, mistakes=[squares]) == [("operator", ["+"])]
+    assert found(answer, source, shown, mistakes=[squares, without_9])[0][0] == "name"
 
 
 @pytest.mark.parametrize(

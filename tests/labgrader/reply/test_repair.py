@@ -90,6 +90,41 @@ def test_an_answer_is_told_what_its_reader_can_use(answer):
         assert mended(question, pieces, next(f for f in found if f.kind == answer["kind"]))
 
 
+TWO_MISTAKES = [
+    (
+        "01_labels.class_shares",
+        "def class_shares(y, C):\n    j = y[(y > 0) & (y != 255)]\n"
+        "    return np.bincount(j, minlength=C) / max(j.size, 1)",
+        ["2: >"],
+        "Which images show the class at all?",
+    ),
+    (
+        "04_iou.iou",
+        'def iou(n):\n    with np.errstate(all="ignore"):\n'
+        "        return np.nan_to_num(np.diagonal(n) / (n.sum(axis=0) + n.sum(axis=1)))",
+        ["3: n.sum(axis=0)"],
+        "what would a score of 0 say",
+    ),
+    (
+        "09_other_stacks.enlarge",
+        "def enlarge(labels, size):\n    H, W = size\n    h, w = labels.shape\n"
+        "    return np.array([[labels[v * h // H, u * w // W] for u in range(W)] for v in range(H)])",
+        ["2: H", "2: W"],
+        "where is its centre?",
+    ),
+]  # a place, and a listed mistake beside it, in questions that have heavy cases
+
+
+@pytest.mark.parametrize("name, source, marked, says", TWO_MISTAKES, ids=[name for name, *_ in TWO_MISTAKES])
+def test_a_place_is_marked_beside_a_listed_mistake(name, source, marked, says):
+    question = find(name)
+    pieces = ("quiet", "import numpy as np"), (question.function, source)
+    verdict = judge(question, LiveProgram(question.function, pieces).answer, PUBLIC_SEED)
+    sentence = next(sentences(question, verdict.cases, verdict.outputs, pieces, looked_at(verdict, pieces)))
+    assert [f"{line.number}: {line.text[a:b]}" for line in sentence.marked for a, b in line.parts] == marked
+    assert sentence.says.startswith("Two things are wrong") and says in sentence.says
+
+
 @pytest.mark.parametrize("answer", [a for a in ANSWERS if a["kind"] == "cast"], ids=lambda a: a["thought"])
 def test_values_that_another_type_would_mend_are_not_called_right(answer):
     question, pieces = find(answer["question"]), pieces_of(answer)
