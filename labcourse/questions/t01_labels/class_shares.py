@@ -76,6 +76,11 @@ def of_all_pixels(y, C):
     return counts(y, C).sum(axis=0) / y.size
 
 
+@wrong("You return counts: of which pixels is each of them a share?")
+def counts_alone(y, C):
+    return counts(y, C).sum(axis=0)
+
+
 @wrong("You divide by all pixels of the images that show a class: which of them were never judged?")
 def unjudged_counted(y, C):
     return shares(counts(y, C), np.full(len(y), y[0].size))

@@ -54,17 +54,12 @@ def mixed(p, eps):
 
 
 @wrong(
-    "That is the lesson's cost, with a floor. Here nothing is clipped: mix p with the blind guess, then take the log."
+    "That is the lesson's cost, with a floor. Here nothing is clipped: mix p with the blind guess, then take the log.",
+    floor=("eps", "eps per class", "eps, then scaled"),
 )
-def floor_of_the_lesson(p, eps):
-    return -np.log(np.maximum(p, eps))
-
-
-@wrong(
-    "That is the lesson's cost, with a floor. Here nothing is clipped: mix p with the blind guess, then take the log."
-)
-def floor_of_one_class(p, eps):
-    return -np.log(np.maximum(p, eps / p.shape[-1]))
+def floor_of_the_lesson(p, eps, floor):
+    q = np.maximum(p, eps / p.shape[-1] if floor == "eps per class" else eps)
+    return -np.log(q / q.sum(axis=-1, keepdims=True) if "scaled" in floor else q)
 
 
 @wrong("Nothing is clipped here, at either end: mix p with the blind guess, then take the log.", end=("eps", "0"))

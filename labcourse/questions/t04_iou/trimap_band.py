@@ -185,10 +185,16 @@ def unjudged_like_any_class(y, width):
     return np.any([n != y for n in near], axis=0)
 
 
-@wrong("With 255 between them, two classes can be near and not touch: from where does your band grow?")
-def grown_from_where_classes_touch(y, width):
-    touching = np.where(trimap_band(y, 1), 1, 255)
-    return banded(touching, max(width - 1, 1), square(width - 1), lambda near, _: near == 1) & (y != 255)
+@wrong(
+    "With 255 between them, two classes can be near and not touch: from where does your band grow?",
+    over=("every pixel", "pixels of a class"),
+)
+def grown_from_where_classes_touch(y, width, over):
+    band = trimap_band(y, 1)
+    for _ in range(width - 1):
+        band = banded(np.where(band, 1, 255), 1, square(1), lambda near, _: near == 1)
+        band &= (y != 255) | (over == "every pixel")
+    return band & (y != 255)
 
 
 @wrong("Labels go up to 254, and 8 bits with a sign end at 127: what becomes of the label 254?")
