@@ -1,7 +1,7 @@
 """A limit on the CPU time of a call in this process, on every system: `TimeIsUp` is raised in what takes longer.
 
 It reaches Python's own loops. A compiled function that does not come back is ended with its process, by whoever started
-that (`labgrader.run.channel`).
+that (`labgrader.run.channel`); NumPy's that are known not to come back from infinite numbers raise instead (`finite`).
 """
 
 import contextlib
@@ -9,9 +9,12 @@ import ctypes
 import functools
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+
+import numpy as np
 
 TICK_S = 0.02
+ENDLESS = ("svd", "pinv", "lstsq")  # of np.linalg: LAPACK's search for singular vectors
 
 
 class TimeIsUp(BaseException):
@@ -72,3 +75,28 @@ def limited(seconds: float) -> Iterator[None]:
         yield
     finally:
         watching.stop()
+
+
+@contextlib.contextmanager
+def finite() -> Iterator[None]:
+    """Functions of np.linalg that may not come back from a matrix with infinite entries raise LinAlgError of one."""
+    before = {name: getattr(np.linalg, name) for name in ENDLESS}
+    for name, function in before.items():
+        setattr(np.linalg, name, of_finite(function))
+    try:
+        yield
+    finally:
+        for name, function in before.items():
+            setattr(np.linalg, name, function)
+
+
+def of_finite(function: Callable) -> Callable:
+    """A function of a matrix that raises LinAlgError where an entry is infinite."""
+
+    @functools.wraps(function)
+    def wrapper(a, *args, **kwargs):
+        if np.isinf(a).any():
+            raise np.linalg.LinAlgError("infinite entries")
+        return function(a, *args, **kwargs)
+
+    return wrapper

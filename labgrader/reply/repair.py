@@ -25,7 +25,7 @@ import numpy as np
 
 from labgrader.comparison import is_heavy, quiet, weight
 from labgrader.program.live import LiveProgram, defines
-from labgrader.reply.alarm import ENDS, TimeIsUp, alarm, limited
+from labgrader.reply.alarm import ENDS, TimeIsUp, alarm, finite, limited
 from labgrader.reply.finding import REPAIRS, Finding
 from labgrader.reply.listed import Listed, fingerprint
 from labgrader.reply.mutation import Mutation, mutations
@@ -99,7 +99,7 @@ def repairs(
     public ones. right, off: as in `Search`; listed: one for each of the cases. Empty if there is none, or if the time
     is up.
     """
-    with quiet():
+    with quiet(), finite():
         try:
             with limited(MOST_S):
                 program = LiveProgram(name, pieces)

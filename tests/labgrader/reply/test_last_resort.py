@@ -56,6 +56,14 @@ def test_a_program_that_takes_long_on_its_cases_is_not_searched(monkeypatch):
     assert found(np.multiply, source) == []
 
 
+def test_a_change_from_which_lapack_would_not_come_back_does_not_end_the_search():
+    """b / a has infinite entries, in places where the search for singular vectors has no end."""
+    a, b = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 3.0, 2.0]]), np.array([1e-4, 0.3, 1.0])
+    reference = lambda a, b: np.abs(np.linalg.svd(a * b[:, None])[2])  # noqa: E731
+    source = "def f(a, b):\n    return np.abs(np.linalg.svd(a / b[:, None])[2])"
+    assert ("operator", ["/"]) in found(reference, source, [(a, b)], fresh=[(a.T, b)])
+
+
 @pytest.mark.parametrize(
     "now, before, closer",
     [
