@@ -29,7 +29,8 @@ another machine they differ, while their ratios hold. Each section says when it 
 """
 SECTION = "<!-- bench: {} -->"
 QUIET_LOAD, PATIENCE_S = 0.5, 900.0
-ONLY_BY_NAME = {"depth", "ablations", "phone"}  # train six networks in 90 minutes, five in 30; draw 140 photographs
+# Train six networks in 90 minutes, five in 30; draw 140 photographs; follow the rays of 224.
+ONLY_BY_NAME = {"depth", "ablations", "phone", "mirrors"}
 NEEDS = {"photographs": HERE.parents[1] / "shared" / "real"}  # folders that are not everywhere
 # Flags of /proc/cpuinfo that decide how fast networks and kernels run, in words.
 CPU_FLAGS = {"avx2": "AVX2", "avx512f": "AVX-512", "avx512_bf16": "AVX-512 bf16", "amx_bf16": "AMX bf16"}

@@ -5,7 +5,8 @@ agree. They agree in two ways. Patterns agree however each was exposed (normalis
 tell the height sharply, where there is a pattern. Colours agree once exposures are matched, and tell the height roughly
 wherever another colour is near: the middle of a white mug does not lie on the table, for at that height some of the
 photographs show table. Where neither tells, neighbours (semi-global matching, Hirschmueller 2008) and the table decide.
-Depth is unknown where a piece seems to rise from the table and nothing proves it, and where parallax is too small.
+Depth is unknown where a piece seems to rise from the table and nothing proves it, where parallax is too small, and
+where photographs agree better on something far below the table: that is a reflection, or lies beside the table.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,6 +39,10 @@ SURE = 0.5  # certainty under which depth is not known
 FLAT = 0.012  # metres from the table: what lies beyond must be proven
 PROOF, PROVEN = 0.4, 0.3  # by so much a height must be cheaper than the table's, at so large a share of a raised piece
 COARSE = 0.03  # metres: where one pixel of the widest parallax means more, depth is not known
+SMALL = 160  # pixels of the longer side of the pictures in which what lies below the table is looked for,
+UNDER = 0.03, 30.0, 40  # from so many metres below it to so many, in so many steps of equal parallax;
+DEEPER = 0.1  # it is there where it costs so much less than all heights,
+SUNK = 0.5  # and so is a raised piece of which so large a share is within a window of such a place
 LEAST_FITTED, REFLECTION = 50, 15  # points that exposure is fitted to; side of a window of these, 120 pixels wide
 DARK, BRIGHT = 8.0, 247.0  # grey levels beyond which a sensor tells no exposure
 HIDDEN = 0.015  # metres that a point must lie behind another to be hidden by it
@@ -128,7 +133,7 @@ def _apart(views: Sequence[View]) -> Float[np.ndarray, "n n"]:
 def sweep(views: Sequence[View], progress: Callable = lambda heights: heights) -> Swept:
     """Find the depth of the first view's pixels from at least two others of the same table, all of one size.
 
-    progress: wraps the heights while they are tried, such as tqdm. Takes about 5 s of one core and 0.5 GB for seven
+    progress: wraps the heights while they are tried, such as tqdm. Takes about 6 s of one core and 0.5 GB for seven
     views of 640 x 480. Raises ValueError for fewer than three views, or views of several sizes. Topic 06, parallax.
     """
     require("views", len(views) >= LEAST_VIEWS, f"at least {LEAST_VIEWS}", len(views))
@@ -158,6 +163,8 @@ def sweep(views: Sequence[View], progress: Callable = lambda heights: heights) -
     certainty = _certainty(patterns.weight, by_pattern, by_colour, k)
     known = (certainty > SURE) & (k > 0) & (k < len(HEIGHTS) - 1) & np.isfinite(depth)
     known &= ~_unproven(known & (np.abs(height) > FLAT), total[np.abs(HEIGHTS).argmin()] - total.min(axis=0) >= PROOF)
+    below, near = _below(views)
+    known &= ~(below | (_share_of_piece(known & (np.abs(height) > FLAT), near) > SUNK))
     known &= depth**2 <= COARSE * first.K[0, 0] * _apart(views)[0].max()  # a pixel means z^2 / (b f) at depth z
     depth = np.where(known, depth, 0.0).astype(np.float32)
     changed = changed_places(first, others, depth, colours, other_colours, gains)
@@ -174,9 +181,14 @@ def _unproven(raised: Bool[np.ndarray, "H W"], proof: Bool[np.ndarray, "H W"]) -
     >>> _unproven(raised, np.array([[True, False, False, False, False, False]])).tolist()
     [[False, False, False, False, True, True]]
     """
-    count, number = cv2.connectedComponents(raised.astype(np.uint8), connectivity=4)
-    pixels, proven = (np.bincount(number[raised & which], minlength=count) for which in (True, proof))
-    return raised & ~proof & (proven < PROVEN * pixels)[number]
+    return raised & ~proof & (_share_of_piece(raised, proof) < PROVEN)
+
+
+def _share_of_piece(pieces: Bool[np.ndarray, "H W"], which: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
+    """For each pixel, of how large a share of its piece `which` is true; 0 outside of pieces."""
+    count, number = cv2.connectedComponents(pieces.astype(np.uint8), connectivity=4)
+    pixels, true = (np.bincount(number[pieces & each], minlength=count) for each in (True, which))
+    return (true / np.maximum(pixels, 1))[number]
 
 
 def plane_homography(first: View, other: View, height: float) -> Float[np.ndarray, "3 3"]:
@@ -213,14 +225,19 @@ class Patterns:
         near = _moments(gray, GRAIN_WINDOW)[1]
         self.weight = near**2 / (near**2 + GRAIN**4)
 
-    def cost(self, gray: Float32[np.ndarray, "H W"], M: Float[np.ndarray, "3 3"]) -> Float32[np.ndarray, "H W"]:
-        """What it costs to say that another view, warped by M, shows the same: 1 - correlation, at most 1."""
+    def cost(
+        self, gray: Float32[np.ndarray, "H W"], M: Float[np.ndarray, "3 3"], outside: float = NEUTRAL
+    ) -> Float32[np.ndarray, "H W"]:
+        """What it costs to say that another view, warped by M, shows the same: 1 - correlation, at most 1.
+
+        outside: the cost where that view ends.
+        """
         seen = _warped(gray, M, self.gray.shape[::-1])
         there = np.maximum(seen, 0.0)
         mean, spread = _moments(there, WINDOW)
         both = cv2.boxFilter(self.gray * there, -1, (WINDOW, WINDOW)) - self.mean * mean
         off = np.minimum(1.0 - both / np.sqrt((self.spread + 1.0) * (spread + 1.0)), 1.0)
-        return np.where(seen > OUTSIDE / 2.0, NEUTRAL + self.weight * (off - NEUTRAL), NEUTRAL)
+        return np.where(seen > OUTSIDE / 2.0, NEUTRAL + self.weight * (off - NEUTRAL), outside)
 
 
 def exposure_gain(
@@ -323,6 +340,41 @@ def semi_global(
     return total / 4.0
 
 
+def _below(views: Sequence[View]) -> tuple[Bool[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
+    """Pixels of the first view whose patterns agree better somewhere below the table than at any height, and those
+    within a window of them, where patterns are mixed.
+
+    That is what a mirror shows, or a floor. Colours are not asked: a lamp's shine agrees below a plain table, too.
+    """
+    H, W = views[0].rgb.shape[:2]
+    times = max(1, round(max(H, W) / SMALL))
+    first, *others = (_smaller(view, times) for view in views)
+    patterns, seen = Patterns(_gray(first)), [_gray(view) for view in others]
+    up, (near, far, steps) = first.T_base_cam[2, 3], UNDER
+    under = up - 1.0 / np.linspace(1.0 / (up + far), 1.0 / (up + near), steps)
+    heights = [*under, *HEIGHTS[::2]]
+    costs = np.empty((*first.rgb.shape[:2], len(heights)), np.float32)
+    for k, height in enumerate(heights):
+        M = [plane_homography(first, view, height) for view in others]
+        outside = 1.0 if k < steps else NEUTRAL  # what is below the table must be seen
+        each = [patterns.cost(*at, outside) for at in zip(seen, M, strict=True)]
+        costs[..., k] = mean_of_best(each, SEEN_BY[0])
+    total = semi_global(costs, first.rgb.astype(np.float32))
+    deeper = total[..., steps:].min(axis=-1) - total[..., :steps].min(axis=-1) > DEEPER
+    deeper = cv2.morphologyEx(deeper.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3)))
+    empty = cv2.dilate(_empty(views[0].rgb), np.ones(2 * [times * (WINDOW + 1) + 1])) > 0
+    grown = [cv2.dilate(deeper, np.ones((side, side))) for side in (3, WINDOW)]
+    return tuple((cv2.resize(one, (W, H), interpolation=cv2.INTER_NEAREST) > 0) & ~empty for one in grown)
+
+
+def _empty(rgb: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
+    """1 at the picture's border, and where it is black from there on: a lens that was taken out leaves such a strip,
+    which goes along with the camera, as something infinitely far away does."""
+    black = np.pad((rgb.max(axis=-1) == 0).astype(np.uint8), 1, constant_values=1)
+    number = cv2.connectedComponents(black, connectivity=4)[1]
+    return (number == number[0, 0]).astype(np.uint8)[1:-1, 1:-1]
+
+
 def _between(total: Float32[np.ndarray, "N H W"], k) -> Float[np.ndarray, "H W"]:
     """The height of the lowest cost, between two steps: of the parabola through it and its neighbours."""
     inner = np.clip(k, 1, len(HEIGHTS) - 2)
@@ -401,6 +453,14 @@ def _halved(view: View) -> Float32[np.ndarray, "h w 3"]:
     """Colours at half size, whose noise is half as large."""
     H, W = view.rgb.shape[:2]
     return cv2.resize(view.rgb.astype(np.float32), (W // 2, H // 2), interpolation=cv2.INTER_AREA)
+
+
+def _smaller(view: View, times: int) -> View:
+    """The view in a picture that is so many times smaller."""
+    H, W = view.rgb.shape[:2]
+    size = W // times, H // times
+    small = cv2.resize(view.rgb, size, interpolation=cv2.INTER_AREA)
+    return View(small, resized_K(view.K, (W, H), size), view.T_base_cam)
 
 
 def _upsampled(costs: Float32[np.ndarray, "N h w"], size: tuple[int, int]) -> Float32[np.ndarray, "N H W"]:
