@@ -1,8 +1,9 @@
 """The course's notebooks, for the tests that look into them; as a plugin of pytest, nbval and what it compares.
 
 Outputs of lessons and solutions are compared with the committed ones. Labs have none: they run as students get them,
-but on fewer scenes and for fewer steps of training; the others do so where no compared output shows it. Each
-notebook has a kernel of its own, which is forked from one that has imported what they import.
+but on fewer scenes, for fewer steps of training and without pictures; the others have fewer scenes and steps where no
+compared output shows it. Each notebook has a kernel of its own, which is forked from one that has imported what they
+import.
 """
 
 import re
@@ -74,6 +75,7 @@ FEWER_IN_LABS = {
     # Its pictures lie in a folder that its solution, which runs at the same time, does not share.
     "10_capstone": {"else (12, 10, 8)": "else (4, 2, 2)", '"small")': '"few")'},
 }
+NO_PICTURES = {"plt.show()": 'plt.close("all")'}  # solutions draw the same ones
 
 
 def imported() -> list[str]:
@@ -123,6 +125,6 @@ def pytest_itemcollected(item):
         return
     changes = FEWER.get(item.path.stem, {})
     if item.path.is_relative_to(ROOT / "labs"):
-        changes = changes | FEWER_IN_LABS.get(item.path.stem, {})
+        changes = changes | FEWER_IN_LABS.get(item.path.stem, {}) | NO_PICTURES
     for many, few in changes.items():
         item.cell.source = item.cell.source.replace(many, few)

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
 OTHERS = """numpy torch cv2 matplotlib.pyplot scipy.spatial.transform scipy.ndimage scipy.optimize numba pybullet
     trimesh typer tqdm.auto plotly.graph_objects PIL.Image psutil ruamel.yaml rosbags.highlevel cloudpickle
@@ -85,6 +87,7 @@ for words in (["grade", "04_iou"], ["grades", "04_iou"], ["texts", "04_iou"], ["
         assert b"labkit " + name + b" needs Linux" in done.stderr, done.stderr
 
 
+@pytest.mark.nightly
 def test_a_console_of_code_page_1252_gets_lines_and_no_traceback():
     program = "import labcli.cli\nsys.argv = ['labkit', 'doctor']\ntry: labcli.cli.main()\nexcept SystemExit: pass"
     done = as_on_windows(program, OTHERS, PYTHONIOENCODING="cp1252", PYTHONUTF8="0")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from at_night import others_at_night
 
 import data_gen
 from data_gen import clutter, dataset
@@ -77,9 +78,7 @@ def test_no_family_is_both_target_and_obstacle_and_colours_do_not_tell():
     assert np.abs(means[TARGET] - means[OBSTACLE]).max() < 0.06
 
 
-@pytest.mark.parametrize(
-    "config", ["train", *(pytest.param(config, marks=pytest.mark.nightly) for config in ("wide", "any"))]
-)
+@pytest.mark.parametrize("config", others_at_night(["train", "wide", "any"]))
 def test_training_shows_nothing_that_hard_asks_about(config):
     scenes = {c: drawn(c) for c in (config, "hard")}
     things = {c: [thing for spec in scenes[c] for thing in spec.objects] for c in scenes}
@@ -96,7 +95,7 @@ def test_training_shows_nothing_that_hard_asks_about(config):
         assert all(height < high_from and not low_from < height < low_to for height in ours)
 
 
-@pytest.mark.parametrize("ours_is", ["wide", pytest.param("any", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("ours_is", others_at_night(["wide", "any"]))
 def test_wide_has_none_of_hards_shapes(ours_is):
     """Shapes are told apart by the edges of their boxes, or by their parts."""
     things = {"wide": ours_is, "hard": "hard"}
@@ -155,7 +154,7 @@ def test_statistics_of_test_are_as_promised():
     assert s.target_pixels <= 0.02
 
 
-@pytest.mark.parametrize("config", ["messy", *(pytest.param(c, marks=pytest.mark.nightly) for c in ("clutter", "bin"))])
+@pytest.mark.parametrize("config", others_at_night(["messy", "clutter", "bin"]))
 def test_crowds_are_repeatable_and_what_holds_them_is_no_thing(config):
     """1 to 20 things of many sizes; walls, floors of bins and shelves have no instance, and only floors are surface."""
     specs = [data_gen.sample_scene(seed, config) for seed in range(12)]
@@ -313,7 +312,7 @@ def distances(folder: Path) -> list[float]:
     return [float(np.linalg.norm(np.mean(places, axis=0))) / 1000.0 for places in targets]
 
 
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("workers", others_at_night([1, 2]))
 def test_a_camera_of_ones_own_holds_in_every_process_and_is_part_of_the_request(workers, tmp_path):
     """A far camera stands far away in each worker, too, and no later call takes its frames for those of another."""
     far, out, how = {"distance": (2.0, 2.1)}, tmp_path / "far", {"size": SIZE, "progress": False}

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+from at_night import others_at_night
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
@@ -330,7 +331,7 @@ def test_a_pose_beside_a_picture_of_a_folder_is_taken(shot, own, tmp_path, capsy
         PictureFolder(own)
 
 
-@pytest.mark.parametrize("value", [1, 2, 3, 200, 255, 3000])
+@pytest.mark.parametrize("value", others_at_night([1, 2, 3, 200, 255, 3000], by_day=(1, 2, 3000)))
 def test_masks_of_0_and_one_other_value_mean_the_same_in_perceive_and_train(shot, own, tmp_path, capsys, value):
     """The value is the target, which is said where the kit has another class of that number."""
     target = shot.frame.labels == TARGET

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from at_night import others_at_night
 from camera_files import FILES
 from PIL import Image, ImageOps
 from scenes import png_that_claims
@@ -101,7 +102,7 @@ def written(kind: str, path, metres: np.ndarray) -> None:
 # ------------------------------------------------------------------------------- from file to grasp, in one command
 
 
-@pytest.mark.parametrize("kind", ["tiff", "pfm", "npy", "npz", "exr"])
+@pytest.mark.parametrize("kind", others_at_night(["tiff", "pfm", "npy", "npz", "exr"], by_day=("tiff", "npz")))
 def test_depth_in_float_metres_gives_the_grasp_of_millimetres(kind, files):
     """NaN and infinity are no reading; the unit needs no word."""
     metres = DEPTH.copy()
@@ -273,7 +274,7 @@ def test_a_picture_is_turned_as_its_calibration_was(orientation, files):
 
 
 @pytest.mark.parametrize("depth_is_shown", [False, True])
-@pytest.mark.parametrize("already", [False, True])
+@pytest.mark.parametrize("already", others_at_night([False, True]))
 def test_a_portrait_picture_and_its_calibration_lead_to_the_grasp_of_the_sensors(depth_is_shown, already, files):
     _, usual = perceived(files)
     held(files, 6, depth_is_shown or already, already)

@@ -1,7 +1,7 @@
 """A class of synthetic students over all labs: every grade as constructed, nothing wrong passes or right fails.
 
-Students hand in all misconceptions, alternatives and spoilt answers; the attacks are in test_attacks. One lab; the
-others at night: every question's answers are judged in this process, too (reply/test_questions).
+Students hand in all misconceptions, alternatives and spoilt answers; the attacks are in test_attacks. At night,
+since every question's answers are judged in this process at each run (reply/test_questions).
 """
 
 import grading_course as kit
@@ -13,11 +13,10 @@ from labgrader.sandbox.sandbox import Limits
 
 SEED = "a hidden seed"
 LABS = [topic for topic in topics() if of_topic(topic)]  # those that have questions
-EACH_TIME = LABS[:1]  # that of the fewest students, and of answers that take no time
-AT_NIGHT = [pytest.param(topic, marks=pytest.mark.nightly) for topic in LABS if topic not in EACH_TIME]
 
 
-@pytest.mark.parametrize("topic", EACH_TIME + AT_NIGHT)
+@pytest.mark.nightly
+@pytest.mark.parametrize("topic", LABS)
 def test_every_grade_is_as_constructed(topic, tmp_path):
     students = kit.synthetic_class(topic)
     kit.write_lab(tmp_path, topic, whole=True)

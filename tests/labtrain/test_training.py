@@ -180,7 +180,12 @@ class OwnNetwork(nn.Module):
 
 
 @pytest.mark.parametrize(
-    ("model", "make"), [("smallsegnet", None), ("unet", None), ("unet_rgbd", None), ("mine", OwnNetwork)]
+    ("model", "make"),
+    [
+        *(pytest.param(name, None, marks=pytest.mark.nightly) for name in ("smallsegnet", "unet")),
+        ("unet_rgbd", None),
+        ("mine", OwnNetwork),
+    ],
 )
 def test_a_stopped_and_resumed_run_ends_with_the_very_same_weights(model, make, tmp_path, monkeypatch):
     """Stopped by a real SIGINT in the middle of an epoch, once in each of three steps, and gone on with each time."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from at_night import others_at_night
 from notebooks import ROOT, code
 from promises import Trial, examples, is_a_case, unsaid
 
@@ -35,7 +36,7 @@ def statement(question: Question) -> str:
 
 
 BLANKS = pytest.mark.parametrize("name", blanks())
-ROUNDS = pytest.mark.parametrize("rounds", [8, pytest.param(60, marks=pytest.mark.nightly)])
+ROUNDS = pytest.mark.parametrize("rounds", others_at_night([8, 60]))
 
 
 @BLANKS

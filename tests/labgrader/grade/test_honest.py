@@ -4,6 +4,7 @@ from pathlib import Path
 
 import grading_course as kit
 import pytest
+from at_night import others_at_night
 from submissions import OWN, Honest, as_editors_save_it, as_students_leave_it, in_other_labs
 from submissions.generated import generated
 
@@ -17,15 +18,16 @@ from labgrader.run import subprocess_worker
 from labgrader.run.run import Limits, Run, public_cases
 
 HONEST = in_other_labs()
+PARTS = 6  # in which they are handed in
 TOPICS = sorted({submission.name.partition(".")[0] for submission in HONEST})
 
 
-@pytest.mark.parametrize("third", [0, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2))])
+@pytest.mark.parametrize("part", others_at_night(range(PARTS)))
 @pytest.mark.parametrize("topic", TOPICS)
-def test_what_is_honest_is_right_and_the_file_check_says_the_same_before(topic, third, tmp_path):
+def test_what_is_honest_is_right_and_the_file_check_says_the_same_before(topic, part, tmp_path):
     kit.write_lab(tmp_path, topic, whole=True)
     submissions = [one for one in HONEST if one.name.startswith(topic)]
-    students = {f"s{i}": one for i, one in enumerate(submissions[third::3])}
+    students = {f"s{i}": one for i, one in enumerate(submissions[part::PARTS])}
     for student, submission in students.items():
         kit.submit(tmp_path, student, topic, submission.notebook())
     records = grade_course(topic, tmp_path, seed="secret", workers=2, progress=False).records
@@ -45,9 +47,7 @@ def whole_lab(topic: str) -> Honest:
     return Honest(topic, (*OWN["setup"], *((answer, name) for name, answer in kit.right_answers(topic).items())))
 
 
-@pytest.mark.parametrize(
-    "topic", [TOPICS[0], *(pytest.param(topic, marks=pytest.mark.nightly) for topic in TOPICS[1:])]
-)
+@pytest.mark.parametrize("topic", others_at_night(TOPICS))
 def test_whole_labs_are_right_however_an_editor_saves_them_and_wherever_the_cells_went(topic, tmp_path):
     """Each lab takes every fifth of the ways."""
     right = whole_lab(topic)

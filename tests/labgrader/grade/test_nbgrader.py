@@ -67,6 +67,7 @@ def copies(course: Path) -> dict[str, bytes]:
     return {student: (course / f"autograded/{student}/{TOPIC}/{TOPIC}.ipynb").read_bytes() for student in POINTS}
 
 
+@pytest.mark.nightly  # test_pages presses formgrader's button in a browser
 def test_autograde_refuses_in_one_sentence_and_touches_nothing(course):
     before = copies(course)
     done = autograde(course)
@@ -122,7 +123,7 @@ def test_a_score_that_is_not_the_kits_is_put_right(course):
     assert grade(course).graded_now == 0 and scores(course) == POINTS
 
 
-@pytest.mark.nightly  # test_pages presses it in a browser
+@pytest.mark.nightly
 def test_formgraders_button_refuses_too(course, tmp_path_factory):
     """What the bolt in formgrader's table asks its server for, whose log it then shows."""
     with serving.jupyterlab(course, tmp_path_factory.mktemp("jupyter")) as url:

@@ -31,7 +31,7 @@ from labgrader.reply.sentences import Sentence
 CHECKS, SEEDS = (0,), (0, 1, 20_260_101)  # the seed of `check`; those of the night
 LIMIT_S = 0.5
 # On how many random inputs a surviving mutant must differ nowhere, and how many seconds of a processor it may take.
-BY_DAY, AT_NIGHT = (40, 0.3), (150, 1.0)
+BY_DAY, AT_NIGHT = (40, 0.1), (150, 1.0)
 
 KINDS = ("operator", "comparison", "order", "sign", "not", "axis", "constant", "function", "brackets")
 

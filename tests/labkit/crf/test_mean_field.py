@@ -146,7 +146,7 @@ def test_the_lattice_is_the_one_of_the_paper(d):
     assert GaussianFilter("features", features).filtered(values) == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
-@pytest.mark.parametrize(("noise", "share"), [(False, 0.015), (True, 0.2)])
+@pytest.mark.parametrize(("noise", "share"), [(False, 0.015), pytest.param(True, 0.2, marks=pytest.mark.nightly)])
 def test_the_dense_crf_is_as_far_from_exact_mean_field_as_it_says(noise, share):
     rng = np.random.default_rng(3)
     H, W, C = 40, 60, 4
