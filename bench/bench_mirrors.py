@@ -13,6 +13,7 @@ brackets: the largest share in one set. The threshold of the look below the tabl
 """
 
 import sys
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,14 +38,24 @@ def main(sets: int = SETS) -> str:
     return table(header, rows)
 
 
-def shares(shots: Mirrored) -> tuple[float, ...]:
-    """Of the mirror's pixels: without depth, its own, that of what is seen, wrong; of the others: known."""
+class Shares(NamedTuple):
+    """Of the mirror's pixels: without depth, with its own, with that of what is seen, wrong; of the rest: known."""
+
+    without: float
+    own: float
+    seen: float
+    wrong: float
+    rest: float
+
+
+def shares(shots: Mirrored) -> Shares:
+    """Sweep the views, and compare with the truth about the first."""
     depth = sweep(shots.views).depth
     known = depth > 0.0
     own = known & (np.abs(depth - shots.depth) <= NEAR)
     seen = known & ~own & (np.abs(depth - shots.seen) <= NEAR)
     parts = (~known, own, seen, known & ~own & ~seen)
-    return (*(float(part[shots.there].mean()) for part in parts), float(known[~shots.there].mean()))
+    return Shares(*(float(part[shots.there].mean()) for part in parts), float(known[~shots.there].mean()))
 
 
 if __name__ == "__main__":
