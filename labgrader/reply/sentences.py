@@ -26,6 +26,7 @@ SLOW = (
     "It is right in {right} smaller cases, and too slow for a case as large as this one. Which work does it repeat, "
     "and which loop over single numbers could be one step for whole arrays?"
 )
+OF_NONE = "None is no number. Where does it come from, and which number does the task ask for there?"
 OF_BYTES = "Bytes are not an array yet. Which function of NumPy makes one of them, and with which dtype?"
 ASLEEP = "It waits, and computes nothing: does it sleep, or wait for something to be typed?"
 
@@ -131,6 +132,8 @@ def exceptions(question, cases, outputs, pieces=()) -> Iterator[Sentence]:
         yield Sentence("exception", out_of_time(cases, right, shown, got))
     if got.kind == "kind" and got.says.endswith(("got bytes", "got bytearray", "got memoryview")):
         yield Sentence("exception", OF_BYTES)
+    if got.kind == "kind" and got.says.startswith("there is a None"):
+        yield Sentence("exception", OF_NONE)
     if "returns None" in got.says:
         never = all(isinstance(other, Problem) and "returns None" in other.says for other in outputs)
         words = "It never reaches" if never else "In some cases it does not reach"

@@ -10,7 +10,7 @@ import torch
 from labgrader.comparison import Problem, as_numpy, compare, expected_cases
 from labgrader.question import Misconception, Property, Question, Untold, wrong
 from labgrader.reply.judge import judge, outputs_of, verdict
-from labgrader.reply.sentences import OF_BYTES, Sentence, at_once, recognise
+from labgrader.reply.sentences import OF_BYTES, OF_NONE, Sentence, at_once, recognise
 
 
 def iou(n):
@@ -289,6 +289,11 @@ def test_bytes_are_said_to_be_no_array_before_the_program_is_searched():
     """The absolute value of a bytearray is the array that was asked for, which says nothing of what is wrong."""
     for kind in (bytes, bytearray):
         assert judge(PLAIN, lambda n, kind=kind: kind(2), seed=3).hint == OF_BYTES
+
+
+def test_a_none_among_numbers_gets_a_hint_although_no_case_has_an_output():
+    """So does a list with None for what has no partner, in every case."""
+    assert judge(PLAIN, lambda n: [0.5, None], seed=3).hint == OF_NONE
 
 
 def test_the_hint_of_an_output_that_is_right_in_the_case_shown_is_not_said():
