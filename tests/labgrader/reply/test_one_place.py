@@ -49,6 +49,8 @@ def one_place_changed(question: Question) -> Iterator[tuple[str, int]]:
     both = zip(public_cases(question), listed_mistakes(question), strict=True)
     light = [(case, of_case) for case, of_case in both if not is_heavy(case.args, case.expected)]
     light.sort(key=lambda entry: weight(entry[0].args))
+    right = [of_case.get(fingerprint(case.expected), frozenset()) for case, of_case in light]
+    told_here = set(range(len(question.misconceptions))) - frozenset.intersection(*right)  # not in heavy cases alone
     absent = ("torch", "cv2", "scipy", "as_strided", *question.forbidden)  # a changed as_strided may end the process
     texts = [kit.as_cell(answer, question.function) for answer in alternatives(question)]
     for text in [text for text in texts if not any(name in text for name in absent)][:ANSWERS]:
@@ -62,7 +64,7 @@ def one_place_changed(question: Question) -> Iterator[tuple[str, int]]:
                         program.replace(statement)
                     except Exception:  # a change that is no program
                         continue
-                    told = set(range(len(question.misconceptions)))
+                    told = set(told_here)
                     for case, of_case in light:
                         told &= of_case.get(fingerprint(output_of(program, case.args)), frozenset())
                         if not told:
