@@ -6,8 +6,8 @@ lamps; poses are off by 0.04 degrees and 0.7 mm, as a printed sheet leaves them.
 side raised, 9 to 29 degrees. Leaning: 57 to 74 degrees. Pane: lies 4 cm over the table, its glass 8 % bright. Shares of
 the mirror's or glass's pixels in the first view: without depth; within 2 cm of its own surface; within 2 cm of what is
 seen in it or through it, as if there were no mirror; wrong, which is neither. Rest: of all other pixels, known. In
-brackets: the largest share in one set. The threshold of the look below the table (`DEEPER` in
-`labkit.geometry.sweep`) was chosen on the first three sets of flat, tilted and leaning mirrors. A ball's image lies
+brackets: the largest share in one set. The thresholds of the look below the table (`DEEPER` in
+`labkit.geometry.sweep`) were chosen on the first three sets of flat, tilted and leaning mirrors. A ball's image lies
 3 cm behind its surface, which is what comes out, and counts as wrong.
 `python -m bench.bench_mirrors 3` takes three sets of each.
 """

@@ -41,7 +41,7 @@ PROOF, PROVEN = 0.4, 0.3  # by so much a height must be cheaper than the table's
 COARSE = 0.03  # metres: where one pixel of the widest parallax means more, depth is not known
 SMALL = 160  # pixels of the longer side of the pictures in which what lies below the table is looked for,
 UNDER = 0.03, 30.0, 40  # from so many metres below it to so many, in so many steps of equal parallax;
-DEEPER = 0.1  # it is there where it costs so much less than all heights,
+DEEPER = 0.1, 0.05  # it is there where it costs so much less than all heights, and from there on, so much less,
 SUNK = 0.5  # and so is a raised piece of which so large a share is within a window of such a place
 LEAST_FITTED, REFLECTION = 50, 15  # points that exposure is fitted to; side of a window of these, 120 pixels wide
 DARK, BRIGHT = 8.0, 247.0  # grey levels beyond which a sensor tells no exposure
@@ -360,8 +360,9 @@ def _below(views: Sequence[View]) -> tuple[Bool[np.ndarray, "H W"], Bool[np.ndar
         each = [patterns.cost(*at, outside) for at in zip(seen, M, strict=True)]
         costs[..., k] = mean_of_best(each, SEEN_BY[0])
     total = semi_global(costs, first.rgb.astype(np.float32))
-    deeper = total[..., steps:].min(axis=-1) - total[..., :steps].min(axis=-1) > DEEPER
-    deeper = cv2.morphologyEx(deeper.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3)))
+    less = total[..., steps:].min(axis=-1) - total[..., :steps].min(axis=-1)
+    sure = cv2.morphologyEx((less > DEEPER[0]).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))) > 0
+    deeper = (_share_of_piece(less > DEEPER[1], sure) > 0.0).astype(np.uint8)
     empty = cv2.dilate(_empty(views[0].rgb), np.ones(2 * [times * (WINDOW + 1) + 1])) > 0
     grown = [cv2.dilate(deeper, np.ones((side, side))) for side in (3, WINDOW)]
     return tuple((cv2.resize(one, (W, H), interpolation=cv2.INTER_NEAREST) > 0) & ~empty for one in grown)
