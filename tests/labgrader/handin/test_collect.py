@@ -151,14 +151,13 @@ def test_a_zip_in_canvass_zip_is_its_students(tmp_path):
     collect(
         tmp_path,
         {
-            "adamseve_LATE_1235_567891_x.zip": zipped(
-                {"hoppergrace_7654_9_04_iou.ipynb": wrong, "04_iou.ipynb": right}
-            ),
+            "adamseve_LATE_1235_567891_x.zip": zipped({"hoppergrace_7654_9_04_iou.ipynb": wrong}),
             "hoppergrace_7654_567_04_iou.ipynb": right,
         },
     )
     points = {record.student: record.points for record in grade_course(TOPIC, tmp_path, progress=False).records}
-    assert points == {"adamseve_1235": TOTAL, "hoppergrace_7654": TOTAL}
+    assert points == {"adamseve_1235": 0.0, "hoppergrace_7654": TOTAL}
+    assert [path.name for path in (tmp_path / "submitted/hoppergrace_7654").rglob("*.ipynb")] == ["04_iou.ipynb"]
     assert marked_late(tmp_path, TOPIC).keys() == {"adamseve_1235"}
 
 
