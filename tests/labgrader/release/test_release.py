@@ -355,7 +355,7 @@ def test_a_lab_in_the_bundle_runs(tmp_path):
     with zipfile.ZipFile(tmp_path / "course.zip") as archive:
         archive.extractall(tmp_path)
     course = tmp_path / "course"
-    lab = [sys.executable, "-m", "pytest", "-q", "--nbval-lax", "--nbval-current-env", "-p", "no:cacheprovider"]
+    lab = [sys.executable, "-m", "pytest", "-q", "-p", "nbval.plugin", "--nbval-lax", "--nbval-current-env"]
     environment = os.environ | {"PYTHONPATH": str(course)}
     done = subprocess.run([*lab, "labs/04_iou"], cwd=course, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
