@@ -75,6 +75,7 @@ def test_autograde_refuses_in_one_sentence_and_touches_nothing(course):
     assert scores(course) == POINTS and copies(course) == before
 
 
+@pytest.mark.nightly
 def test_feedback_reaches_all_whoever_handed_in_no_secret_and_no_time_and_nobody_else_reads_the_course(course):
     """Ada's come from a hub, Ben handed in by Moodle, or wrote a time that is none; the commands run with umask 022."""
     for name, text in (("timestamp.txt", "2026-10-01 12:00:00 UTC"), ("submission_secret.txt", "hers")):
