@@ -38,6 +38,7 @@ def _any_classes(rng, shape):
 
 MOST_SIDE = 4000
 SIDES = {"H": (1, MOST_SIDE), "W": (1, MOST_SIDE)}
+_LARGE = np.random.default_rng(4).integers(2, size=(2, 1100, 1000), dtype=np.uint8)  # no part is like the whole
 QUESTION = Question(
     reference=confusion_matrix,
     kinds={
@@ -71,12 +72,7 @@ QUESTION = Question(
         (np.array([[0]], np.uint8), np.array([[0]], np.uint8), 1, 255),
         (np.array([[255, 255]], np.uint8), np.array([[0, 1]], np.uint8), 2, 255),  # nothing was judged
         (np.array([[0, 255]], np.uint8), np.array([[0, 0]], np.uint8), 1, 255),  # one class, and what nobody judged
-        (
-            np.zeros((240, 320), np.uint8),
-            np.ones((240, 320), np.uint8),
-            2,
-            255,
-        ),  # a frame: more than two bytes can count
+        (*_LARGE, 2, 255),  # more pixels of a pair than two bytes count
         (np.array([[19, 19, 18]], np.uint8), np.array([[19, 18, 19]], np.uint8), 20, 255),
         (np.array([[254]], np.uint8), np.array([[253]], np.uint8), 255, 255),
     ),
@@ -124,6 +120,16 @@ def shares(y_true, y_pred, num_classes, ignore, of):
     n = pair_count(*counted_pairs(y_true, y_pred, ignore), num_classes)
     with np.errstate(invalid="ignore"):
         return n / n.sum() if of == "all" else n / np.maximum(n.sum(axis=1, keepdims=True), 1)
+
+
+@wrong(
+    "A row is num_classes long, whatever that is: by which number do you multiply the true class?",
+    factor=(2, 3, 4, 10, 20),
+)
+def pairs_of_so_many_classes(y_true, y_pred, num_classes, ignore, factor):
+    rows, columns = counted_pairs(y_true, y_pred, ignore)
+    n = np.bincount(rows * factor + columns, minlength=num_classes**2)
+    return n[: num_classes**2].reshape(num_classes, num_classes)
 
 
 @wrong("With 20 classes the numbers go wrong: what is 19 * 20 + 19 in uint8, which ends at 255?")

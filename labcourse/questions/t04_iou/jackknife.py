@@ -25,6 +25,13 @@ def _frames_alike(rng):
     return (n + rng.integers(0, 30, (MOST_FRAMES, 2, 2)),)
 
 
+def _two_equal(rng):
+    """Draw the frames of a camera that stands still at the end: the last two are equal."""
+    (n,) = counts_of_frames(rng)
+    n[-1] = n[-2]
+    return (n,)
+
+
 def _ends_unlike(rng):
     """Draw a hundred frames of which the first and the last count most, each by another class."""
     n = rng.integers(1, 50, (MOST_FRAMES, 3, 3))
@@ -59,13 +66,13 @@ QUESTION = Question(
             free=("reversed along F",),
         )
     },
-    inputs=(counts_of_frames, _frames_alike, counts_of_frames, _many_classes, _ends_unlike),
+    inputs=(counts_of_frames, _frames_alike, _two_equal, _many_classes, _ends_unlike),
     by_hand=(
         (np.array([[[255, 0], [1, 3]], [[4, 5], [0, 6]]]),),
         (
             np.array([[[0, 0], [0, 1]], [[0, 99], [0, 0]]]),
         ),  # without one frame class 1 scores 0/99, without the other 1/1
-        (np.array([[[1, 1], [0, 2]], [[3, 0], [1, 0]], [[2, 0], [0, 2]]]),),
+        (np.array([[[1, 1], [0, 2]], [[3, 0], [1, 1]], [[1, 1], [0, 2]]]),),  # two frames are equal, and both count
         (_ONE_PIXEL,),  # one pixel is called class 2
         (np.array([[[30_000, 2_000], [0, 500]]] * 3),),  # no frame differs; more pixels than 16 bits count
         (np.array([[[3]], [[5]]]),),  # one class
@@ -207,6 +214,12 @@ def bias_corrected(n_frames):
 def left_out_for_good(n_frames):
     left = np.array([pooled(n_frames[k + 1 :]) for k in range(len(n_frames) - 1)])
     return pooled(n_frames), spread(left, lambda _: (len(n_frames) - 1) / len(n_frames))
+
+
+@wrong("Two frames may be equal, as where a camera stands still: each counts, and each is left out once.")
+def equal_frames_left_out_once(n_frames):
+    left = np.array([pooled(n_frames.sum(axis=0, keepdims=True) - n) for n in np.unique(n_frames, axis=0)])
+    return pooled(n_frames), spread(left, lambda F: (F - 1) / F)
 
 
 @wrong("The overlap is in the row sum and in the column sum: how often is it in your union?")

@@ -48,7 +48,7 @@ QUESTION = Question(
     by_hand=(
         (np.array([[5, 1, 0], [0, 3, 2], [0, 4, 6]]), np.array([0, 1, 1])),
         (np.array([[5, 1, 7], [0, 3, 2], [9, 4, 6]]), np.array([1, 0, 1])),  # groups need not be in order
-        (np.array([[5, 1], [2, 3]]), np.array([0, 0])),  # everything is one class
+        (np.array([[5, 1, 7], [2, 3, 0], [4, 8, 6]]), np.array([0, 0, 0])),  # everything is one class
         (np.array([[5, 1], [2, 3]]), np.array([1, 0])),
         (np.array([[5]]), np.array([0])),
         (np.array([[10**12, 10**12 - 2], [7, 10**12]]), np.array([0, 0])),  # few groups of many pixels
@@ -60,11 +60,33 @@ QUESTION = Question(
 # ---------------------------------------------------------------------------------------------------- wrong answers
 
 
-@wrong("Some pixels are lost: an index that occurs twice is written once. What adds them up?")
-def written_once(n, group):
-    merged = np.zeros((group.max() + 1, group.max() + 1), n.dtype)
-    merged[group[:, None], group] += n
+@wrong(
+    "Some pixels are lost: an index that occurs twice is written once. What adds them up?",
+    of=("cells", "columns", "rows"),
+)
+def written_once(n, group, of):
+    G = group.max() + 1
+    merged = np.zeros((G, G), n.dtype)
+    if of == "cells":
+        merged[group[:, None], group] += n
+    elif of == "columns":
+        merged[:, group] += old_columns(n, group)
+    else:
+        merged[group] += old_rows(n, group)
     return merged
+
+
+@wrong("Your matrix is as large as the last class's group says: that need not be the largest of the groups.")
+def last_entry_for_the_largest(n, group):
+    return merge_classes(n, group)[: group[-1] + 1, : group[-1] + 1]
+
+
+@wrong("A group may have three classes or more: you add up its first and its last. What of those between them?")
+def two_classes_of_each_group(n, group):
+    first = np.unique(group, return_index=True)[1]
+    last = len(n) - 1 - np.unique(group[::-1], return_index=True)[1]
+    ends = np.isin(np.arange(len(n)), [first, last])
+    return merge_classes(np.where(ends[:, None] & ends, n, 0), group)
 
 
 @wrong("Two classes have become one: where do the pixels go that were confused between them?")

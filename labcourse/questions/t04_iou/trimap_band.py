@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from labcourse.kinds import LONG, array, count
+from labcourse.kinds import array, count
 from labgrader.question import Question, wrong
 
 
@@ -36,18 +36,19 @@ def _labels(rng):
 
 
 def _long(rng, shape):
-    """Draw a picture of few pixels across and many along, of any classes, each a few pixels long, and a wide band."""
+    """Draw a picture of two pixels across and many along, of any classes, each a few pixels long, and a wide band."""
     y = np.repeat(LABELS.draw(rng, H=1, W=20)[0], rng.integers(1, 60, 20))
-    y = np.resize(y, LONG * 2).reshape(shape)
+    y = np.resize(y, shape)
     return y, int(rng.integers(9, MOST_WIDE + 1))
 
 
 MOST_WIDE = 16
+BEYOND_VGA = 700  # longer than a common image, which is 640 wide
 LABELS = array("H W", 0, 254, also=(255,), dtype="uint8", says=("0 .. 254", "255 is no class"))
 QUESTION = Question(
     reference=trimap_band,
     kinds={"y": LABELS, "width": count(1, MOST_WIDE, says="1 to 16")},
-    inputs=(_labels, partial(_long, shape=(2, LONG)), _labels, partial(_long, shape=(LONG, 2))),
+    inputs=(_labels, partial(_long, shape=(2, BEYOND_VGA)), _labels, partial(_long, shape=(BEYOND_VGA, 2))),
     by_hand=(
         (np.array([[1, 1, 1, 2, 2], [1, 1, 1, 1, 1]], np.uint8), 1),
         (np.full((4, 7), 3, np.uint8), 2),  # one class: no edge, at the image's border neither
@@ -108,6 +109,11 @@ def zero_is_no_class(y, width):
 @wrong("A class may have any number from 0 to 254: over which of them does your loop go?", count=(2, 3, 4, 5, 10, 20))
 def few_classes(y, width, count):
     return trimap_band(y, width) & (y < count)
+
+
+@wrong("A class may have any number from 0 to 254: over which of them does your loop go?", count=(2, 3, 4, 5, 10, 20))
+def few_classes_nearby(y, width, count):
+    return trimap_band(np.where(y < count, y, 255).astype(np.uint8), width)
 
 
 @wrong("An image of one class has no edge: beyond its border there is no class, not class 0.")
