@@ -7,6 +7,7 @@ from labcourse.kinds import number
 # What comes as an argument in several of the questions.
 PLACES = {"least": -10.0, "most": 10.0}  # metres, of a point's coordinates
 WITHIN = "within 10 m"
+MOST_OF_ONE = 10_000  # points of one object
 LENGTH = number(0.0, 1.0, says="0 to 1")
 ANY_ORDER = ("reversed along N", "unique along N")  # of points
 LAST_ROW = "* at ?3, ?]"  # of a pose: 0 0 0 1
@@ -34,6 +35,11 @@ def transform(R, origin):
     T = np.eye(4)
     T[:3] = np.column_stack([R, origin])
     return T
+
+
+def across(rng, axis):
+    """Draw an origin 7 m or more from the base's along an axis; minus it is twice as far away. Both are within 10 m."""
+    return axis * rng.uniform(7.0, 9.5) / np.abs(axis).max()
 
 
 def quarter_turns(rng):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcourse.kinds import array, number
-from labcourse.questions.t07_grasp import ANY_ORDER, LENGTH, PLACES, WITHIN, cloud
+from labcourse.questions.t07_grasp import ANY_ORDER, LENGTH, MOST_OF_ONE, PLACES, WITHIN, cloud
 from labgrader.question import Question, holds, wrong
 
 
@@ -31,11 +31,13 @@ def _upright(low, high):
 
 FREE = ("* at 3?0]", "* at 3?1]", "* at the first", "sorted along N", *ANY_ORDER)  # x and y do not count
 
+# Of all these points the last is the highest.
+_MANY = np.vstack([_upright(-1.0, -0.5), np.full((MOST_OF_ONE - 4, 3), -0.75), [[0.5, 0.1, -0.4375]]])
 
 QUESTION = Question(
     reference=grasp_height,
     kinds={
-        "P": array("N 3", **PLACES, says=("N at least 1", WITHIN), free=FREE),
+        "P": array("N 3", **PLACES, lengths={"N": (1, MOST_OF_ONE)}, says=("N from 1 to 10,000", WITHIN), free=FREE),
         "table_z": number(**PLACES, says=WITHIN),
         "palm": LENGTH,
         "tips": LENGTH,
@@ -56,7 +58,7 @@ QUESTION = Question(
         (_upright(-9.875, -9.75), -9.875, 0.25, 1.0, 1.0),
         (_upright(-0.1234, 0.3456), -0.2345, 0.1737, 0.12345, 0.0123456),  # few digits do not hold these
         (_upright(-0.1234, 0.0456), -0.1268, 0.5, 0.12345, 0.0123456),
-        (np.vstack([_upright(-1.0, -0.5), np.full((299, 3), -0.75), [[0.5, 0.1, -0.4375]]]), -1.0, 0.25, 0.125, 0.0),
+        (_MANY, -1.0, 0.25, 0.125, 0.0),
     ),
     edges=10,
     random_cases=20,
@@ -100,6 +102,15 @@ def palm_forgotten(P, table_z, palm, tips, clearance):
 @wrong("Only the upper part was seen, and you reach below it: what is there is unknown.")
 def unseen_depth(P, table_z, palm, tips, clearance):
     return max(P[:, 2].max() - palm, table_z + clearance) + tips
+
+
+@wrong(
+    "You let the palm's bound cap the height. What does the palm meet if the tips go below that bound?",
+    last=("table", "palm"),
+)
+def palm_as_an_upper_limit(P, table_z, palm, tips, clearance, last):
+    low, cap, table = P[:, 2].min(), P[:, 2].max() - palm, table_z + clearance
+    return (max(min(low, cap), table) if last == "table" else min(max(low, table), cap)) + tips
 
 
 @wrong("All three bounds are heights of the tips, but you add tips only to the table's.")

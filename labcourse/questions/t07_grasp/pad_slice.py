@@ -9,9 +9,11 @@ from labcourse.questions.t07_grasp import (
     FROM_BELOW,
     LAST_ROW,
     LENGTH,
+    MOST_OF_ONE,
     PLACES,
     TURNED,
     WITHIN,
+    across,
     axes_of_yaw,
     cloud,
     quarter_turns,
@@ -49,18 +51,28 @@ def _cloud_and_grasp(rng):
     return P, T, float(half)
 
 
+def _far_along_y(rng):
+    """Draw a hand, and points that are more than 10 m away from it along y, one way or the other."""
+    R, P = rotation(rng), cloud(rng)
+    origin = across(rng, R[:, 1]) * rng.choice([-1.0, 1.0])
+    return P - P.mean(axis=0) - origin, transform(R, origin), float(rng.uniform(0.02, 0.05))
+
+
 # In the frame FACING_X, whose y is the base's x and whose x is the base's y: an L.
 _L = np.array([[1.5, 1.0, 0.5], [2.25, 1.125, 0.5], [1.75, 0.5, 0.5], [5.0, 1.5, 0.5], [2.5, 0.75, 0.0]])
+_MANY = np.vstack([np.resize(_L, (MOST_OF_ONE - 2, 3)), [[0.5, 1.0, 0.5], [4.25, 1.0, 0.5]]])
 
 
 QUESTION = Question(
     reference=pad_slice,
     kinds={
-        "P": array("N 3", **PLACES, says=("N at least 1", WITHIN), free=ANY_ORDER),
+        "P": array(
+            "N 3", **PLACES, lengths={"N": (1, MOST_OF_ONE)}, says=("N from 1 to 10,000", WITHIN), free=ANY_ORDER
+        ),
         "T_base_grasp": poses(free=(LAST_ROW, "* at ??, 2]")),  # nor on what is along the approach
         "half": LENGTH,
     },
-    inputs=_cloud_and_grasp,
+    inputs=(_cloud_and_grasp, _cloud_and_grasp, _far_along_y),
     by_hand=(
         (_L, FACING_X, 0.25),  # the point at the edge of the pads counts
         (_L, FACING_X, 0.125),
@@ -78,7 +90,7 @@ QUESTION = Question(
             FACING_X,
             0.12342,
         ),  # few digits do not hold these
-        (np.tile(_L, (60, 1)), FACING_X, 0.25),
+        (_MANY, FACING_X, 0.25),  # the last two are the outermost
     ),
     edges=7,
     random_cases=14,
@@ -134,6 +146,18 @@ def extremes_that_begin_at_0(P, T_base_grasp, half):
     x, y, _ = in_grasp(P, T_base_grasp)
     y = y[np.abs(x) <= half]
     return middle_and_width(np.append(y, 0.0))
+
+
+@wrong("P has no order: need the first and the last of the points between the pads be the outermost?")
+def first_and_last(P, T_base_grasp, half):
+    x, y, _ = in_grasp(P, T_base_grasp)
+    return middle_and_width(y[np.abs(x) <= half][[0, -1]]) if (np.abs(x) <= half).any() else (0.0, 0.0)
+
+
+@wrong("The hand may lean: the points and its axes have three components each, and you drop the third.")
+def seen_from_above(P, T_base_grasp, half):
+    x, y = ((P - T_base_grasp[:3, 3])[:, :2] @ T_base_grasp[:2, :2]).T
+    return middle_and_width(y[np.abs(x) <= half])
 
 
 @wrong("Cut the points in the grasp frame: does a pad know where the base's axes point?")

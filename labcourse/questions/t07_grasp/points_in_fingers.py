@@ -12,6 +12,7 @@ from labcourse.questions.t07_grasp import (
     TURNED,
     TURNED_OVER,
     WITHIN,
+    across,
     quarter_turns,
     transform,
 )
@@ -45,6 +46,21 @@ def _scene_round_a_grasp(rng):
     P = moved(rng.uniform([-0.02, -0.06, -0.05], [0.02, 0.08, 0.03], (120, 3)), T).T
     width, half = float(rng.uniform(0.03, 0.05)), float(rng.uniform(0.009, 0.012))
     return P, T, width, half, float(rng.uniform(0.013, 0.02)), float(rng.uniform(0.005, 0.012))
+
+
+def _thin_and_far(rng):
+    """Draw fingers as thin as a sheet of card, and points just in and just outside of them, or 11 m up and more."""
+    R, width = rotation(rng), float(rng.uniform(0.03, 0.08))
+    half, thickness, tips = map(float, rng.uniform(2e-4, 6e-4, 3))
+    part = rng.uniform(0.1, 0.9, (36, 3))  # of the way to a border
+    for k in range(3):
+        part[5 * k : 5 * k + 5, k] = rng.uniform(1.1, 1.5, 5)
+    x, out, z = (part * (half, thickness, tips)).T
+    z[-8:] -= rng.uniform(11.0, 13.5, 8)
+    x_side, y_side = rng.choice([-1.0, 1.0], (2, 36))
+    T = transform(R, across(rng, R[:, 2]))
+    in_grasp = np.stack([x_side * x, y_side * (width / 2 + out), z], axis=1)
+    return moved(in_grasp, T).T, T, width, half, thickness, tips
 
 
 # Beside the jaws along the base's x. Those that count: at the pad, a finger's thickness outside it, three at the tips,
@@ -87,7 +103,7 @@ QUESTION = Question(
         "thickness": LENGTH,
         "tips": LENGTH,
     },
-    inputs=_scene_round_a_grasp,
+    inputs=(_scene_round_a_grasp, _scene_round_a_grasp, _thin_and_far),
     by_hand=(
         (np.array([_OUT[0], *_IN, *_OUT[1:]]), FACING_X, 1.0, 0.25, 0.25, 0.25),
         (np.array(_IN[:1]), FACING_X, 1.0, 0.25, 0.25, 0.25),

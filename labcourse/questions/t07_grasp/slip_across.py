@@ -129,6 +129,12 @@ def with_signs(T_base_grasp, middle):
     return off[1], off[0]
 
 
+@wrong("A part that points against the axis is not 0: how far off is a middle on the other side of the hand?")
+def one_side_alone(T_base_grasp, middle):
+    off = 1000.0 * T_base_grasp[:3, :3].T @ (middle - T_base_grasp[:3, 3])
+    return np.maximum(off[1], 0.0), np.maximum(off[0], 0.0)
+
+
 @wrong("The middle is a point of the base frame: where is it, seen from the grasp's origin?")
 def middle_taken_as_it_is(T_base_grasp, middle):
     x, y = T_base_grasp[:3, 0], T_base_grasp[:3, 1]
