@@ -85,11 +85,13 @@ def fits(kind: Kind, name: str) -> bool:
 
 
 def ends(kind: Kind) -> dict[str, Change]:
-    """Cut where a kind goes on: half way to its largest number, just before it, at twice its smallest; fewer digits."""
+    """Cut where a kind goes on: half way to its largest number, just before it, near its smallest; fewer digits."""
     most = min(kind.most, LARGE)
     found = {"half of the largest": lambda x: np.clip(x, -most / 2, most / 2)}
     if np.isfinite(kind.most):
         found["nine tenths of the largest"] = lambda x: np.clip(x, -0.9 * kind.most, 0.9 * kind.most)
+    if kind.least == 0.0 and not kind.whole:
+        found["a thousandth at least"] = lambda x: np.maximum(x, 1e-3)
     if kind.least > 0:
         found["twice the smallest"] = lambda x: np.maximum(x, 2 * kind.least)
     if kind.digits > 7:
@@ -122,13 +124,18 @@ def changed_at(change: Change, place: tuple, x: np.ndarray) -> np.ndarray:
 
 
 def on_axes(kind: Kind, x: np.ndarray) -> dict[str, Change]:
-    """What makes the order along an axis, or all of it but the first, count for nothing."""
+    """What makes the order along an axis, all of it but the first, or what comes late, count for nothing."""
     named = [(k, axis) for k, axis in enumerate(named_axes(kind, x)) if x.shape[k] > 1]
     found = {
         f"{name} along {axis}": (lambda x, change=change, k=k: change(x, k))
         for (name, change), (k, axis) in itertools.product(ALONG.items(), named)
     }
     longest = {axis: kind.length(axis)[1] for _, axis in named if not axis.startswith("...")}
+    found |= {
+        f"the first {LONG - 1} along {axis}": (lambda x, k=k: np.take(x, range(min(LONG - 1, x.shape[k])), k))
+        for k, axis in named
+        if longest.get(axis, 0) is None
+    }
     return found | {
         f"all but the last of {longest[axis]} along {axis}": (lambda x, k=k: np.take(x, range(x.shape[k] - 1), k))
         for k, axis in named

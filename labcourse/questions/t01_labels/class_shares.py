@@ -25,11 +25,16 @@ def _many_labels(rng):
 
 
 def _all_classes(rng, shape):
-    """Draw images of a shape with any of 255 classes, and pixels that are not judged, but not all of an image."""
+    """Draw images of a shape with any of 255 classes, and pixels that are not judged, but not all of an image.
+
+    The last class is at the last pixel alone.
+    """
     y = LABELS.draw(rng, N=shape[0], H=shape[1], W=shape[2])
     unjudged = rng.random(shape) < 0.5
     unjudged[:, 0, 0] = False
-    return np.where(unjudged, 255, np.where(y == 255, 0, y)).astype(np.uint8), MOST_CLASSES
+    y = np.where(unjudged, 255, np.where(y >= MOST_CLASSES - 1, 0, y)).astype(np.uint8)
+    y[-1, -1, -1] = MOST_CLASSES - 1
+    return y, MOST_CLASSES
 
 
 LABELS = labels("N H W", free=("reversed*", "sorted along [HW]"))

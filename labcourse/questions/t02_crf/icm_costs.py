@@ -27,7 +27,9 @@ def _pixel_of(rng, draw):
     return y, psi, weights, int(rng.integers(y.shape[0])), int(rng.integers(y.shape[1]))
 
 
-_LONG_ROW, _LONG_COLUMN = (labelled_model(np.random.default_rng(3), *sides, 2) for sides in ((1, LONG), (LONG, 1)))
+_LONG_ROW, _LONG_COLUMN = (
+    labelled_model(np.random.default_rng(3), *sides, 2) for sides in ((1, LONG + 1), (LONG + 1, 1))
+)
 _ONE_PAIR = np.zeros((4, 2, 2))
 _ONE_PAIR[1, 0, 1] = 1e6
 _LABELS, *_REST = labelled_model(np.random.default_rng(2), 3, 4)

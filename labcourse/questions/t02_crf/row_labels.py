@@ -86,7 +86,7 @@ QUESTION = Question(
         (np.array([[-9.2e5, -9.8e5]]), np.zeros(0)),
         (np.array([[4e-4, 2e-4]]), np.zeros(0)),
         (np.array([[0.0, 9.9e5], [9.5e5, 0.0]]), np.array([9.7e5])),
-        (np.array([[0.0, 9e-4], [3e-4, 0.0]]), np.array([4e-4])),
+        (np.array([[0.0, 9e-4, 9e-4], [3e-4, 0.0, 9e-4], [5e-4, 9e-4, 0.0]]), np.array([4e-4, 2e-4])),
     ),
     edges=9,
     random_cases=12,

@@ -80,7 +80,7 @@ QUESTION = Question(
             dtype="float64 float32",
             lengths=_SIDES,
             says=("0..1", "1 to 400"),
-            free=("whole", "0 to NaN", "nine tenths*"),
+            free=("whole", "0 to NaN", "nine tenths*", "a thousandth*"),
         ),
         "votes": array(
             "H W 2",

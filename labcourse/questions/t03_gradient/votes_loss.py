@@ -29,6 +29,7 @@ ONE_ROW = np.array([[3, 3, 3, 0, 255]], np.uint8)
 def _scattered_things(rng, shape, size, beta, numbers=(0, 1, 9, 128, 254, 255)):
     """Draw votes of a size, scattered things of some numbers in a picture of a shape, and beta from a range."""
     instances = rng.permutation(np.resize(numbers, np.prod(shape))).reshape(shape)
+    instances[-1, -1] = 254  # what is last counts
     votes = np.clip(size * rng.normal(size=(*shape, 2)), -1e6, 1e6)
     return votes, instances.astype(np.uint8), float(rng.uniform(*beta))
 

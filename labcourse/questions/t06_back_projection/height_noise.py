@@ -40,8 +40,8 @@ _TURNED_OVER = np.diag([1.0, -1.0, -1.0, 1.0]) @ _SLANTED
 QUESTION = Question(
     reference=height_noise,
     kinds={
-        "u": number(0.0, 4000.0, says="0 to 4000"),
-        "v": number(0.0, 4000.0, says="0 to 4000"),
+        "u": number(0.0, 4000.0, says="0 to 4000", free=("a thousandth*",)),
+        "v": number(0.0, 4000.0, says="0 to 4000", free=("a thousandth*",)),
         "d": number(0.01, 100.0, says="0.01 to 100"),
         "K": intrinsics(),
         "T_base_cam": poses(free=("*at ?0, *", "*at ?1, *", "*at ?3, *", "*at ?2, 3]")),

@@ -45,7 +45,7 @@ QUESTION = Question(
     reference=undistort,
     kinds={
         "pixels": array("N 2", -5000.0, 6000.0, says="-5000 to 6000"),
-        "K": intrinsics(free=("*at ?2, *",)),  # the row 0 0 1
+        "K": intrinsics(free=("*at ?2, *", "a thousandth*")),  # the row 0 0 1, and a skew of a thousandth
         "k": array(
             "2",
             says=("k1 from -0.3 to 0.4", "k2 from 0 to 0.1"),
