@@ -33,8 +33,8 @@ def _two_equal(rng):
 
 
 def _ends_unlike(rng):
-    """Draw a hundred frames of which the first and the last count most, each by another class."""
-    n = rng.integers(1, 50, (MOST_FRAMES, 3, 3))
+    """Draw a hundred frames, many equal; the first and the last count most, each by another class."""
+    n = np.resize(rng.integers(1, 50, (MOST_FRAMES // 3, 3, 3)), (MOST_FRAMES, 3, 3))
     n[0, 0, 1:], n[-1, 1:, 0] = rng.integers(3000, 9000, (2, 2))
     return (n,)
 
