@@ -58,7 +58,7 @@ QUESTION = Question(
     inputs=(
         _label_pair,
         partial(_any_classes, shape=(MOST_SIDE, 2)),
-        partial(_label_pair, shape=(40, 60), classes=(2,)),  # more pixels of a pair than a byte counts
+        partial(_label_pair, shape=(40, 60), classes=(2, 3)),  # more pixels of a pair than a byte counts
         partial(_any_classes, shape=(1, MOST_SIDE)),
     ),
     by_hand=(
