@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from at_night import others_at_night
 
 from labcourse.exam.draw import bank, choose, draw, topics, topics_of
 from labcourse.exam.page import exam, write
@@ -459,7 +460,7 @@ def numerical(value) -> bool:
     return np.asarray(value).dtype.kind in "iuf"
 
 
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 30), marks=pytest.mark.nightly)], ids=len)
+@pytest.mark.parametrize("seeds", others_at_night([range(4), range(4, 30)]), ids=len)
 @pytest.mark.parametrize("question", BANK, ids=lambda question: f"{question.topic}.{question.name}")
 def test_a_wrong_value_tells_one_mistake_and_versions_share_no_answer(question, seeds):
     """In three versions of each seed; titles ask for nothing that the text does not."""

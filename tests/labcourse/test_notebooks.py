@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from at_night import others_at_night
 from notebooks import FEWER, FEWER_IN_LABS, LABS, LESSONS, ROOT, SOLUTIONS, code, is_compared, notebook, prose
 
 from labgrader.check import describe
@@ -154,7 +155,7 @@ def cells_to_first_check(path: Path) -> str:
     return "\n".join(sources[: next(i for i, text in enumerate(sources) if " = check(" in text) + 1])
 
 
-@pytest.mark.parametrize("topic", [pytest.param("01_labels", marks=pytest.mark.nightly), "04_iou"])
+@pytest.mark.parametrize("topic", others_at_night(["01_labels", "04_iou"], by_day=("04_iou",)))
 def test_a_lab_loads_no_heavy_package_before_its_first_check(topic):
     """On a hub everybody's kernel has its own copy: PyTorch takes 120 MB of memory, numba 30."""
     path = ROOT / "labs" / topic / f"{topic}.ipynb"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import grading_course as kit
 import pytest
+from at_night import others_at_night
 
 from labgrader.check import check
 from labgrader.course import find
@@ -19,7 +20,6 @@ from labgrader.handin.reading import read_lab, read_submission
 
 pytestmark = pytest.mark.bad_input  # without the shape checks, as outside the suite
 ANSWERS = json.loads((Path(__file__).parents[2] / "data" / "answers.json").read_text())
-SOME = [pytest.param(a, marks=[pytest.mark.nightly] if i % 16 else []) for i, a in enumerate(ANSWERS)]
 
 
 def block_of(function: str, printed: str) -> list[str]:
@@ -35,7 +35,11 @@ def block_of(function: str, printed: str) -> list[str]:
     return [line for line in block if line]
 
 
-@pytest.mark.parametrize("answer", SOME, ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}")
+@pytest.mark.parametrize(
+    "answer",
+    others_at_night(ANSWERS, by_day=ANSWERS[::16]),
+    ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}",
+)
 def test_notebook_file_and_page_say_the_same(answer, tmp_path, capsys, monkeypatch):
     question, source = find(answer["question"]), answer["source"]
     monkeypatch.setitem(kit.FEW, question.topic, (question.function,))

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from at_night import others_at_night
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from labgrader.course import asked
@@ -452,7 +453,7 @@ def test_a_repository_that_git_does_not_read_is_no_folder_without_one(course, tm
     assert not bundle(course, tmp_path / "x.zip").tracked
 
 
-@pytest.mark.parametrize("labs", [["90_one"], pytest.param([], marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("labs", others_at_night([["90_one"], []]))
 def test_what_is_published_on_a_hub_is_what_git_tracks(course, tmp_path, labs):
     release(course)
     shutil.copytree(ROOT / "deploy", course / "deploy")

@@ -31,7 +31,7 @@ from labgrader.reply.sentences import Sentence
 CHECKS, SEEDS = (0,), (0, 1, 20_260_101)  # the seed of `check`; those of the night
 LIMIT_S = 0.5
 # On how many random inputs a surviving mutant must differ nowhere, how many seconds of a processor it may take, and
-# every which mutant is tried.
+# which mutants are tried: every third, or all.
 BY_DAY, AT_NIGHT = (40, 0.1, 3), (150, 1.0, 1)
 
 KINDS = ("operator", "comparison", "order", "sign", "not", "axis", "constant", "function", "brackets")

@@ -59,11 +59,6 @@ def mended(question, pieces, finding) -> bool:
     return False
 
 
-def some(answers: list) -> list:
-    """Every fifth at once, and all of them at night."""
-    return [pytest.param(a, marks=[pytest.mark.nightly] if i % 5 else []) for i, a in enumerate(answers)]
-
-
 def looked_at(verdict, pieces, repair: bool = True) -> list[Finding]:
     """What a worker finds in a program, found in this process."""
     question, shown = verdict.question, verdict.case or 0
@@ -75,7 +70,11 @@ def looked_at(verdict, pieces, repair: bool = True) -> list[Finding]:
     return found[:MOST_FINDINGS]
 
 
-@pytest.mark.parametrize("answer", some(ANSWERS), ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}")
+@pytest.mark.parametrize(
+    "answer",
+    others_at_night(ANSWERS, by_day=ANSWERS[::5]),
+    ids=lambda a: f"{a['question'].partition('.')[2]}: {a['thought']}",
+)
 def test_an_answer_is_told_what_its_reader_can_use(answer):
     """A listed mistake may take the place of any other sentence, which still is true."""
     question, pieces = find(answer["question"]), pieces_of(answer)
@@ -119,7 +118,7 @@ TWO_MISTAKES = [
 @pytest.mark.parametrize("name, source, marked, says", TWO_MISTAKES, ids=[name for name, *_ in TWO_MISTAKES])
 def test_a_place_is_marked_beside_a_listed_mistake(name, source, marked, says):
     question = find(name)
-    pieces = ("quiet", "import numpy as np"), (question.function, source)
+    pieces = pieces_of({"question": name, "source": source})
     verdict = judge(question, LiveProgram(question.function, pieces).answer, PUBLIC_SEED)
     sentence = next(sentences(question, verdict.cases, verdict.outputs, pieces, looked_at(verdict, pieces)))
     assert [f"{line.number}: {line.text[a:b]}" for line in sentence.marked for a, b in line.parts] == marked
