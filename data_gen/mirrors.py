@@ -211,23 +211,23 @@ def on_a_ball(picture, middle, Q):
     return painted(picture, 1000.0 * (Q - middle)[:, :2] + 300.0 * (Q - middle)[:, 2:])
 
 
-def mirror(kind: str, rng: np.random.Generator, facing: float) -> list[Surface]:
+def mirror(kind: str, rng: np.random.Generator, facing: float) -> Surface:
     """A mirror or a glass in the middle of the table; those that stand or lean face the azimuth `facing`."""
     half = rng.uniform(0.08, 0.12), rng.uniform(0.07, 0.1)
     glass = {"back": GLASS, "through": True} if "pane" in kind or kind == "tumbler" else {"back": SILVER}
     facing += rng.uniform(-0.3, 0.3)
     if kind == "ball":
         r = rng.uniform(0.05, 0.07)
-        return [ball((0, 0, r), r, **glass)]
+        return ball((0, 0, r), r, **glass)
     if kind == "tumbler":
-        return [tube((0, 0, 0), rng.uniform(0.03, 0.045), rng.uniform(0.09, 0.15), **glass)]
+        return tube((0, 0, 0), rng.uniform(0.03, 0.045), rng.uniform(0.09, 0.15), **glass)
     lean = {"flat": 0.0, "pane": 0.0, "tilted": rng.uniform(0.15, 0.5), "leaning": rng.uniform(1.0, 1.3)}.get(
         kind, np.pi / 2
     )
     x = np.array([-np.sin(facing), np.cos(facing), 0.0])
     up = np.array([-np.cos(lean) * np.cos(facing), -np.cos(lean) * np.sin(facing), np.sin(lean)])
-    raised = {"pane": 0.04}.get(kind, 0.003)
-    return [rectangle((0, 0, raised + half[1] * np.sin(lean)), x, up, half, **glass)]
+    raised = 0.04 if kind == "pane" else 0.003
+    return rectangle((0, 0, raised + half[1] * np.sin(lean)), x, up, half, **glass)
 
 
 def photographed(kind: str, seed: int, patterned: bool = True, size=SIZE, count: int = 7) -> Mirrored:
@@ -236,9 +236,7 @@ def photographed(kind: str, seed: int, patterned: bool = True, size=SIZE, count:
     around, distance, elevation = rng.uniform(-np.pi, np.pi), rng.uniform(0.48, 0.6), rng.uniform(0.75, 1.2)
     table = pattern(rng, rng.uniform(70.0, 190.0, 3), rng.uniform(6.0, 25.0))
     board = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0), (0.6, 0.6), picture=table)
-    surfaces = [*room(rng, patterned), board, *things(rng)]
-    special = range(len(surfaces), len(surfaces) + 1)
-    surfaces += mirror(kind, rng, around)
+    surfaces = [*room(rng, patterned), board, *things(rng), mirror(kind, rng, around)]
     K = intrinsics(FOV_Y, *size)
     pixels = np.stack([*np.meshgrid(np.arange(float(size[0])), np.arange(float(size[1]))), np.ones(size[::-1])], -1)
     rays = pixels.reshape(-1, 3) @ np.linalg.inv(K).T
@@ -251,7 +249,7 @@ def photographed(kind: str, seed: int, patterned: bool = True, size=SIZE, count:
         colours, *about = follow(surfaces, np.broadcast_to(T[:3, 3], rays.shape), rays @ T[:3, :3].T)
         if truth is None:
             near, whole, which = (a.reshape(size[::-1]) for a in about)
-            truth = near, whole, np.isin(which, special)
+            truth = near, whole, which == len(surfaces) - 1
         drawn = np.clip(colours, 0.0, 255.0).reshape(*size[::-1], 3)
         large = cv2.resize(drawn.astype(np.float32), None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC)
         taken = as_a_phone(np.clip(large, 0.0, 255.0).astype(np.uint8), rng)

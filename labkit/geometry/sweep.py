@@ -10,7 +10,7 @@ where photographs agree better on something far below the table: that is a refle
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -105,9 +105,8 @@ def view_of_sheet(
     misfit = float(np.sqrt((off**2).sum(axis=1).mean())) / max(height, width)
     straight = cv2.undistort(picture, np.asarray(K, float), np.array(distortion, float)) if any(distortion) else picture
     scale = min(1.0, WIDEST / max(height, width))
-    size = round(scale * width), round(scale * height)
-    small = cv2.resize(straight, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else straight
-    return View(small, resized_K(K, (width, height), size), invert_transform(T_cam_sheet), misfit)
+    view = View(straight, K, invert_transform(T_cam_sheet), misfit)
+    return _resized(view, (round(scale * width), round(scale * height)))
 
 
 def frame_from_views(views: Sequence[View], progress: Callable = lambda heights: heights) -> RGBDFrame:
@@ -348,7 +347,7 @@ def _below(views: Sequence[View]) -> tuple[Bool[np.ndarray, "H W"], Bool[np.ndar
     """
     H, W = views[0].rgb.shape[:2]
     times = max(1, round(max(H, W) / SMALL))
-    first, *others = (_smaller(view, times) for view in views)
+    first, *others = (_resized(view, (W // times, H // times)) for view in views)
     patterns, seen = Patterns(_gray(first)), [_gray(view) for view in others]
     up, (near, far, steps) = first.T_base_cam[2, 3], UNDER
     under = up - 1.0 / np.linspace(1.0 / (up + far), 1.0 / (up + near), steps)
@@ -456,12 +455,11 @@ def _halved(view: View) -> Float32[np.ndarray, "h w 3"]:
     return cv2.resize(view.rgb.astype(np.float32), (W // 2, H // 2), interpolation=cv2.INTER_AREA)
 
 
-def _smaller(view: View, times: int) -> View:
-    """The view in a picture that is so many times smaller."""
+def _resized(view: View, size: tuple[int, int]) -> View:
+    """The view in a picture of another, smaller size: width, height."""
     H, W = view.rgb.shape[:2]
-    size = W // times, H // times
     small = cv2.resize(view.rgb, size, interpolation=cv2.INTER_AREA)
-    return View(small, resized_K(view.K, (W, H), size), view.T_base_cam)
+    return replace(view, rgb=small, K=resized_K(view.K, (W, H), size))
 
 
 def _upsampled(costs: Float32[np.ndarray, "N h w"], size: tuple[int, int]) -> Float32[np.ndarray, "N H W"]:

@@ -43,7 +43,7 @@ def test_rays_meet_balls_boxes_and_tubes_where_they_are():
 def test_every_kind_is_met_above_the_table(kind):
     rng = np.random.default_rng(0)
     points = rng.uniform((-0.2, -0.2, 0.3), (0.2, 0.2, 0.6), (500, 3))
-    (surface,) = mirror(kind, rng, 0.0)
+    surface = mirror(kind, rng, 0.0)
     rays = (0.0, 0.0, 0.02) - points
     distance = surface.meet(points, rays)
     met = np.isfinite(distance)
